@@ -1,0 +1,1 @@
+"""Tracks in, pose estimate out."""

@@ -1,0 +1,114 @@
+"""The averaged estimate: the mean of what a regressor says of each track."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.errors import TooFewTrajectoriesError
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import (
+    Array,
+    angles_from_rotation,
+    mean_quaternion,
+    rotation_from_quaternion,
+)
+
+FEWEST_TRACKS = 5
+_RESAMPLES = 300
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackPredictions:
+    """What a regressor says of N tracks: heights (N,) in metres, quaternions wxyz (N, 4)."""
+
+    height_m: Array
+    quaternion_wxyz: Array
+
+    def __len__(self) -> int:
+        return int(self.height_m.size)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseEstimate:
+    """Height, tilt and roll from tracks, each with its standard deviation.
+
+    `heading_rad` is the heading of the averaged orientation. It is no measurement (a ground plane
+    and walking people do not show it) but part of the paper's angle error.
+    """
+
+    height_m: float
+    tilt_rad: float
+    roll_rad: float
+    heading_rad: float
+    height_sd_m: float
+    tilt_sd_rad: float
+    roll_sd_rad: float
+    tracks: int
+
+
+def average_windows(
+    height_m: Array, quaternion_wxyz: Array, owner_idx: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int64], TrackPredictions]:
+    """One prediction for each track that has windows: their owners, and the means.
+
+    Args:
+        height_m: of each window (B,).
+        quaternion_wxyz: of each window (B, 4).
+        owner_idx: the track of each window (B,).
+    """
+    owners = np.unique(owner_idx)
+    rows = [np.flatnonzero(owner_idx == owner) for owner in owners]
+    heights = np.array([height_m[row].mean() for row in rows])
+    quaternions = np.array([mean_quaternion(quaternion_wxyz[row]) for row in rows]).reshape(-1, 4)
+    return owners, TrackPredictions(height_m=heights, quaternion_wxyz=quaternions)
+
+
+def averaged_estimate(predictions: TrackPredictions, seed: int) -> PoseEstimate:
+    """The mean over tracks, with standard deviations by bootstrap over tracks.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks.
+
+    Source: Xu et al. 2020, section 3.4; orientations by Markley 2007.
+    """
+    count = len(predictions)
+    if count < FEWEST_TRACKS:
+        raise TooFewTrajectoriesError(
+            f"tracks: at least {FEWEST_TRACKS} with a prediction are needed, got {count}"
+        )
+    # A resample is a weight for each track: how often it was drawn.
+    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), _RESAMPLES)
+    weights = np.concatenate([np.ones((1, count)), drawn])
+    heights = weights @ predictions.height_m / count
+    means = mean_quaternion(
+        np.broadcast_to(predictions.quaternion_wxyz, (len(weights), count, 4)), weights
+    )
+    tilts, rolls, headings = angles_from_rotation(rotation_from_quaternion(means))
+    return PoseEstimate(
+        height_m=float(heights[0]),
+        tilt_rad=float(tilts[0]),
+        roll_rad=float(rolls[0]),
+        heading_rad=float(headings[0]),
+        height_sd_m=float(heights[1:].std(ddof=1)),
+        tilt_sd_rad=float(tilts[1:].std(ddof=1)),
+        roll_sd_rad=float(_around(rolls[1:], rolls[0]).std(ddof=1)),
+        tracks=count,
+    )
+
+
+def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
+    """The estimate as a pose; what tracks cannot tell (x, y, heading) is the prior pose's."""
+    return CameraPose(
+        height_m=max(estimate.height_m, 1e-3),
+        tilt_rad=estimate.tilt_rad,
+        roll_rad=estimate.roll_rad,
+        heading_rad=prior.heading_rad,
+        x_m=prior.x_m,
+        y_m=prior.y_m,
+    )
+
+
+def _around(angles: Array, centre: float) -> Array:
+    """Angles moved by whole turns to lie within half a turn of a centre."""
+    return np.asarray((angles - centre + np.pi) % (2 * np.pi) - np.pi)

@@ -1,0 +1,1 @@
+"""Recorded scenes, and how far estimates on them are from the truth."""

@@ -1,0 +1,136 @@
+"""The lens: focal lengths, principal point and OpenCV's distortion, both ways."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.errors import ShapeError
+from models.geometry.rotation import Array, Mask
+
+_NEWTON_STEPS = 30
+_CONVERGED = 1e-10  # normalised units; 1e-7 px on a long lens
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Intrinsics:
+    """Intrinsics in pixels; `distortion` is (k1, k2, p1, p2, k3) in OpenCV's order.
+
+    Pixel (u, v) has u right and v down; integers are pixel centres.
+
+    Raises:
+        ShapeError: a size or focal length is not above 0, or a number is not finite.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "fx", "fy"):
+            if not 0 < getattr(self, name) < 1e6:
+                raise ShapeError(
+                    f"{name}: must be above 0 and below 1e6, got {getattr(self, name)}"
+                )
+        if len(self.distortion) != 5:
+            raise ShapeError(f"distortion: 5 numbers are needed, got {len(self.distortion)}")
+        if not all(math.isfinite(value) for value in (self.cx, self.cy, *self.distortion)):
+            raise ShapeError("cx, cy, distortion: must be finite")
+
+    @property
+    def matrix(self) -> Array:
+        """K (3, 3)."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+    @property
+    def max_radius(self) -> float:
+        """The normalised radius up to which the radial distortion still grows.
+
+        Beyond it the polynomial folds back and would put points from far outside the view
+        into the image; such points are not valid. Infinite where it never folds.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        # d/dr r (1 + k1 r^2 + k2 r^4 + k3 r^6) as a polynomial in s = r^2
+        roots = np.roots(np.array([7 * k3, 5 * k2, 3 * k1, 1.0]))
+        real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
+        return float(np.sqrt(real.min())) if real.size else math.inf
+
+    def project(self, points_camera: Array) -> tuple[Array, Mask]:
+        """Pixels (..., 2) of points (..., 3) in the camera frame, and which are valid (...).
+
+        Valid are points in front of the camera that the distortion does not fold back; they may
+        lie outside the image. The others are NaN.
+
+        Source: OpenCV, "Camera Calibration and 3D Reconstruction", detailed description.
+        """
+        depth = points_camera[..., 2]
+        in_front = depth > 1e-9
+        rays = points_camera[..., :2] / np.where(in_front, depth, 1.0)[..., None]
+        valid = in_front & (np.hypot(rays[..., 0], rays[..., 1]) < self.max_radius)
+        distorted, _ = self._distort(rays)
+        uv = distorted * (self.fx, self.fy) + (self.cx, self.cy)
+        return np.where(valid[..., None], uv, np.nan), valid
+
+    def rays(self, uv: Array) -> tuple[Array, Mask]:
+        """Directions (..., 3), z = 1, in the camera frame of pixels (..., 2), and which are valid.
+
+        Newton's method on the distortion; a pixel that no ray reaches is NaN and not valid.
+        """
+        target = (np.asarray(uv, np.float64) - (self.cx, self.cy)) / (self.fx, self.fy)
+        estimate = target
+        if any(self.distortion):
+            for _ in range(_NEWTON_STEPS):
+                value, jacobian = self._distort(estimate)
+                miss = value - target
+                if np.nanmax(np.abs(miss), initial=0.0) < _CONVERGED / 10:
+                    break
+                (a, b), (c, d) = np.moveaxis(jacobian, (-2, -1), (0, 1))
+                determinant = a * d - b * c
+                step = np.stack(
+                    [d * miss[..., 0] - b * miss[..., 1], a * miss[..., 1] - c * miss[..., 0]], -1
+                )
+                with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                    step = step / determinant[..., None]
+                # A long step leaves the region where the polynomial is a lens.
+                length = np.linalg.norm(step, axis=-1, keepdims=True)
+                estimate = estimate - step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-300))
+        value, _ = self._distort(estimate)
+        near = np.abs(value - target).max(-1) < _CONVERGED
+        valid = near & (np.hypot(estimate[..., 0], estimate[..., 1]) < self.max_radius)
+        directions = np.concatenate([estimate, np.ones_like(estimate[..., :1])], axis=-1)
+        return np.where(valid[..., None], directions, np.nan), valid
+
+    def contains(self, uv: Array, margin_px: float = 0.0) -> Mask:
+        """Which pixels (..., 2) lie inside the image, widened by a margin; NaN does not."""
+        u, v = uv[..., 0], uv[..., 1]
+        across = (u >= -0.5 - margin_px) & (u <= self.width - 0.5 + margin_px)
+        return np.asarray(across & (v >= -0.5 - margin_px) & (v <= self.height - 0.5 + margin_px))
+
+    def _distort(self, rays: Array) -> tuple[Array, Array]:
+        """Distorted rays (..., 2) and the Jacobian (..., 2, 2)."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = rays[..., 0], rays[..., 1]
+        s = x * x + y * y
+        with np.errstate(over="ignore", invalid="ignore"):
+            radial = 1 + s * (k1 + s * (k2 + s * k3))
+            slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))  # d radial / d(s) times 2
+            value = np.stack(
+                [
+                    x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x),
+                    y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y,
+                ],
+                axis=-1,
+            )
+            cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+            jacobian = np.stack(
+                [
+                    np.stack([radial + x * x * slope + 2 * p1 * y + 6 * p2 * x, cross], -1),
+                    np.stack([cross, radial + y * y * slope + 6 * p1 * y + 2 * p2 * x], -1),
+                ],
+                axis=-2,
+            )
+        return value, jacobian

@@ -1,0 +1,1 @@
+"""The regressor: network, recipes, training, checkpoints. The only rooms that import torch."""

@@ -1,0 +1,102 @@
+"""The synthetic set of one camera: simulated walks with the poses that saw them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array, quaternion_from_rotation
+from models.regression.network import offsets_of
+from models.regression.recipe import TrainingPlan
+from models.simulation.poses import PoseSet, grid_poses, random_poses
+from models.simulation.walkers import simulate_walks
+
+_STEP_SCALE = 32.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SyntheticSet:
+    """Scaled foot points (B, T, C), lengths (B,) and what the walks were seen from.
+
+    Heights (B,) are in metres, quaternions wxyz (B, 4); `offsets` (B, 3) are `offsets_of`'s.
+    """
+
+    points: Tensor
+    lengths: Tensor
+    height_m: Tensor
+    quaternion: Tensor
+    offsets: Tensor
+
+    def __len__(self) -> int:
+        return int(self.lengths.numel())
+
+
+def synthetic_set(plan: TrainingPlan, rng: np.random.Generator) -> SyntheticSet:
+    """The training set of a plan: some walks for each pose of the recipe.
+
+    Raises:
+        DegenerateGeometryError: no pose around the prior sees enough ground.
+    """
+    recipe = plan.recipe
+    if recipe.poses == "grid":
+        poses = grid_poses(plan.prior_pose, recipe.spread)
+    else:
+        poses = random_poses(plan.prior_pose, recipe.spread, recipe.random_poses, rng)
+    return _walks_of(plan, poses.take(np.repeat(np.arange(len(poses)), recipe.walks_per_pose)), rng)
+
+
+def held_out_set(plan: TrainingPlan, count: int, rng: np.random.Generator) -> SyntheticSet:
+    """Walks seen from poses drawn evenly over the plan's range, none of them on its grid."""
+    poses = random_poses(plan.prior_pose, plan.recipe.spread, count, rng)
+    return _walks_of(plan, poses, rng)
+
+
+def scale_points(uv: Array, intrinsics: Intrinsics, inputs: str) -> Tensor:
+    """Network input (B, T, 2) or (B, T, 4) of pixels (B, T, 2); NaN becomes 0.
+
+    Points are scaled so that the image spans -1 to 1 on both axes. With
+    `inputs="points_and_steps"` the step to each point stands beside it, 32 times as large: then
+    both are of one size.
+    """
+    half = np.array([intrinsics.width, intrinsics.height]) / 2
+    points = (uv + 0.5) / half - 1
+    if inputs == "points_and_steps":
+        steps = np.diff(points, axis=1, prepend=points[:, :1])
+        points = np.concatenate([points, _STEP_SCALE * steps], axis=-1)
+    return torch.from_numpy(np.nan_to_num(points, nan=0.0).astype(np.float32))
+
+
+def equal_length_batches(
+    lengths: npt.NDArray[np.int64], size: int, rng: np.random.Generator
+) -> Iterator[npt.NDArray[np.int64]]:
+    """Indices of shuffled batches whose rows all have the same number of points.
+
+    Rows of one length need no padding, which halves the time of a step on a CPU.
+    """
+    batches: list[npt.NDArray[np.int64]] = []
+    for length in np.unique(lengths):
+        rows = rng.permutation(np.flatnonzero(lengths == length))
+        batches += np.array_split(rows, max(1, round(rows.size / size)))
+    for place in rng.permutation(len(batches)):
+        yield batches[place]
+
+
+def _walks_of(plan: TrainingPlan, poses: PoseSet, rng: np.random.Generator) -> SyntheticSet:
+    walks = simulate_walks(plan.intrinsics, poses, plan.walk, rng)
+    uv = walks.uv
+    if plan.recipe.noise_px:
+        uv = uv + rng.normal(0, plan.recipe.noise_px, uv.shape)
+    seen_by = poses.take(walks.pose_idx)
+    quaternion = quaternion_from_rotation(seen_by.rotation)
+    offsets = offsets_of(seen_by.height_m, seen_by.tilt_rad, seen_by.roll_rad, plan)
+    return SyntheticSet(
+        points=scale_points(uv, plan.intrinsics, plan.recipe.inputs),
+        lengths=torch.from_numpy(walks.lengths),
+        height_m=torch.from_numpy(seen_by.height_m.astype(np.float32)),
+        quaternion=torch.from_numpy(quaternion.astype(np.float32)),
+        offsets=torch.from_numpy(offsets.astype(np.float32)),
+    )

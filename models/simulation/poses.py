@@ -1,0 +1,101 @@
+"""Camera poses around a prior pose, and sets of them as arrays."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array, rotation_from_angles
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseRange:
+    """How far, and how finely, poses are spread around the prior pose."""
+
+    height_m: float = 3.0
+    height_step_m: float = 0.4
+    angle_rad: float = math.radians(15)
+    angle_step_rad: float = math.radians(2)
+    lowest_m: float = 0.5  # the paper's max(0, h - 3 m), kept clear of the ground itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseSet:
+    """P poses that share x, y and heading; `height_m`, `tilt_rad`, `roll_rad` are (P,)."""
+
+    height_m: Array
+    tilt_rad: Array
+    roll_rad: Array
+    heading_rad: float
+    x_m: float
+    y_m: float
+
+    def __len__(self) -> int:
+        return int(self.height_m.size)
+
+    def take(self, indices: npt.NDArray[np.int64]) -> "PoseSet":
+        """The poses at the given places, in that order."""
+        return PoseSet(
+            height_m=self.height_m[indices],
+            tilt_rad=self.tilt_rad[indices],
+            roll_rad=self.roll_rad[indices],
+            heading_rad=self.heading_rad,
+            x_m=self.x_m,
+            y_m=self.y_m,
+        )
+
+    @property
+    def rotation(self) -> Array:
+        """Rotations `camera_from_world` (P, 3, 3)."""
+        return rotation_from_angles(self.tilt_rad, self.roll_rad, self.heading_rad)
+
+    @property
+    def centre_m(self) -> Array:
+        """Camera centres in the world (P, 3)."""
+        return np.stack(
+            np.broadcast_arrays(np.float64(self.x_m), np.float64(self.y_m), self.height_m), axis=-1
+        )
+
+
+def grid_poses(prior: CameraPose, spread: PoseRange) -> PoseSet:
+    """The paper's grid: every combination of height, tilt and roll around the prior pose.
+
+    Each axis runs from its lower end in equal steps. With the paper's numbers that is 16 x 16 x 16
+    poses and the prior pose itself is not one of them.
+
+    Source: Xu et al. 2020, section 4.1 ("min" is printed for the lower end of the height; a camera
+    is above the ground, so max is meant).
+    """
+    lowest = max(spread.lowest_m, prior.height_m - spread.height_m)
+    heights = _steps(lowest, prior.height_m + spread.height_m, spread.height_step_m)
+    offsets = _steps(-spread.angle_rad, spread.angle_rad, spread.angle_step_rad)
+    grid = np.meshgrid(heights, prior.tilt_rad + offsets, prior.roll_rad + offsets, indexing="ij")
+    height, tilt, roll = (axis.ravel() for axis in grid)
+    return _around(prior, height, tilt, roll)
+
+
+def random_poses(
+    prior: CameraPose, spread: PoseRange, count: int, rng: np.random.Generator
+) -> PoseSet:
+    """Poses drawn evenly over the same range as the grid's."""
+    lowest = max(spread.lowest_m, prior.height_m - spread.height_m)
+    tilt, roll = rng.uniform(-spread.angle_rad, spread.angle_rad, (2, count))
+    height = rng.uniform(lowest, prior.height_m + spread.height_m, count)
+    return _around(prior, height, prior.tilt_rad + tilt, prior.roll_rad + roll)
+
+
+def _around(prior: CameraPose, height: Array, tilt: Array, roll: Array) -> PoseSet:
+    return PoseSet(
+        height_m=height,
+        tilt_rad=np.clip(tilt, -math.pi / 2, math.pi / 2),
+        roll_rad=roll,
+        heading_rad=prior.heading_rad,
+        x_m=prior.x_m,
+        y_m=prior.y_m,
+    )
+
+
+def _steps(low: float, high: float, step: float) -> Array:
+    return np.asarray(low + step * np.arange(math.floor((high - low) / step + 1e-9) + 1))

@@ -1,0 +1,123 @@
+"""Trajectories of pedestrians and the windows that a regressor reads of them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.errors import ShapeError
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array
+
+WINDOW_MIN_POINTS = 11
+WINDOW_MAX_POINTS = 31  # N in [11, 31]: Xu et al. 2020, section 4.1
+DEFAULT_STEP_S = 0.4
+_LONGEST_GAP_STEPS = 2.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """Foot points of one pedestrian in time order.
+
+    `time_s` is (N,), strictly increasing, seconds since the Unix epoch; `uv` is (N, 2) in pixels.
+
+    Raises:
+        ShapeError: the arrays do not fit, a number is not finite, or time does not increase.
+    """
+
+    time_s: Array
+    uv: Array
+
+    def __post_init__(self) -> None:
+        if self.time_s.ndim != 1 or self.uv.shape != (self.time_s.size, 2):
+            raise ShapeError(
+                f"uv: ({self.time_s.size}, 2) is needed beside time_s, got {self.uv.shape}"
+            )
+        if not (np.isfinite(self.time_s).all() and np.isfinite(self.uv).all()):
+            raise ShapeError("time_s, uv: must be finite")
+        if not (np.diff(self.time_s) > 0).all():
+            raise ShapeError("time_s: must increase strictly")
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first point to the last."""
+        return float(self.time_s[-1] - self.time_s[0]) if self.time_s.size else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Windows:
+    """Equally spaced pieces of trajectories: what the regressor reads.
+
+    `uv` is (B, T, 2) in pixels, NaN after the first `lengths` (B,) points of each; `owner_idx`
+    (B,) tells which of the given trajectories a window is from.
+    """
+
+    uv: Array
+    lengths: npt.NDArray[np.int64]
+    owner_idx: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return int(self.lengths.size)
+
+
+def choose_step_s(trajectories: Sequence[Trajectory]) -> float:
+    """The sampling step in seconds that a camera's tracks can offer; 0.4 s where nothing is known.
+
+    A whole multiple of the median interval between points, near 0.4 s. It is made shorter, down to
+    one interval, until four of five tracks give the eleven points that a window needs. Tracks
+    sparser than 0.4 s give their own interval.
+    """
+    if not trajectories:
+        return DEFAULT_STEP_S
+    interval_s = float(np.median(np.concatenate([np.diff(t.time_s) for t in trajectories])))
+    short_s = float(np.quantile([t.duration_s for t in trajectories], 0.2))
+    wanted_s = min(DEFAULT_STEP_S, short_s / (WINDOW_MIN_POINTS - 1))
+    multiple = max(1, math.floor(wanted_s / interval_s + 0.05))
+    return round(multiple * interval_s, 3)
+
+
+def cut_windows(
+    trajectories: Sequence[Trajectory], intrinsics: Intrinsics, step_s: float
+) -> Windows:
+    """Windows of 11 to 31 points at a fixed step, from each trajectory.
+
+    The rule: a trajectory is broken where its points leave the image or are more than 2.5 steps
+    apart; each run is resampled linearly at `step_s` from its first point on; a run of n >= 11
+    samples is cut into ceil(n / 31) windows of equal length that do not overlap. What is shorter
+    gives no window.
+    """
+    pieces: list[Array] = []
+    owners: list[int] = []
+    for owner, trajectory in enumerate(trajectories):
+        for run in _runs(trajectory, intrinsics, step_s):
+            count = math.ceil(len(run) / WINDOW_MAX_POINTS)
+            pieces += np.array_split(run, count)
+            owners += [owner] * count
+    uv = np.full((len(pieces), WINDOW_MAX_POINTS, 2), np.nan)
+    for row, piece in zip(uv, pieces, strict=True):
+        row[: len(piece)] = piece
+    return Windows(
+        uv=uv,
+        lengths=np.array([len(piece) for piece in pieces], dtype=np.int64),
+        owner_idx=np.array(owners, dtype=np.int64),
+    )
+
+
+def _runs(trajectory: Trajectory, intrinsics: Intrinsics, step_s: float) -> list[Array]:
+    """Resampled runs (n, 2), n >= 11, of a trajectory."""
+    inside = intrinsics.contains(trajectory.uv)
+    gap = np.diff(trajectory.time_s) > _LONGEST_GAP_STEPS * step_s
+    breaks = np.flatnonzero(gap | ~inside[1:] | ~inside[:-1]) + 1
+    runs = []
+    for indices in np.split(np.arange(inside.size), breaks):
+        if not inside[indices].all():
+            continue
+        time_s = trajectory.time_s[indices] - trajectory.time_s[indices[0]]
+        # The small slack keeps the last point where rounding puts it a hair before the sample.
+        samples_s = np.arange(math.floor(time_s[-1] / step_s + 1e-3) + 1) * step_s
+        if samples_s.size >= WINDOW_MIN_POINTS:
+            uv = trajectory.uv[indices]
+            runs.append(np.stack([np.interp(samples_s, time_s, uv[:, axis]) for axis in (0, 1)], 1))
+    return runs

@@ -1,0 +1,65 @@
+"""Errors that the service answers with a problem document (RFC 9457)."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldError:
+    """One thing wrong in a body: a JSON Pointer and the reason, with limit and value."""
+
+    pointer: str
+    reason: str
+
+
+class ServiceError(Exception):
+    """An error with an HTTP status and a stable code; the message is the detail."""
+
+    status = 500
+    code = "internal"
+
+    def __init__(self, detail: str, errors: tuple[FieldError, ...] = ()) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.errors = errors
+
+
+class NotFoundError(ServiceError):
+    """The path names nothing that exists."""
+
+    status, code = 404, "not_found"
+
+
+class ConflictError(ServiceError):
+    """The request does not fit the state that things are in."""
+
+    status, code = 409, "conflict"
+
+
+class PreconditionFailedError(ServiceError):
+    """`If-Match` names another version than the stored one."""
+
+    status, code = 412, "precondition_failed"
+
+
+class PreconditionRequiredError(ServiceError):
+    """A change came without `If-Match`."""
+
+    status, code = 428, "precondition_required"
+
+
+class TooLargeError(ServiceError):
+    """A request beyond a stated limit."""
+
+    status, code = 413, "too_large"
+
+
+class MalformedError(ServiceError):
+    """A body that cannot be read at all, or lacks or breaks a field."""
+
+    status, code = 422, "malformed"
+
+
+class UnsupportedMediaTypeError(ServiceError):
+    """A body of a content type that the path does not take."""
+
+    status, code = 415, "unsupported_media_type"

@@ -1,0 +1,1 @@
+"""Forms in which trackers hand over tracks."""

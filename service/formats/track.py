@@ -1,0 +1,203 @@
+"""One incoming track: its value, its limits, and why it may be refused."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.geometry.rotation import Array
+
+MIN_POINTS = 5
+MIN_DURATION_S = 2.0
+MAX_POINTS = 10_000
+MAX_TRACKS = 5_000
+MAX_BODY_BYTES = 32 * 1024 * 1024
+MAX_ID_LENGTH = 200
+# A foot may be below the picture; one a whole picture away from it is no foot.
+MAX_OUTSIDE_IMAGES = 1.0
+_LATEST_TIME_S = 4_102_444_800.0  # the year 2100: later ones are milliseconds taken for seconds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IncomingTrack:
+    """A track as posted: points (N, 3) are time in s, u and v; boxes (N, 4) x1, y1, x2, y2."""
+
+    source: str
+    track_id: str
+    points: Array
+    boxes: Array | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rejection:
+    """Why one track of a request was not stored; `index` is its place in the request."""
+
+    index: int
+    track_id: str | None
+    code: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """What could be read of a request."""
+
+    tracks: tuple[IncomingTrack, ...]
+    rejections: tuple[Rejection, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clock:
+    """How frame numbers become times; unset where the request does not say."""
+
+    frame_rate_hz: float | None
+    started_at_s: float | None
+
+
+class TrackRejectedError(Exception):
+    """One track breaks a limit; the others of its request do not suffer."""
+
+    def __init__(self, code: str, detail: str) -> None:
+        super().__init__(detail)
+        self.code = code
+        self.detail = detail
+
+
+_FORMS = {"points": 3, "boxes": 5, "frames": 3, "frame_boxes": 5}
+
+
+def read_track(raw: Any, source: str, clock: Clock, size: tuple[int, int]) -> IncomingTrack:
+    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes"}`.
+
+    Raises:
+        TrackRejectedError: with a code, the field, the limit and the value received.
+    """
+    if not isinstance(raw, dict):
+        raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
+    given = [name for name in _FORMS if name in raw]
+    if len(given) != 1:
+        raise TrackRejectedError(
+            "malformed",
+            f"one of points, boxes, frames, frame_boxes is needed, got {given or 'none'}",
+        )
+    form = given[0]
+    rows = _numbers(form, raw[form], _FORMS[form])
+    if form.startswith("frame"):
+        if clock.frame_rate_hz is None or clock.started_at_s is None:
+            raise TrackRejectedError(
+                "no_clock", f"{form}: frame_rate_hz and started_at are needed beside it"
+            )
+        rows[:, 0] = clock.started_at_s + rows[:, 0] / clock.frame_rate_hz
+    return check_track(track_name(raw.get("id")), source, rows, size)
+
+
+def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) -> IncomingTrack:
+    """The track of rows (N, 3) of time, u, v or (N, 5) of time and box, if it keeps the limits.
+
+    Raises:
+        TrackRejectedError: with a code, the field, the limit and the value received.
+    """
+    if len(rows) > MAX_POINTS:
+        raise TrackRejectedError(
+            "too_many_points", f"points: at most {MAX_POINTS} a track are taken, got {len(rows)}"
+        )
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise TrackRejectedError(
+            "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
+        )
+    time_s = rows[:, 0]
+    if len(rows) and not (time_s.min() >= 0 and time_s.max() < _LATEST_TIME_S):
+        at = int(np.argmax((time_s < 0) | (time_s >= _LATEST_TIME_S)))
+        raise TrackRejectedError(
+            "time_out_of_range",
+            f"points/{at}/0: seconds since 1970 below {_LATEST_TIME_S:.0f} are needed, "
+            f"got {time_s[at]:.3f}",
+        )
+    increasing = np.diff(time_s) > 0
+    if not increasing.all():
+        at = int(np.argmin(increasing)) + 1
+        raise TrackRejectedError(
+            "time_not_increasing",
+            f"points/{at}/0: must be later than the point before, {time_s[at - 1]:.3f}, "
+            f"got {time_s[at]:.3f}",
+        )
+    duration_s = float(time_s[-1] - time_s[0]) if len(rows) else 0.0
+    if len(rows) < MIN_POINTS or duration_s < MIN_DURATION_S - 1e-6:
+        raise TrackRejectedError(
+            "too_short",
+            f"{len(rows)} points over {duration_s:.1f} s; at least {MIN_POINTS} points over "
+            f"{MIN_DURATION_S:g} s are needed",
+        )
+    boxes = None
+    points = rows
+    if rows.shape[1] == 5:
+        boxes = rows[:, 1:]
+        upright = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1])
+        if not upright.all():
+            at = int(np.argmin(upright))
+            raise TrackRejectedError(
+                "malformed", f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}"
+            )
+        points = np.column_stack([time_s, (boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
+    _check_inside(points[:, 1:], size)
+    return IncomingTrack(source=source, track_id=track_id, points=points, boxes=boxes)
+
+
+def track_name(value: Any) -> str:
+    """The tracker's id of a track, as text.
+
+    Raises:
+        TrackRejectedError: missing, neither text nor a whole number, empty or too long.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise TrackRejectedError(
+            "malformed", f"id: text or a whole number is needed, got {value!r}"
+        )
+    name = str(value)
+    if not 1 <= len(name) <= MAX_ID_LENGTH:
+        raise TrackRejectedError(
+            "malformed", f"id: 1 to {MAX_ID_LENGTH} characters are needed, got {len(name)}"
+        )
+    return name
+
+
+def _numbers(form: str, value: Any, columns: int) -> Array:
+    if not isinstance(value, list):
+        raise TrackRejectedError("malformed", f"{form}: a list is needed, got {value!r:.60}")
+    if len(value) > MAX_POINTS:
+        raise TrackRejectedError(
+            "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
+        )
+    for at, row in enumerate(value):
+        if not isinstance(row, list) or len(row) != columns:
+            raise TrackRejectedError(
+                "malformed", f"{form}/{at}: {columns} numbers are needed, got {row!r:.80}"
+            )
+        for number in row:
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                # JSON has no NaN; some writers put null or a word in its place.
+                code = "not_finite" if number is None else "malformed"
+                raise TrackRejectedError(
+                    code, f"{form}/{at}: numbers are needed, got {number!r:.40}"
+                )
+            if isinstance(number, int) and abs(number) > 2**53 or math.isinf(number):
+                raise TrackRejectedError(
+                    "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
+                )
+    return np.array(value, dtype=np.float64).reshape(-1, columns)
+
+
+def _check_inside(uv: Array, size: tuple[int, int]) -> None:
+    limit = np.array(size) * MAX_OUTSIDE_IMAGES
+    inside = ((uv >= -limit) & (uv <= np.array(size) + limit)).all(axis=1)
+    if not inside.all():
+        at = int(np.argmin(inside))
+        raise TrackRejectedError(
+            "outside_image",
+            f"points/{at}: u from {-limit[0]:.0f} to {size[0] + limit[0]:.0f} and v from "
+            f"{-limit[1]:.0f} to {size[1] + limit[1]:.0f} px are taken, got "
+            f"({uv[at, 0]:.1f}, {uv[at, 1]:.1f})",
+        )

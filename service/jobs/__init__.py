@@ -1,0 +1,1 @@
+"""Background work: training, estimates, housekeeping, on a durable engine (DBOS)."""

@@ -1,0 +1,18 @@
+"""What every job in a worker process is given."""
+
+import threading
+from dataclasses import dataclass, field
+
+from service.job_queue import JobQueue
+from service.settings import Settings
+from service.store.database import Store
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobContext:
+    """The worker's settings, store and queue; `stopping` is set when the process should end."""
+
+    settings: Settings
+    store: Store
+    queue: JobQueue
+    stopping: threading.Event = field(default_factory=threading.Event)

@@ -1,0 +1,48 @@
+"""Which tracks a model has yet to look at, and keeping what it says of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.settings import Settings
+from service.store import cameras, tracks, trainings
+from service.store.tables import TrackRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PendingTracks:
+    """Tracks without a prediction, and the model that is to look at them."""
+
+    model_id: str
+    weights_sha256: str
+    config: dict[str, Any]
+    tracks: Sequence[TrackRecord]
+
+
+def take_pending(
+    session: Session, settings: Settings, camera_id: str, limit: int
+) -> PendingTracks | None:
+    """Take the mark "due" off a camera and name its pending tracks; None without any or model."""
+    camera = cameras.find(session, camera_id)
+    if camera is None:
+        return None
+    camera.estimate_due_at = None
+    model = trainings.newest_model(session, camera_id)
+    window = tracks.window(session, camera_id, settings.window_tracks, settings.window_days)
+    if model is None or window is None:
+        return None
+    return PendingTracks(
+        model_id=model.id,
+        weights_sha256=model.weights_sha256,
+        config=model.config,
+        tracks=tracks.without_prediction(session, camera_id, model.id, window, limit),
+    )
+
+
+def keep_predictions(session: Session, model_id: str, rows: Sequence[dict[str, Any]]) -> None:
+    """Store predictions, of those tracks and that model that still exist."""
+    existing = tracks.existing(session, [row["track_pk"] for row in rows])
+    if trainings.model_exists(session, model_id):
+        tracks.add_predictions(session, [row for row in rows if row["track_pk"] in existing])

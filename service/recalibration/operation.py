@@ -1,0 +1,75 @@
+"""What operators of the service itself ask: is it ready, what happened."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
+
+from service.settings import Settings
+from service.store import cameras, events, workers
+from service.store.database import Store
+from service.store.tables import EventRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Readiness:
+    """Whether the service can do its work, and if not, why."""
+
+    store_writable: bool
+    worker_alive: bool
+    worker_silent_s: float | None
+    queue_lag_s: float
+    problems: tuple[str, ...]
+
+    @property
+    def ready(self) -> bool:
+        """All is well."""
+        return not self.problems
+
+
+def check_readiness(store: Store, settings: Settings) -> Readiness:
+    """Try to take the write lock; look at the workers and the oldest waiting camera."""
+    try:
+        with store.write() as session:
+            heartbeat = workers.newest_heartbeat(session)
+            due = cameras.longest_due(session)
+    except SQLAlchemyError as error:
+        return Readiness(
+            store_writable=False,
+            worker_alive=False,
+            worker_silent_s=None,
+            queue_lag_s=0.0,
+            problems=(f"store: {error.__class__.__name__}: {error}",),
+        )
+    now = datetime.now(UTC)
+    silent_s = None if heartbeat is None else (now - heartbeat).total_seconds()
+    alive = silent_s is not None and silent_s < settings.worker_lost_s
+    lag_s = 0.0 if due is None else (now - due).total_seconds()
+    problems = []
+    if not alive:
+        heard = "none was ever heard of" if silent_s is None else f"silent for {silent_s:.0f} s"
+        problems.append(f"worker: {heard}; up to {settings.worker_lost_s:g} s are waited for")
+    if lag_s > _LONGEST_LAG_S:
+        problems.append(f"queue: tracks wait for {lag_s:.0f} s; {_LONGEST_LAG_S:g} s are the limit")
+    return Readiness(
+        store_writable=True,
+        worker_alive=alive,
+        worker_silent_s=silent_s,
+        queue_lag_s=lag_s,
+        problems=tuple(problems),
+    )
+
+
+_LONGEST_LAG_S = 60.0
+
+
+def newest_event_id(session: Session) -> int:
+    """The id of the newest event."""
+    return events.newest_id(session)
+
+
+def events_after(session: Session, event_id: int, limit: int) -> Sequence[EventRecord]:
+    """Events after one, oldest first."""
+    return events.after(session, event_id, limit)

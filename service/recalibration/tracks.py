@@ -1,0 +1,52 @@
+"""Take in tracks."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.formats.track import Batch, Rejection
+from service.job_queue import JobQueue
+from service.recalibration.trainings import request_estimate
+from service.store import tracks
+from service.store.packing import pack
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Receipt:
+    """What became of the tracks of one request."""
+
+    accepted: int
+    duplicates: int
+    rejections: tuple[Rejection, ...]
+
+
+def receive_tracks(session: Session, queue: JobQueue, camera_id: str, batch: Batch) -> Receipt:
+    """Store the good tracks of a request and have them looked at, in one transaction.
+
+    A track is known by (camera, source, id, start time): one that is stored already stays.
+    """
+    now = datetime.now(UTC)
+    added = tracks.add(
+        session,
+        [
+            {
+                "camera_id": camera_id,
+                "source": track.source,
+                "track_id": track.track_id,
+                "started_s": float(track.points[0, 0]),
+                "ended_s": float(track.points[-1, 0]),
+                "points": pack(track.points),
+                "boxes": None if track.boxes is None else pack(track.boxes),
+                "received_at": now,
+            }
+            for track in batch.tracks
+        ],
+    )
+    if added:
+        request_estimate(session, queue, camera_id)
+    return Receipt(
+        accepted=added,
+        duplicates=len(batch.tracks) - added,
+        rejections=batch.rejections,
+    )

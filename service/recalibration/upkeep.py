@@ -1,0 +1,112 @@
+"""Level-triggered upkeep: what should be under way, and what may be forgotten."""
+
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from service.job_queue import JobQueue
+from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
+from service.settings import Settings
+from service.store import cameras, estimates, events, tracks, trainings, workers
+from service.store.tables import CameraRecord
+
+# A model reads tracks at another step than its own, but less well the farther they are apart.
+_STEP_RATIO = 1.3
+_DUE_LOST_S = 30.0
+_KEPT_MODELS = 2
+
+
+def reconcile_camera(
+    session: Session, queue: JobQueue, settings: Settings, camera_id: str
+) -> list[str]:
+    """Enqueue what the store says should be under way for a camera; says what it found."""
+    camera = cameras.find(session, camera_id)
+    if camera is None:
+        return []
+    found = []
+    reason = _why_train(session, camera)
+    if reason is not None:
+        queue_training(session, queue, settings, camera_id)
+        found.append(reason)
+    model = trainings.newest_model(session, camera_id)
+    window = tracks.window(session, camera_id, settings.window_tracks, settings.window_days)
+    if model is not None and window is not None:
+        pending = tracks.without_prediction(session, camera_id, model.id, window, 1)
+        due = camera.estimate_due_at
+        lost = due is not None and datetime.now(UTC) - due > timedelta(seconds=_DUE_LOST_S)
+        if (pending and due is None) or lost:
+            camera.estimate_due_at = None
+            request_estimate(session, queue, camera_id)
+            found.append("tracks without a prediction")
+    return found
+
+
+def forget_old(session: Session, settings: Settings, camera_id: str) -> int:
+    """Apply the limits on tracks, estimates and models of a camera; returns tracks deleted."""
+    before_s = time.time() - settings.keep_days * 86_400
+    deleted = tracks.forget(session, camera_id, before_s, settings.keep_tracks)
+    estimates.forget(session, camera_id, settings.keep_estimates)
+    for model in trainings.superseded_models(session, camera_id, _KEPT_MODELS):
+        session.delete(model)
+    return deleted
+
+
+def forget_events(session: Session, settings: Settings) -> None:
+    """Apply the limit on events."""
+    events.forget(session, settings.keep_events)
+
+
+def unused_weights(session: Session, folder: Path) -> list[Path]:
+    """Weight files that no model names and that are not being written now."""
+    used = trainings.weights_in_use(session)
+    hour_ago = time.time() - 3600
+    return [
+        path
+        for path in folder.glob("*")
+        if path.name.split(".")[0] not in used and path.stat().st_mtime < hour_ago
+    ]
+
+
+def camera_ids(session: Session) -> Sequence[str]:
+    """The ids of all cameras."""
+    return [camera.id for camera in cameras.every(session)]
+
+
+def heartbeat(session: Session, name: str, pid: int) -> None:
+    """Record that a worker is alive."""
+    workers.beat(session, name, pid, datetime.now(UTC))
+
+
+def take_lost_workers(session: Session, settings: Settings) -> list[str]:
+    """Names of workers that have fallen silent; each is named once."""
+    limit = datetime.now(UTC) - timedelta(seconds=settings.worker_lost_s)
+    lost = workers.silent_since(session, limit)
+    names = [worker.name for worker in lost]
+    for worker in lost:
+        session.delete(worker)
+    return names
+
+
+def _why_train(session: Session, camera: CameraRecord) -> str | None:
+    if trainings.unfinished(session, camera.id):
+        return None
+    prior = cameras.prior_pose(session, camera.id)
+    newest = trainings.of_camera(session, camera.id, 1)
+    if (
+        newest
+        and newest[0].prior_pose_id == prior.id
+        and newest[0].state in ("failed", "cancelled")
+    ):
+        return None  # trying the same again needs a person, or another prior pose
+    model = trainings.newest_model(session, camera.id)
+    if model is None:
+        return "camera without a model"
+    if model.prior_pose_id != prior.id:
+        return "model older than the prior pose"
+    ratio = camera_step_s(session, camera.id) / model.step_s
+    if not 1 / _STEP_RATIO < ratio < _STEP_RATIO:
+        return "model of another sampling step than the tracks offer"
+    return None

@@ -1,0 +1,140 @@
+"""Replay a recorded scene against a running service, as its tracker would have posted it."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from models.evaluation.scenes import Knock, Scene, SceneTrack, knock_trajectory, load_scene
+from service.formats.track import MIN_DURATION_S, MIN_POINTS
+
+_SOURCE = "surefoot-replay"
+_BATCH_TRACKS = 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayProgress:
+    """How far a replay is."""
+
+    posted: int
+    tracks: int
+    accepted: int
+    duplicates: int
+    rejected: int
+
+
+def replay_scene(
+    folder: Path,
+    url: str,
+    *,
+    knock: Knock,
+    speed: float,
+    on_progress: Callable[[ReplayProgress], None],
+) -> tuple[Scene, ReplayProgress]:
+    """Register the scene's camera with its true pose as prior, and post its tracks in time order.
+
+    A camera that is registered already stays. The recording ends now; at `speed` 0 it is posted as
+    fast as it goes, else so many times as fast as it was recorded. With a knock, people are seen as
+    the moved camera would have.
+
+    Raises:
+        httpx.HTTPError: the service cannot be reached or refuses.
+    """
+    scene = load_scene(folder)
+    with httpx.Client(base_url=url, timeout=60) as http:
+        _register(http, scene)
+        tracks = list(_seen(scene, knock))
+        ends = [float(track.trajectory.time_s[-1]) for track in tracks]
+        shift_s = math.floor(time.time() - max(ends, default=0.0))
+        order = sorted(range(len(tracks)), key=ends.__getitem__)
+        counts = {"accepted": 0, "duplicates": 0, "rejected": 0}
+        started = time.monotonic()
+        for at in range(0, len(order), _BATCH_TRACKS):
+            rows = order[at : at + _BATCH_TRACKS]
+            if speed > 0:
+                due_s = (ends[rows[-1]] - ends[order[0]]) / speed
+                time.sleep(max(0.0, started + due_s - time.monotonic()))
+            receipt = post_tracks(http, scene.scene_id, [tracks[row] for row in rows], shift_s)
+            counts["accepted"] += receipt["accepted"]
+            counts["duplicates"] += receipt["duplicates"]
+            counts["rejected"] += len(receipt["rejected"])
+            progress = ReplayProgress(posted=at + len(rows), tracks=len(tracks), **counts)
+            on_progress(progress)
+    return scene, progress
+
+
+def post_tracks(
+    http: httpx.Client, camera_id: str, tracks: Sequence[SceneTrack], shift_s: float
+) -> dict[str, Any]:
+    """Post some tracks with their times shifted; returns the receipt."""
+    body = {
+        "source": _SOURCE,
+        "tracks": [
+            {
+                "id": track.track_id,
+                "points": [
+                    [t + shift_s, u, v]
+                    for t, (u, v) in zip(
+                        track.trajectory.time_s.tolist(),
+                        track.trajectory.uv.tolist(),
+                        strict=True,
+                    )
+                ],
+            }
+            for track in tracks
+        ],
+    }
+    answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
+    answer.raise_for_status()
+    receipt: dict[str, Any] = answer.json()
+    return receipt
+
+
+def _seen(scene: Scene, knock: Knock) -> Iterator[SceneTrack]:
+    """Tracks as the knocked camera would have them, of those long enough to be taken."""
+    if knock == Knock():
+        yield from scene.tracks
+        return
+    knocked = knock.apply(scene.true_pose)
+    for track in scene.tracks:
+        seen = knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
+        if (
+            seen is not None
+            and seen.time_s.size >= MIN_POINTS
+            and seen.duration_s >= MIN_DURATION_S
+        ):
+            yield SceneTrack(track_id=track.track_id, trajectory=seen)
+
+
+def _register(http: httpx.Client, scene: Scene) -> None:
+    lens, pose = scene.intrinsics, scene.true_pose
+    answer = http.post(
+        "/cameras",
+        json={
+            "id": scene.scene_id,
+            "intrinsics": {
+                "width": lens.width,
+                "height": lens.height,
+                "fx": lens.fx,
+                "fy": lens.fy,
+                "cx": lens.cx,
+                "cy": lens.cy,
+                "distortion": list(lens.distortion),
+            },
+            "prior_pose": {
+                "height_m": pose.height_m,
+                "tilt_deg": math.degrees(pose.tilt_rad),
+                "roll_deg": math.degrees(pose.roll_rad),
+                "heading_deg": math.degrees(pose.heading_rad),
+                "x_m": pose.x_m,
+                "y_m": pose.y_m,
+            },
+            "frame_rate_hz": scene.frame_rate_hz,
+        },
+    )
+    if answer.status_code != 409:
+        answer.raise_for_status()

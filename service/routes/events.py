@@ -1,0 +1,53 @@
+"""`GET /events`: Server-Sent Events out of the store, with resume and heartbeat."""
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Request
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from service.recalibration import operation
+from service.routes.state import AppState, StateDep
+from service.store.tables import EventRecord
+
+router = APIRouter(tags=["events"])
+
+_POLL_S = 0.5
+_HEARTBEAT_S = 10.0
+_BATCH = 500
+
+
+@router.get("/events", response_class=EventSourceResponse)
+async def events(
+    request: Request,
+    state: StateDep,
+    last_event_id: Annotated[str | None, Header()] = None,
+) -> AsyncIterator[ServerSentEvent]:
+    """Poses, alerts and trainings as they happen; with `Last-Event-ID`, all since that one."""
+    given = (last_event_id or "").strip()
+    seen = int(given) if given.isdigit() else await run_in_threadpool(_newest, state)
+    silent_s = 0.0
+    yield ServerSentEvent(comment="connected", retry=2000)
+    while not state.stopping.is_set() and not await request.is_disconnected():
+        records = await run_in_threadpool(_after, state, seen)
+        for record in records:
+            seen = record.id
+            yield ServerSentEvent(id=str(record.id), event=record.type, data=record.payload)
+        silent_s = 0.0 if records else silent_s + _POLL_S
+        if silent_s >= _HEARTBEAT_S:
+            silent_s = 0.0
+            yield ServerSentEvent(comment="heartbeat")
+        if len(records) < _BATCH:
+            await asyncio.sleep(_POLL_S)
+
+
+def _newest(state: AppState) -> int:
+    with state.store.read() as session:
+        return operation.newest_event_id(session)
+
+
+def _after(state: AppState, seen: int) -> Sequence[EventRecord]:
+    with state.store.read() as session:
+        return operation.events_after(session, seen, _BATCH)

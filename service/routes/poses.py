@@ -1,0 +1,59 @@
+"""`/cameras/{id}/pose`: the served pose, its history, and accepting it."""
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+
+from service.errors import FieldError, MalformedError
+from service.recalibration import poses
+from service.routes.state import ReadDep, StateDep, WriteDep
+from service.schemas import AcceptBody, History, HistoryPoint, ServedPoseOut
+
+router = APIRouter(prefix="/cameras/{camera_id}/pose", tags=["pose"])
+
+
+@router.get("", response_model=ServedPoseOut)
+def show(
+    camera_id: str,
+    state: StateDep,
+    session: ReadDep,
+    response: Response,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> ServedPoseOut | Response:
+    """The pose now, how sure it is, and why the state is what it is."""
+    view = poses.view_pose(session, state.settings, camera_id)
+    if if_none_match is not None and view.etag in (tag.strip() for tag in if_none_match.split(",")):
+        return Response(status_code=304, headers={"ETag": view.etag})
+    response.headers["ETag"] = view.etag
+    return ServedPoseOut.from_value(view)
+
+
+@router.get("/history")
+def history(
+    camera_id: str,
+    session: ReadDep,
+    from_: Annotated[datetime | None, Query(alias="from")] = None,
+    to: datetime | None = None,
+    limit: Annotated[int, Query(ge=1, le=10_000)] = 1000,
+) -> History:
+    """The estimates between two times, oldest first."""
+    for name, value in (("from", from_), ("to", to)):
+        if value is not None and value.tzinfo is None:
+            reason = f"a time with its zone is needed, got {value.isoformat()}"
+            raise MalformedError(
+                f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),)
+            )
+    records = poses.pose_history(session, camera_id, from_, to, limit)
+    return History(items=[HistoryPoint.from_record(record) for record in records])
+
+
+@router.post("/accept")
+def accept(
+    camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
+) -> ServedPoseOut:
+    """Make the served pose the new prior pose and close the drift alert."""
+    by = None if body is None else body.by
+    return ServedPoseOut.from_value(
+        poses.accept_pose(session, state.queue, state.settings, camera_id, by)
+    )

@@ -1,0 +1,82 @@
+"""`POST /cameras/{id}/tracks` in all its forms."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request
+
+from service.errors import UnsupportedMediaTypeError
+from service.formats import batch as formats
+from service.formats.batch import DEFAULT_SOURCE
+from service.formats.track import Batch, Clock
+from service.recalibration import cameras, tracks
+from service.routes.state import BodyDep, ReadDep, StateDep
+from service.schemas import ReceiptOut
+
+router = APIRouter(tags=["tracks"])
+
+_DESCRIBED_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "required": ["tracks"],
+                    "properties": {
+                        "source": {"type": "string"},
+                        "frame_rate_hz": {"type": "number"},
+                        "started_at": {"type": "string", "format": "date-time"},
+                        "tracks": {"type": "array", "items": {"type": "object"}},
+                    },
+                }
+            },
+            "application/x-ndjson": {"schema": {"type": "string"}},
+            "text/csv": {"schema": {"type": "string"}},
+        },
+    }
+}
+
+
+def read_batch(
+    camera_id: str,
+    request: Request,
+    body: BodyDep,
+    session: ReadDep,
+    source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
+    frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
+    started_at: str | None = None,
+) -> Batch:
+    """The tracks of a request, read before the write lock is taken.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
+    """
+    camera = cameras.require_camera(session, camera_id)
+    size = (camera.width, camera.height)
+    clock = Clock(
+        frame_rate_hz=frame_rate_hz or camera.frame_rate_hz,
+        started_at_s=None if started_at is None else formats.read_time(started_at, "/started_at"),
+    )
+    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if media_type == "application/json":
+        return formats.read_json(body, clock, size)
+    if media_type == "application/x-ndjson":
+        return formats.read_ndjson(body, source, clock, size)
+    if media_type == "text/csv":
+        return formats.read_mot(body, source, clock, size)
+    raise UnsupportedMediaTypeError(
+        "Content-Type: application/json, application/x-ndjson or text/csv is needed, "
+        f"got {media_type or 'none'}"
+    )
+
+
+@router.post("/cameras/{camera_id}/tracks", status_code=202, openapi_extra=_DESCRIBED_BODY)
+def post_tracks(
+    camera_id: str, batch: Annotated[Batch, Depends(read_batch)], state: StateDep
+) -> ReceiptOut:
+    """Store tracks. One bad track never loses the others; 202 means that they are on disk."""
+    with state.store.write() as session:
+        cameras.require_camera(session, camera_id)
+        receipt = tracks.receive_tracks(session, state.queue, camera_id, batch)
+    return ReceiptOut.from_value(receipt)

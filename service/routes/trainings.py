@@ -1,0 +1,45 @@
+"""Trainings: queue, list, show, cancel."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from service.recalibration import cameras, trainings
+from service.routes.state import ReadDep, StateDep, WriteDep
+from service.schemas import TrainingBody, TrainingList, TrainingOut
+
+router = APIRouter(tags=["trainings"])
+
+
+@router.post("/cameras/{camera_id}/trainings", status_code=202)
+def request(
+    camera_id: str, state: StateDep, session: WriteDep, body: TrainingBody | None = None
+) -> TrainingOut:
+    """Queue a training at the camera's prior pose."""
+    body = body or TrainingBody()
+    cameras.require_camera(session, camera_id)
+    record = trainings.queue_training(
+        session, state.queue, state.settings, camera_id, body.recipe, body.seed
+    )
+    return TrainingOut.from_record(record)
+
+
+@router.get("/cameras/{camera_id}/trainings")
+def list_all(
+    camera_id: str, session: ReadDep, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> TrainingList:
+    """A camera's trainings, newest first."""
+    records = trainings.list_trainings(session, camera_id, limit)
+    return TrainingList(items=[TrainingOut.from_record(record) for record in records])
+
+
+@router.get("/trainings/{training_id}")
+def show(training_id: str, session: ReadDep) -> TrainingOut:
+    """A training with its progress."""
+    return TrainingOut.from_record(trainings.show_training(session, training_id))
+
+
+@router.delete("/trainings/{training_id}", status_code=202)
+def cancel(training_id: str, session: WriteDep) -> TrainingOut:
+    """Cancel a training: a queued one at once, a running one within a second or so."""
+    return TrainingOut.from_record(trainings.cancel_training(session, training_id))

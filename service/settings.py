@@ -1,0 +1,68 @@
+"""Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
+
+import os
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+class Settings(BaseSettings):
+    """Everything that an operator can set; each field is also `SUREFOOT_<FIELD>`."""
+
+    model_config = SettingsConfigDict(env_prefix="SUREFOOT_", frozen=True)
+
+    data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
+    host: str = Field("127.0.0.1", description="address that the API listens on")
+    port: int = Field(8080, ge=0, le=65535, description="port that the API listens on")
+    workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
+
+    recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
+    epochs: int | None = Field(
+        None, ge=1, description="epochs of a training; the recipe's if unset"
+    )
+    seed: int = Field(0, ge=0, description="seed of trainings and bootstraps")
+    trainings_at_once: int = Field(1, ge=1, description="over all workers")
+    training_threads: int = Field(1, ge=1, description="CPU threads of a worker process")
+
+    window_tracks: int = Field(400, ge=5, description="newest tracks that an estimate uses")
+    window_days: float = Field(
+        7.0, gt=0, description="age of the oldest of them, before the newest"
+    )
+    no_data_after_h: float = Field(24.0, gt=0, description="hours without a track until no_data")
+
+    drift_sigmas: float = Field(4.0, gt=0, description="drift must exceed so many sd")
+    drift_floor_deg: float = Field(2.0, ge=0, description="and this angle")
+    drift_floor_m: float = Field(0.5, ge=0, description="or this height")
+    drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
+    drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
+
+    keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
+    keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
+    keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
+    keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
+
+    reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
+    worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
+
+    @property
+    def database_path(self) -> Path:
+        """The SQLite file of the application and its job engine."""
+        return self.data_dir / "surefoot.sqlite"
+
+    @property
+    def database_url(self) -> str:
+        """SQLAlchemy URL of the database."""
+        return f"sqlite:///{self.database_path.absolute()}"
+
+    @property
+    def weights_dir(self) -> Path:
+        """Folder of weight files, named by their hash."""
+        return self.data_dir / "weights"
+
+    def as_environment(self) -> dict[str, str]:
+        """This process's environment with these settings in it, for a child process."""
+        values = self.model_dump(mode="json", exclude_none=True)
+        ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
+        return {**os.environ, **ours}

@@ -1,0 +1,1 @@
+"""The SQLite store: tables, and every SQL statement."""

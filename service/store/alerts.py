@@ -1,0 +1,36 @@
+"""Statements on alerts."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.tables import AlertRecord
+
+
+def find(session: Session, alert_id: str) -> AlertRecord | None:
+    """The alert, or None."""
+    return session.get(AlertRecord, alert_id)
+
+
+def firing(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
+    """The open alert of a camera and kind, or None."""
+    return session.scalars(
+        select(AlertRecord).where(
+            AlertRecord.camera_id == camera_id,
+            AlertRecord.kind == kind,
+            AlertRecord.state == "firing",
+        )
+    ).first()
+
+
+def listed(
+    session: Session, state: str | None, camera_id: str | None, limit: int
+) -> Sequence[AlertRecord]:
+    """Alerts, newest first."""
+    query = select(AlertRecord)
+    if state is not None:
+        query = query.where(AlertRecord.state == state)
+    if camera_id is not None:
+        query = query.where(AlertRecord.camera_id == camera_id)
+    return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()

@@ -1,0 +1,45 @@
+"""Statements on cameras and their prior poses."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.tables import CameraRecord, PriorPoseRecord
+
+
+def find(session: Session, camera_id: str) -> CameraRecord | None:
+    """The camera, or None."""
+    return session.get(CameraRecord, camera_id)
+
+
+def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
+    """Cameras in order of their ids, after one."""
+    query = select(CameraRecord).where(CameraRecord.id > after_id)
+    return session.scalars(query.order_by(CameraRecord.id).limit(limit)).all()
+
+
+def every(session: Session) -> Sequence[CameraRecord]:
+    """All cameras."""
+    return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
+
+
+def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
+    """The pose that a camera is trusted to have had last."""
+    return session.scalars(
+        select(PriorPoseRecord)
+        .where(PriorPoseRecord.camera_id == camera_id)
+        .order_by(PriorPoseRecord.id.desc())
+        .limit(1)
+    ).one()
+
+
+def longest_due(session: Session) -> datetime | None:
+    """Since when the tracks of the camera that waits longest have waited."""
+    return session.scalars(
+        select(CameraRecord.estimate_due_at)
+        .where(CameraRecord.estimate_due_at.is_not(None))
+        .order_by(CameraRecord.estimate_due_at)
+        .limit(1)
+    ).first()

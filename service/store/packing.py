@@ -1,0 +1,51 @@
+"""Arrays as bytes, and records as the values of `models/`."""
+
+import numpy as np
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+from models.trajectory import Trajectory
+from service.store.tables import CameraRecord, PriorPoseRecord, TrackRecord
+
+
+def pack(array: Array) -> bytes:
+    """Little-endian float64, row by row."""
+    return np.ascontiguousarray(array, dtype="<f8").tobytes()
+
+
+def unpack(data: bytes, columns: int) -> Array:
+    """The array (N, columns) of `pack`."""
+    return np.frombuffer(data, dtype="<f8").reshape(-1, columns).astype(np.float64)
+
+
+def trajectory_of(record: TrackRecord) -> Trajectory:
+    """The foot points of a stored track."""
+    points = unpack(record.points, 3)
+    return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+
+
+def intrinsics_of(record: CameraRecord) -> Intrinsics:
+    """The lens of a stored camera."""
+    k1, k2, p1, p2, k3 = record.distortion
+    return Intrinsics(
+        width=record.width,
+        height=record.height,
+        fx=record.fx,
+        fy=record.fy,
+        cx=record.cx,
+        cy=record.cy,
+        distortion=(k1, k2, p1, p2, k3),
+    )
+
+
+def pose_of_prior(record: PriorPoseRecord) -> CameraPose:
+    """A stored prior pose."""
+    return CameraPose(
+        height_m=record.height_m,
+        tilt_rad=record.tilt_rad,
+        roll_rad=record.roll_rad,
+        heading_rad=record.heading_rad,
+        x_m=record.x_m,
+        y_m=record.y_m,
+    )

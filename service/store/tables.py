@@ -1,0 +1,281 @@
+"""Records of the store. Angles are radians, times aware UTC; track times seconds since epoch."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import (
+    JSON,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    String,
+    TypeDecorator,
+    UniqueConstraint,
+    text,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """Aware UTC times; SQLite keeps them without their zone."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Refuse naive times; store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"time: an aware time is needed, got {value}")
+        return value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Give the zone back."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Record(DeclarativeBase):
+    """Base of all records."""
+
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map = {datetime: UtcDateTime, dict[str, Any]: JSON, list[float]: JSON}
+
+
+def _camera_key() -> Any:
+    return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
+
+
+class CameraRecord(Record):
+    """A registered camera. `estimate_due_at` is set while tracks wait to be looked at."""
+
+    __tablename__ = "cameras"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str]
+    width: Mapped[int]
+    height: Mapped[int]
+    fx: Mapped[float]
+    fy: Mapped[float]
+    cx: Mapped[float]
+    cy: Mapped[float]
+    distortion: Mapped[list[float]]
+    frame_rate_hz: Mapped[float | None]
+    walking_speed_mean_mps: Mapped[float]
+    walking_speed_sd_mps: Mapped[float]
+    reference_tracks: Mapped[int]
+    version: Mapped[int]
+    estimate_due_at: Mapped[datetime | None]
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+
+
+class PriorPoseRecord(Record):
+    """A pose that was trusted from a time on; the newest of a camera is its prior pose."""
+
+    __tablename__ = "prior_poses"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    height_m: Mapped[float]
+    tilt_rad: Mapped[float]
+    roll_rad: Mapped[float]
+    heading_rad: Mapped[float]
+    x_m: Mapped[float]
+    y_m: Mapped[float]
+    origin: Mapped[str]  # registered, changed, accepted
+    trusted_by: Mapped[str | None]
+    created_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "id"),)
+
+
+class TrackRecord(Record):
+    """A stored track: points (N, 3) and boxes (N, 4) packed as little-endian float64."""
+
+    __tablename__ = "tracks"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    source: Mapped[str]
+    track_id: Mapped[str]
+    started_s: Mapped[float]
+    ended_s: Mapped[float]
+    points: Mapped[bytes] = mapped_column(LargeBinary)
+    boxes: Mapped[bytes | None] = mapped_column(LargeBinary)
+    received_at: Mapped[datetime]
+
+    __table_args__ = (
+        UniqueConstraint("camera_id", "source", "track_id", "started_s"),
+        Index(None, "camera_id", "ended_s"),
+    )
+
+
+class TrainingRecord(Record):
+    """One training run; `attempt` grows each time a worker takes it up."""
+
+    __tablename__ = "trainings"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    recipe: Mapped[str]
+    seed: Mapped[int]
+    state: Mapped[str]  # queued, running, succeeded, failed, cancelled
+    attempt: Mapped[int]
+    cancel_requested: Mapped[bool]
+    step: Mapped[int]
+    steps: Mapped[int]
+    loss: Mapped[float | None]
+    eta_s: Mapped[float | None]
+    error: Mapped[str | None]
+    metrics: Mapped[dict[str, Any] | None]
+    queued_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+    __table_args__ = (Index(None, "camera_id", "queued_at"), Index(None, "state"))
+
+
+class ModelRecord(Record):
+    """A published model; its weights are the file `<weights_sha256>.safetensors`."""
+
+    __tablename__ = "models"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    training_id: Mapped[str] = mapped_column(
+        ForeignKey("trainings.id", ondelete="CASCADE"), unique=True
+    )
+    weights_sha256: Mapped[str] = mapped_column(String(64))
+    config: Mapped[dict[str, Any]]
+    seed: Mapped[int]
+    step_s: Mapped[float]
+    metrics: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "created_at"),)
+
+
+class PredictionRecord(Record):
+    """What a model says of a track; without numbers where the track gives no window."""
+
+    __tablename__ = "predictions"
+
+    model_id: Mapped[str] = mapped_column(
+        ForeignKey("models.id", ondelete="CASCADE"), primary_key=True
+    )
+    track_pk: Mapped[int] = mapped_column(
+        ForeignKey("tracks.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    windows: Mapped[int]
+    height_m: Mapped[float | None]
+    qw: Mapped[float | None]
+    qx: Mapped[float | None]
+    qy: Mapped[float | None]
+    qz: Mapped[float | None]
+
+
+class EstimateRecord(Record):
+    """The served estimate at one time; `raw` has each estimator's own answer."""
+
+    __tablename__ = "estimates"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    model_id: Mapped[str] = mapped_column(ForeignKey("models.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    state: Mapped[str]  # ok, drifting, out_of_range
+    reason: Mapped[str]
+    height_m: Mapped[float]
+    tilt_rad: Mapped[float]
+    roll_rad: Mapped[float]
+    height_sd_m: Mapped[float]
+    tilt_sd_rad: Mapped[float]
+    roll_sd_rad: Mapped[float]
+    drift_height_m: Mapped[float]
+    drift_tilt_rad: Mapped[float]
+    drift_roll_rad: Mapped[float]
+    drift_angle_rad: Mapped[float]
+    drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
+    drift_since: Mapped[datetime | None]
+    raw: Mapped[dict[str, Any]]
+    tracks: Mapped[int]
+    from_s: Mapped[float]
+    to_s: Mapped[float]
+    newest_track_pk: Mapped[int]
+    created_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "id"),)
+
+
+class AlertRecord(Record):
+    """An alert; at most one of a camera and kind is firing."""
+
+    __tablename__ = "alerts"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    kind: Mapped[str]  # drift, no_data, out_of_range, clock
+    state: Mapped[str]  # firing, resolved
+    severity: Mapped[str]  # warning, critical
+    drift: Mapped[dict[str, Any]]
+    opened_at: Mapped[datetime]
+    changed_at: Mapped[datetime | None]
+    updated_at: Mapped[datetime]
+    acknowledged_by: Mapped[str | None]
+    acknowledged_at: Mapped[datetime | None]
+    silenced_until: Mapped[datetime | None]
+    silence_reason: Mapped[str | None]
+    resolved_at: Mapped[datetime | None]
+    resolved_by: Mapped[str | None]
+    outcome: Mapped[str | None]  # put_back, accepted, false_alarm, cleared
+    note: Mapped[str | None]
+
+    __table_args__ = (
+        Index(
+            "uq_alerts_firing",
+            "camera_id",
+            "kind",
+            unique=True,
+            sqlite_where=text("state = 'firing'"),
+            postgresql_where=text("state = 'firing'"),
+        ),
+        Index(None, "opened_at"),
+    )
+
+
+class EventRecord(Record):
+    """Something that happened, for `GET /events`."""
+
+    __tablename__ = "events"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    type: Mapped[str]  # pose, alert, training
+    payload: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime]
+
+    __table_args__ = ({"sqlite_autoincrement": True},)  # an id is never given twice
+
+
+class WorkerRecord(Record):
+    """A worker process and when it was last heard of."""
+
+    __tablename__ = "workers"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    pid: Mapped[int]
+    started_at: Mapped[datetime]
+    heartbeat_at: Mapped[datetime]

@@ -1,0 +1,64 @@
+"""Statements on trainings and models."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.tables import ModelRecord, TrainingRecord
+
+UNFINISHED = ("queued", "running")
+
+
+def find(session: Session, training_id: str) -> TrainingRecord | None:
+    """The training, or None."""
+    return session.get(TrainingRecord, training_id)
+
+
+def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[TrainingRecord]:
+    """A camera's trainings, newest first."""
+    return session.scalars(
+        select(TrainingRecord)
+        .where(TrainingRecord.camera_id == camera_id)
+        .order_by(TrainingRecord.queued_at.desc())
+        .limit(limit)
+    ).all()
+
+
+def unfinished(session: Session, camera_id: str) -> Sequence[TrainingRecord]:
+    """A camera's queued and running trainings, oldest first."""
+    return session.scalars(
+        select(TrainingRecord)
+        .where(TrainingRecord.camera_id == camera_id, TrainingRecord.state.in_(UNFINISHED))
+        .order_by(TrainingRecord.queued_at)
+    ).all()
+
+
+def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
+    """The model in use of a camera, or None."""
+    return session.scalars(
+        select(ModelRecord)
+        .where(ModelRecord.camera_id == camera_id)
+        .order_by(ModelRecord.created_at.desc())
+        .limit(1)
+    ).first()
+
+
+def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:
+    """Models of a camera older than its newest so many."""
+    return session.scalars(
+        select(ModelRecord)
+        .where(ModelRecord.camera_id == camera_id)
+        .order_by(ModelRecord.created_at.desc())
+        .offset(keep)
+    ).all()
+
+
+def weights_in_use(session: Session) -> set[str]:
+    """Hashes of all weights that a model names."""
+    return set(session.scalars(select(ModelRecord.weights_sha256)))
+
+
+def model_exists(session: Session, model_id: str) -> bool:
+    """Whether a model is still stored."""
+    return session.get(ModelRecord, model_id) is not None
