@@ -13,8 +13,12 @@ from models.regression.prediction import predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.trajectory import cut_windows
 from service.jobs.context import JobContext
-from service.recalibration.estimates import PendingTracks, keep_predictions, take_pending
-from service.recalibration.poses import store_estimate
+from service.recalibration.estimates import (
+    PendingTracks,
+    keep_predictions,
+    store_estimate,
+    take_pending,
+)
 from service.store.packing import trajectory_of
 from service.store.tables import TrackRecord
 

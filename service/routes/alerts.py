@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from service.recalibration import alerts
 from service.routes.state import ReadDep, WriteDep
-from service.schemas import AcknowledgeBody, AlertList, AlertOut, ResolveBody
+from service.schemas.alerts import AcknowledgeBody, AlertList, AlertOut, ResolveBody
 
 router = APIRouter(prefix="/alerts", tags=["alerts"])
 

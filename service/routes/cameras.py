@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Response
 from service.recalibration import cameras
 from service.recalibration.cameras import CameraChange, CameraSpec
 from service.routes.state import EtagDep, ReadDep, StateDep, WriteDep
-from service.schemas import CameraBody, CameraOut, CameraPage, CameraPatch, slug
+from service.schemas.cameras import CameraBody, CameraOut, CameraPage, CameraPatch, slug
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
 

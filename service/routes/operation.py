@@ -5,7 +5,7 @@ from fastapi.responses import RedirectResponse
 
 from service.recalibration import operation
 from service.routes.state import StateDep
-from service.schemas import HealthOut, ReadyOut
+from service.schemas.operation import HealthOut, ReadyOut
 
 router = APIRouter(tags=["operation"])
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Header, Query, Response
 from service.errors import FieldError, MalformedError
 from service.recalibration import poses
 from service.routes.state import ReadDep, StateDep, WriteDep
-from service.schemas import AcceptBody, History, HistoryPoint, ServedPoseOut
+from service.schemas.poses import AcceptBody, History, HistoryPoint, ServedPoseOut
 
 router = APIRouter(prefix="/cameras/{camera_id}/pose", tags=["pose"])
 

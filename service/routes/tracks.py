@@ -10,7 +10,7 @@ from service.formats.batch import DEFAULT_SOURCE
 from service.formats.track import Batch, Clock
 from service.recalibration import cameras, tracks
 from service.routes.state import BodyDep, ReadDep, StateDep
-from service.schemas import ReceiptOut
+from service.schemas.tracks import ReceiptOut
 
 router = APIRouter(tags=["tracks"])
 

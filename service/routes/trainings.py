@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from service.recalibration import cameras, trainings
 from service.routes.state import ReadDep, StateDep, WriteDep
-from service.schemas import TrainingBody, TrainingList, TrainingOut
+from service.schemas.trainings import TrainingBody, TrainingList, TrainingOut
 
 router = APIRouter(tags=["trainings"])
 

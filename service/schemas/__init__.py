@@ -1,0 +1,1 @@
+"""Request and response bodies, and their translation to and from values."""

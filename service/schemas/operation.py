@@ -1,0 +1,36 @@
+"""Answers of `/healthz` and `/readyz`."""
+
+from typing import Literal, Self
+
+from pydantic import BaseModel
+
+from service.recalibration.operation import Readiness
+
+
+class HealthOut(BaseModel):
+    """The process answers."""
+
+    status: Literal["ok"]
+
+
+class ReadyOut(BaseModel):
+    """Whether the service can do its work."""
+
+    status: Literal["ready", "not_ready"]
+    store_writable: bool
+    worker_alive: bool
+    worker_silent_s: float | None
+    queue_lag_s: float
+    problems: list[str]
+
+    @classmethod
+    def from_value(cls, value: Readiness) -> Self:
+        """The body of a readiness check."""
+        return cls(
+            status="ready" if value.ready else "not_ready",
+            store_writable=value.store_writable,
+            worker_alive=value.worker_alive,
+            worker_silent_s=value.worker_silent_s,
+            queue_lag_s=value.queue_lag_s,
+            problems=list(value.problems),
+        )

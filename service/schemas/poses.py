@@ -1,0 +1,150 @@
+"""Bodies of `/cameras/{id}/pose`."""
+
+import math
+from datetime import UTC, datetime
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.recalibration.poses import PoseView
+from service.schemas.base import Body, Who
+from service.schemas.geometry import PoseOut
+from service.store.tables import EstimateRecord
+
+
+class AcceptBody(Body):
+    """Who accepts the served pose as the new prior pose."""
+
+    by: Who | None = None
+
+
+class SdOut(BaseModel):
+    """Standard deviations of what was estimated."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+
+
+class DriftOut(BaseModel):
+    """Estimate against prior pose."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+    angle_deg: float
+
+
+class ReferenceOut(BaseModel):
+    """How much of the reference period has been seen."""
+
+    state: Literal["learning", "ready"]
+    tracks: int
+    wanted: int
+    walking_speed_mps: float | None
+
+
+class ServedPoseOut(BaseModel):
+    """The answer of `GET /cameras/{id}/pose`."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    camera_id: str
+    state: Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
+    pose: PoseOut
+    estimated: list[str]
+    sd: SdOut | None
+    drift: DriftOut | None
+    estimates: dict[str, Any]
+    reference: ReferenceOut
+    tracks: int
+    from_: datetime | None = Field(serialization_alias="from")
+    to: datetime | None
+    model_id: str | None
+    updated_at: datetime | None
+    reason: str
+
+    @classmethod
+    def from_value(cls, view: PoseView) -> Self:
+        """The body of a served pose."""
+        estimate = view.estimate
+        return cls(
+            camera_id=view.camera_id,
+            state=view.state,
+            pose=PoseOut.from_value(view.pose),
+            estimated=[] if estimate is None else ["height_m", "tilt_deg", "roll_deg"],
+            sd=None if estimate is None else sd_out(estimate),
+            drift=None if estimate is None else drift_out(estimate),
+            estimates={} if estimate is None else estimate.raw,
+            reference=ReferenceOut(
+                state="learning",
+                tracks=min(view.stored_tracks, view.reference_wanted),
+                wanted=view.reference_wanted,
+                walking_speed_mps=None,
+            ),
+            tracks=0 if estimate is None else estimate.tracks,
+            from_=None if estimate is None else moment(estimate.from_s),
+            to=None if estimate is None else moment(estimate.to_s),
+            model_id=view.model_id,
+            updated_at=None if estimate is None else estimate.created_at,
+            reason=view.reason,
+        )
+
+
+class HistoryPoint(BaseModel):
+    """One estimate of the history."""
+
+    at: datetime
+    state: str
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+    sd: SdOut
+    drift: DriftOut
+    tracks: int
+    to: datetime
+
+    @classmethod
+    def from_record(cls, record: EstimateRecord) -> Self:
+        """The body of a stored estimate."""
+        return cls(
+            at=record.created_at,
+            state=record.state,
+            height_m=record.height_m,
+            tilt_deg=math.degrees(record.tilt_rad),
+            roll_deg=math.degrees(record.roll_rad),
+            sd=sd_out(record),
+            drift=drift_out(record),
+            tracks=record.tracks,
+            to=moment(record.to_s),
+        )
+
+
+class History(BaseModel):
+    """Estimates, oldest first."""
+
+    items: list[HistoryPoint]
+
+
+def sd_out(record: EstimateRecord) -> SdOut:
+    """Standard deviations of a stored estimate."""
+    return SdOut(
+        height_m=record.height_sd_m,
+        tilt_deg=math.degrees(record.tilt_sd_rad),
+        roll_deg=math.degrees(record.roll_sd_rad),
+    )
+
+
+def drift_out(record: EstimateRecord) -> DriftOut:
+    """Drift of a stored estimate."""
+    return DriftOut(
+        height_m=record.drift_height_m,
+        tilt_deg=math.degrees(record.drift_tilt_rad),
+        roll_deg=math.degrees(record.drift_roll_rad),
+        angle_deg=math.degrees(record.drift_angle_rad),
+    )
+
+
+def moment(seconds: float) -> datetime:
+    """The aware UTC time of seconds since the epoch."""
+    return datetime.fromtimestamp(seconds, UTC)

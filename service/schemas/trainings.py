@@ -1,0 +1,66 @@
+"""Bodies of trainings."""
+
+from datetime import datetime
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, Field
+
+from service.schemas.base import Body
+from service.store.tables import TrainingRecord
+
+
+class TrainingBody(Body):
+    """A training to queue; without a recipe, the service's."""
+
+    recipe: Literal["default", "paper"] | None = None
+    seed: int | None = Field(None, ge=0, lt=2**31)
+
+
+class ProgressOut(BaseModel):
+    """How far a training is."""
+
+    step: int
+    steps: int
+    loss: float | None
+    eta_s: float | None
+
+
+class TrainingOut(BaseModel):
+    """A training."""
+
+    id: str
+    camera_id: str
+    state: str
+    recipe: str
+    seed: int
+    progress: ProgressOut
+    queued_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    error: str | None
+    metrics: dict[str, Any] | None
+
+    @classmethod
+    def from_record(cls, record: TrainingRecord) -> Self:
+        """The body of a stored training."""
+        return cls(
+            id=record.id,
+            camera_id=record.camera_id,
+            state=record.state,
+            recipe=record.recipe,
+            seed=record.seed,
+            progress=ProgressOut(
+                step=record.step, steps=record.steps, loss=record.loss, eta_s=record.eta_s
+            ),
+            queued_at=record.queued_at,
+            started_at=record.started_at,
+            finished_at=record.finished_at,
+            error=record.error,
+            metrics=record.metrics,
+        )
+
+
+class TrainingList(BaseModel):
+    """Trainings, newest first."""
+
+    items: list[TrainingOut]

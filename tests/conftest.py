@@ -1,0 +1,117 @@
+"""What several tests need: a migrated data directory, a service under test, a camera to post to."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+
+from service.migrate import migrate
+from service.settings import Settings
+
+CAMERA: dict[str, Any] = {
+    "id": "corner",
+    "name": "The corner",
+    "intrinsics": {"width": 1280, "height": 720, "fx": 1100, "fy": 1100, "cx": 639.5, "cy": 359.5},
+    "prior_pose": {"height_m": 6.0, "tilt_deg": 22.0, "roll_deg": 1.0, "heading_deg": 40.0},
+    "frame_rate_hz": 25.0,
+}
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    made = Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1)
+    migrate(made)
+    return made
+
+
+def track(track_id: str, start_s: float = 1_780_000_000.0, count: int = 20) -> dict[str, Any]:
+    """A walk across the picture at 0.4 s."""
+    points = [[start_s + 0.4 * n, 300.0 + 12 * n, 400.0 + 5 * n] for n in range(count)]
+    return {"id": track_id, "points": points}
+
+
+def wait_for(what: Callable[[], Any], timeout_s: float = 90.0, every_s: float = 0.2) -> Any:
+    """The first true answer; fails loudly when none comes."""
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        answer = what()
+        if answer:
+            return answer
+        time.sleep(every_s)
+    raise AssertionError(f"nothing true within {timeout_s} s")
+
+
+class RunningService:
+    """A real `surefoot serve`, which a test may kill and start again over the same data."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.url = f"http://{settings.host}:{settings.port}"
+        self.http = httpx.Client(base_url=self.url, timeout=30)
+        self.log = settings.data_dir.parent / "serve.log"
+
+    def start(self) -> None:
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "service.cli", "serve"],
+                env=self.settings.as_environment(),
+                stdout=log,
+                stderr=log,
+            )
+        wait_for(self.answers)
+
+    def answers(self) -> bool:
+        assert self.process.poll() is None, self.log.read_text()
+        try:
+            return self.http.get("/healthz").status_code == 200
+        except httpx.TransportError:
+            return False
+
+    def ready(self) -> bool:
+        return self.http.get("/readyz").status_code == 200
+
+    def kill(self) -> None:
+        """`kill -9` of the API; its workers end by themselves."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(10)
+
+    def worker_pid(self) -> int:
+        """The pid of the local worker."""
+        (worker,) = psutil.Process(self.process.pid).children()
+        return worker.pid
+
+    def stop(self) -> int:
+        if self.process.poll() is None:
+            self.process.terminate()
+        code = self.process.wait(20)
+        self.http.close()
+        return code
+
+
+@pytest.fixture
+def service(settings: Settings) -> Iterator[RunningService]:
+    """A running service with one worker and trainings of one epoch."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    running = RunningService(settings.model_copy(update={"port": port}))
+    running.start()
+    yield running
+    running.stop()
+
+
+def pid_exists(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True

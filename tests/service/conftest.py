@@ -1,0 +1,33 @@
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+from tests.conftest import CAMERA
+
+
+@pytest.fixture
+def http(settings: Settings) -> Iterator[TestClient]:
+    """The application over a real, migrated SQLite file; no worker."""
+    with TestClient(create_app(settings)) as client:
+        yield client
+
+
+@pytest.fixture
+def corner(http: TestClient) -> TestClient:
+    """The same, with the camera `corner` registered."""
+    assert http.post("/cameras", json=CAMERA).status_code == 201
+    return http
+
+
+def problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:
+    """The problem document of an answer."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    document: dict[str, Any] = answer.json()
+    assert (document["status"], document["code"]) == (status, code)
+    return document

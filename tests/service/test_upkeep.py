@@ -1,0 +1,200 @@
+"""What the reconcile finds in the store, and what retention deletes."""
+
+import os
+import time
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from models.geometry.pose import CameraPose
+from service.formats.track import Batch, Clock, read_track
+from service.recalibration import upkeep
+from service.recalibration.cameras import add_prior_pose
+from service.recalibration.tracks import receive_tracks
+from service.recalibration.trainings import (
+    begin_training,
+    cancel_training,
+    end_training,
+    publish_model,
+    report_progress,
+    request_estimate,
+)
+from service.store import events, tracks, trainings, workers
+from service.store.database import Store
+from service.store.tables import CameraRecord, TrackRecord
+from tests.conftest import track
+
+
+class Recorder:
+    """A job queue that notes what it was asked for."""
+
+    def __init__(self):
+        self.trainings, self.estimates = [], []
+
+    def enqueue_training(self, session, camera_id, training_id):
+        self.trainings.append(training_id)
+
+    def enqueue_estimate(self, session, camera_id):
+        self.estimates.append(camera_id)
+
+
+@pytest.fixture
+def queue():
+    return Recorder()
+
+
+@pytest.fixture
+def session(corner, settings):
+    with Store(settings).write() as session:
+        yield session
+
+
+def begin(session, settings):
+    return begin_training(session, settings, trainings.unfinished(session, "corner")[0].id)
+
+
+def publish(session, queue, settings):
+    attempt = begin(session, settings)
+    publish_model(session, queue, attempt, weights_sha256="0" * 64, metrics={})
+    return trainings.newest_model(session, "corner")
+
+
+def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
+    start_s = time.time() - 3600 if start_s is None else start_s
+    batch = []
+    for n in range(first, first + count):
+        raw = track(str(n), start_s=start_s + n)
+        for k, point in enumerate(raw["points"]):
+            point[0] = start_s + n + step_s * k
+        clock = Clock(frame_rate_hz=None, started_at_s=None)
+        batch.append(read_track(raw, "t", clock, (1280, 720)))
+    return receive_tracks(session, Recorder(), "corner", Batch(tracks=tuple(batch), rejections=()))
+
+
+def test_a_training_under_way_is_left_alone(session, queue, settings):
+    assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+
+
+def test_a_camera_without_a_model_is_trained(session, queue, settings):
+    session.delete(trainings.unfinished(session, "corner")[0])
+    session.flush()
+    found = upkeep.reconcile_camera(session, queue, settings, "corner")
+    assert found == ["camera without a model"]
+    assert len(queue.trainings) == 1
+
+
+@pytest.mark.parametrize("state", ["failed", "cancelled"])
+def test_what_failed_or_was_cancelled_is_not_tried_again_by_itself(session, queue, settings, state):
+    end_training(session, begin(session, settings), state)
+    assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+
+
+def test_a_model_older_than_the_prior_pose_is_replaced_and_used_meanwhile(session, queue, settings):
+    model = publish(session, queue, settings)
+    add_prior_pose(session, "corner", CameraPose(height_m=5, tilt_rad=0.3), "changed", None)
+    found = upkeep.reconcile_camera(session, queue, settings, "corner")
+    assert found == ["model older than the prior pose"]
+    assert trainings.newest_model(session, "corner").id == model.id
+
+
+def test_tracks_without_a_prediction_are_looked_at(session, queue, settings):
+    publish(session, queue, settings)
+    put_tracks(session, 5)
+    camera = session.get_one(CameraRecord, "corner")
+    camera.estimate_due_at = None  # the nudge of the post was lost
+    queue.estimates.clear()
+    found = upkeep.reconcile_camera(session, queue, settings, "corner")
+    assert found == ["tracks without a prediction"]
+    assert queue.estimates == ["corner"]
+    assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+
+
+def test_many_posts_ask_for_one_estimate(session, queue, settings):
+    publish(session, queue, settings)
+    assert queue.estimates == ["corner"]
+    for _ in range(10):
+        request_estimate(session, queue, "corner")
+    assert queue.estimates == ["corner"]
+
+
+def test_tracks_of_another_step_ask_for_another_model(session, queue, settings):
+    model = publish(session, queue, settings)
+    assert model.step_s == 0.4
+    put_tracks(session, 30, step_s=0.4)
+    assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+    put_tracks(session, 200, step_s=1.0, first=100)
+    found = upkeep.reconcile_camera(session, queue, settings, "corner")
+    assert found == ["model of another sampling step than the tracks offer"]
+    assert begin(session, settings).plan.walk.step_s == 1.0
+
+
+def test_retention_keeps_the_newest_and_the_young(session, settings):
+    put_tracks(session, 12)
+    put_tracks(session, 3, start_s=time.time() - 40 * 86_400, first=500)
+    limited = settings.model_copy(update={"keep_days": 30.0, "keep_tracks": 10})
+    assert upkeep.forget_old(session, limited, "corner") == 5
+    kept = sorted(int(r.track_id) for r in session.query(TrackRecord))
+    assert kept == list(range(2, 12))
+
+
+def test_events_are_kept_up_to_a_number(session, settings):
+    for n in range(20):
+        events.add(session, "pose", {"n": n}, datetime.now(UTC))
+    session.flush()
+    upkeep.forget_events(session, settings.model_copy(update={"keep_events": 5}))
+    assert [e.payload["n"] for e in events.after(session, 0, 100)] == [15, 16, 17, 18, 19]
+
+
+def test_weights_that_no_model_names_are_found_once_they_are_old(session, settings, queue):
+    publish(session, queue, settings)
+    folder = settings.weights_dir
+    folder.mkdir()
+    for name in ("0" * 64 + ".safetensors", "f" * 64 + ".safetensors", "new.safetensors"):
+        (folder / name).write_bytes(b"")
+        if not name.startswith("new"):
+            os.utime(folder / name, (1, 1))
+    assert [p.name[0] for p in upkeep.unused_weights(session, folder)] == ["f"]
+
+
+def test_progress_of_an_attempt_that_was_taken_over_ends_it(session, settings):
+    first = begin(session, settings)
+    assert report_progress(session, first, 1, 10, 0.5, 9.0)
+    second = begin(session, settings)  # the engine runs the job again after a crash
+    assert second.attempt == 2
+    assert not report_progress(session, first, 2, 10, 0.5, 8.0)
+    publish_model(session, Recorder(), first, weights_sha256="1" * 64, metrics={})
+    assert trainings.newest_model(session, "corner") is None
+    publish_model(session, Recorder(), second, weights_sha256="2" * 64, metrics={})
+    assert trainings.newest_model(session, "corner").weights_sha256 == "2" * 64
+    assert begin_training(session, settings, first.training_id) is None
+
+
+def test_a_cancelled_training_publishes_nothing(session, settings):
+    attempt = begin(session, settings)
+    cancel_training(session, attempt.training_id)
+    assert not report_progress(session, attempt, 1, 10, 0.5, 9.0)
+    publish_model(session, Recorder(), attempt, weights_sha256="1" * 64, metrics={})
+    assert trainings.find(session, attempt.training_id).state == "cancelled"
+    assert trainings.newest_model(session, "corner") is None
+
+
+def test_a_lost_worker_is_named_once(session, settings):
+    upkeep.heartbeat(session, "w1", 1)
+    upkeep.heartbeat(session, "w2", 2)
+    session.flush()
+    lost = workers.silent_since(session, datetime.max.replace(tzinfo=UTC))
+    lost[0].heartbeat_at -= timedelta(seconds=settings.worker_lost_s + 5)
+    session.flush()
+    assert upkeep.take_lost_workers(session, settings) == ["w1"]
+    session.flush()
+    assert upkeep.take_lost_workers(session, settings) == []
+
+
+def test_the_window_is_the_newest_tracks_by_their_own_times(session):
+    now = time.time()
+    put_tracks(session, 5, start_s=now - 20 * 86_400)
+    put_tracks(session, 6, start_s=now - 3600, first=50)
+    window = tracks.window(session, "corner", 400, 7.0)
+    assert window.tracks == 6
+    assert window.to_s - window.from_s == pytest.approx(5 + 0.4 * 19)
+    assert tracks.window(session, "corner", 4, 7.0).tracks == 4

@@ -1,0 +1,105 @@
+"""The house's arrows, read from the imports."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+# Rooms, from the ground up: a room may import those before it, and itself.
+SERVICE_ROOMS = [
+    {"settings", "errors", "logs"},
+    {"formats", "store", "job_queue"},
+    {"migrate", "recalibration"},
+    {"schemas", "jobs"},
+    {"routes"},
+    {"app"},
+    {"serve", "replay", "evaluate"},
+    {"demo"},
+    {"cli"},
+]
+MODEL_ROOMS = [
+    {"errors"},
+    {"geometry"},
+    {"trajectory"},
+    {"simulation"},
+    {"regression", "estimation"},
+    {"drift", "evaluation"},
+]
+TORCH_ROOMS = {"models/regression", "service/jobs", "service/evaluate.py"}
+
+
+def sources(top: str) -> list[Path]:
+    return sorted((ROOT / top).rglob("*.py"))
+
+
+def imports(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {node.module}
+    return found
+
+
+def room(name: str) -> str:
+    return name.split(".")[1]
+
+
+def test_models_never_import_the_service():
+    for path in sources("models"):
+        assert not [name for name in imports(path) if name.split(".")[0] == "service"], path
+
+
+@pytest.mark.parametrize(("top", "rooms"), [("models", MODEL_ROOMS), ("service", SERVICE_ROOMS)])
+def test_arrows_go_down_only(top, rooms):
+    level = {name: number for number, names in enumerate(rooms) for name in names}
+    for path in sources(top):
+        here = path.relative_to(ROOT / top).parts[0].removesuffix(".py")
+        if here == "__init__":
+            continue
+        assert here in level, f"{path}: a room without a place in the house"
+        for name in imports(path):
+            if name.startswith(f"{top}.") and room(name) != here:
+                assert level[room(name)] < level[here], f"{path} imports {name}"
+
+
+def test_only_routes_and_the_application_see_schemas():
+    for path in sources("service"):
+        if any(name.startswith("service.schemas") for name in imports(path)):
+            assert {"routes", "schemas"} & set(path.parts), path
+
+
+def test_only_one_module_knows_the_engine_outside_the_worker():
+    for path in sources("service"):
+        if any(name.split(".")[0] == "dbos" for name in imports(path)):
+            assert path.name in ("job_queue.py", "worker.py"), path
+
+
+def test_torch_stays_in_its_rooms():
+    for top in ("models", "service"):
+        for path in sources(top):
+            if any(name.split(".")[0] == "torch" for name in imports(path)):
+                place = str(path.relative_to(ROOT))
+                assert any(place.startswith(allowed) for allowed in TORCH_ROOMS), place
+
+
+def test_files_stay_small():
+    for top in ("models", "service"):
+        for path in sources(top):
+            assert len(path.read_text().splitlines()) <= 400, path
+
+
+def test_the_http_process_imports_no_torch():
+    program = (
+        "import sys; import service.serve, service.app; "
+        "print(sorted({'torch', 'cv2', 'matplotlib', 'scipy'} & set(sys.modules)))"
+    )
+    output = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert output.stdout.strip() == "[]"
