@@ -1,5 +1,6 @@
 """What several tests need: a migrated data directory, a service under test, a camera to post to."""
 
+import math
 import os
 import signal
 import socket
@@ -14,6 +15,8 @@ import httpx
 import psutil
 import pytest
 
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
 from service.migrate import migrate
 from service.settings import Settings
 
@@ -24,6 +27,23 @@ CAMERA: dict[str, Any] = {
     "prior_pose": {"height_m": 6.0, "tilt_deg": 22.0, "roll_deg": 1.0, "heading_deg": 40.0},
     "frame_rate_hz": 25.0,
 }
+
+
+@pytest.fixture
+def lens() -> Intrinsics:
+    return Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
+
+
+@pytest.fixture
+def pose() -> CameraPose:
+    return CameraPose(
+        height_m=6.0,
+        tilt_rad=math.radians(22),
+        roll_rad=math.radians(1),
+        heading_rad=math.radians(40),
+        x_m=3.0,
+        y_m=-2.0,
+    )
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from models.errors import ShapeError
 from models.geometry.rotation import Array, Mask
 
 _NEWTON_STEPS = 30
+_NO_DISTORTION = 1e-9  # a coefficient that moves no pixel
 _CONVERGED = 1e-10  # normalised units; 1e-7 px on a long lens
 
 
@@ -55,7 +56,8 @@ class Intrinsics:
         """
         k1, k2, _, _, k3 = self.distortion
         # d/dr r (1 + k1 r^2 + k2 r^4 + k3 r^6) as a polynomial in s = r^2
-        roots = np.roots(np.array([7 * k3, 5 * k2, 3 * k1, 1.0]))
+        slope = np.array([7 * k3, 5 * k2, 3 * k1, 1.0])
+        roots = np.roots(np.where(np.abs(slope) < _NO_DISTORTION, 0.0, slope))
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
         return float(np.sqrt(real.min())) if real.size else math.inf
 

@@ -51,8 +51,9 @@ def simulate_walks(
 ) -> Walks:
     """One walk for each pose: constant speed, slowly turning heading, wholly inside the image.
 
-    A walk starts at a pixel drawn evenly over the picture's ground, in an even direction. One that
-    leaves the image is drawn again; after many vain draws, with fewer points.
+    A walk passes a pixel drawn evenly over the picture's ground, at any of its points, in an even
+    direction: so people come as often as they go. One that leaves the image is drawn again; after
+    many vain draws, with fewer points.
 
     Raises:
         DegenerateGeometryError: no pose at all sees enough ground for a walk.
@@ -95,10 +96,11 @@ def _draw(
     """Candidate walks (B, T, 2), NaN after the wanted points, and which lie inside the image."""
     count = len(poses)
     rotation, centre = poses.rotation, poses.centre_m
-    start_uv = rng.uniform((-0.5, -0.5), (intrinsics.width - 0.5, intrinsics.height - 0.5),
+    anchor_uv = rng.uniform((-0.5, -0.5), (intrinsics.width - 0.5, intrinsics.height - 0.5),
                            (count, 1, 2))  # fmt: skip
-    start, on_ground = ground_from_pixel(intrinsics, rotation, centre, start_uv)
-    distance = np.linalg.norm(start[:, 0] - centre[:, :2], axis=-1)
+    anchor, on_ground = ground_from_pixel(intrinsics, rotation, centre, anchor_uv)
+    anchor_idx = rng.integers(0, wanted)
+    distance = np.linalg.norm(anchor[:, 0] - centre[:, :2], axis=-1)
     direction = rng.uniform(0, 2 * math.pi, count)
     turn = rng.normal(0, config.turn_sd_rad_per_s, count)
     possible = on_ground[:, 0] & (distance < config.farthest_m)
@@ -107,16 +109,19 @@ def _draw(
     fits = np.zeros(count, dtype=np.bool_)
     row = np.flatnonzero(possible)
     steps = np.arange(config.max_points)
-    heading = direction[row, None] + turn[row, None] * config.step_s * steps[:-1]
+    since_anchor = steps[:-1] - anchor_idx[row, None]
+    heading = direction[row, None] + turn[row, None] * config.step_s * since_anchor
     stride = (speed_mps[row] * config.step_s)[:, None, None]
     moves = stride * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
-    path = start[row] + np.pad(np.cumsum(moves, axis=1), ((0, 0), (1, 0), (0, 0)))
+    walk = np.pad(np.cumsum(moves, axis=1), ((0, 0), (1, 0), (0, 0)))
+    path = anchor[row] + walk - np.take_along_axis(walk, anchor_idx[row, None, None], axis=1)
     walked = steps < wanted[row, None]
     near = (np.linalg.norm(path - centre[row, None, :2], axis=-1) < config.farthest_m) | ~walked
-    # The last point alone rules out most candidates; only the rest are projected whole.
+    # The two ends alone rule out most candidates; only the rest are projected whole.
     last = np.take_along_axis(path, wanted[row, None, None] - 1, axis=1)
-    end_uv, _ = pixel_from_ground(intrinsics, rotation[row], centre[row], last)
-    keep = near.all(-1) & intrinsics.contains(end_uv)[:, 0]
+    ends = np.concatenate([path[:, :1], last], axis=1)
+    ends_uv, _ = pixel_from_ground(intrinsics, rotation[row], centre[row], ends)
+    keep = near.all(-1) & intrinsics.contains(ends_uv).all(-1)
     row, path, walked = row[keep], path[keep], walked[keep]
     seen, _ = pixel_from_ground(intrinsics, rotation[row], centre[row], path)
     fits[row] = (intrinsics.contains(seen) | ~walked).all(-1)
