@@ -113,13 +113,13 @@ def demo(
     stay: Annotated[
         bool | None, typer.Option(help="Keep serving at the end; the default in a terminal.")
     ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Save the last screen as SVG.")] = None,
 ) -> None:
     """Simulate a street, knock its camera, and watch the alert come: under 3 minutes on 2 cores."""
     from service.demo import run_demo
 
-    raise typer.Exit(
-        run_demo(port=port, seed=seed, stay=sys.stdin.isatty() if stay is None else stay)
-    )
+    stays = sys.stdin.isatty() if stay is None else stay
+    raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
 @app.command()

@@ -1,6 +1,7 @@
 """`surefoot demo`: a simulated street, a knocked camera, and the alert, in the terminal."""
 
 import math
+import os
 import signal
 import socket
 import subprocess
@@ -76,7 +77,7 @@ class _Screen:
         return page
 
 
-def run_demo(*, port: int, seed: int, stay: bool) -> int:
+def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
@@ -93,15 +94,19 @@ def run_demo(*, port: int, seed: int, stay: bool) -> int:
         )
         url = f"http://{settings.host}:{settings.port}"
         with _service(settings), httpx.Client(base_url=url, timeout=30) as http:
-            screen = _play(http, console, seed, started)
+            screen, progress = _play(http, console, seed, started)
             won = _close(console, screen, url, time.monotonic() - started)
+            if picture is not None:
+                _save_picture(screen.table(progress), picture)
             if won and stay:
                 console.print("Ctrl-C stops the service.")
                 _wait_for_interrupt()
     return 0 if won else 1
 
 
-def _play(http: httpx.Client, console: Console, seed: int, started: float) -> _Screen:
+def _play(
+    http: httpx.Client, console: Console, seed: int, started: float
+) -> tuple[_Screen, Progress]:
     screen = _Screen()
     progress = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"),
@@ -120,7 +125,15 @@ def _play(http: httpx.Client, console: Console, seed: int, started: float) -> _S
         newest_s = _walk(http, screen, progress, moved, knocked, _KNOCKED_TRACKS, seed + 1, started)
         _settle(http, screen, newest_s, started)
         live.refresh()
-    return screen
+    return screen, progress
+
+
+def _save_picture(page: Table, path: Path) -> None:
+    """The last screen as SVG."""
+    with open(os.devnull, "w") as nowhere:
+        recorder = Console(record=True, width=90, file=nowhere)
+        recorder.print(page)
+        recorder.save_svg(str(path), title="surefoot demo")
 
 
 def _walk(

@@ -123,28 +123,26 @@ def _write(output: Path, runs: Sequence[AveragedRun]) -> None:
 
 
 def _table(runs: Sequence[AveragedRun]) -> Table:
-    table = Table(title="averaged estimate, training range centred on the true pose")
-    for column in ("scene", "recipe", "speed m/s", "seed", "step s", "tracks", "height m",
-                   "height error m", "angle error deg", "held-out", "training s"):  # fmt: skip
-        table.add_column(column, justify="left" if column in ("scene", "recipe") else "right")
+    recipes = ", ".join(sorted({run.recipe for run in runs}))
+    table = Table(title=f"averaged estimate, {recipes} recipe, trained around the true pose")
+    table.add_column("scene", no_wrap=True)
+    for column in ("m/s", "seed", "tracks", "height m", "off m", "off deg", "training s"):
+        table.add_column(column, justify="right")
     groups: dict[tuple[str, float], list[AveragedRun]] = {}
     for run in runs:
         groups.setdefault((run.scene, run.training_speed_mps), []).append(run)
     for (scene, speed), group in groups.items():
         for run in group:
-            table.add_row(
-                scene, run.recipe, f"{speed:g}", str(run.seed), f"{run.step_s:g}", str(run.tracks),
-                f"{run.height_m:.2f}", f"{run.height_error_m:.2f}", f"{run.angle_error_deg:.2f}",
-                f"{run.held_out_height_error_m:.2f}, {run.held_out_angle_error_deg:.1f}",
-                f"{run.training_s:.0f}",
-            )  # fmt: skip
+            table.add_row(scene, f"{speed:g}", str(run.seed), str(run.tracks), *_figures([run]))
         if len(group) > 1:
-            table.add_row(
-                scene, group[0].recipe, f"{speed:g}", "mean", "", "",
-                f"{mean(run.height_m for run in group):.2f}",
-                f"{mean(run.height_error_m for run in group):.2f}",
-                f"{mean(run.angle_error_deg for run in group):.2f}", "",
-                f"{mean(run.training_s for run in group):.0f}",
-                style="bold",
-            )  # fmt: skip
+            table.add_row(scene, f"{speed:g}", "mean", "", *_figures(group), style="bold")
     return table
+
+
+def _figures(runs: Sequence[AveragedRun]) -> list[str]:
+    return [
+        f"{mean(run.height_m for run in runs):.2f}",
+        f"{mean(run.height_error_m for run in runs):.2f}",
+        f"{mean(run.angle_error_deg for run in runs):.2f}",
+        f"{mean(run.training_s for run in runs):.0f}",
+    ]

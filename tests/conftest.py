@@ -89,6 +89,15 @@ class RunningService:
             )
         wait_for(self.answers)
 
+    def start_again(self, **changes: Any) -> None:
+        """Stop, and start with some settings changed."""
+        self.stop()
+        self.settings = self.settings.model_copy(update=changes)
+        self.http = httpx.Client(base_url=self.url, timeout=30)
+        self.start()
+        if self.settings.workers:
+            wait_for(self.ready)
+
     def answers(self) -> bool:
         assert self.process.poll() is None, self.log.read_text()
         try:

@@ -178,12 +178,8 @@ def test_two_workers_of_one_name_do_not_run_beside_each_other(service):
 
 def test_a_lost_workers_training_is_taken_over(service):
     """A worker that never comes back: another one takes its jobs."""
-    wait_for(service.ready)
+    service.start_again(workers=0)
     environment = service.settings.as_environment() | {"SUREFOOT_WORKER_LOST_S": "3"}
-    service.stop()
-    service.settings = service.settings.model_copy(update={"workers": 0})
-    service.http = httpx.Client(base_url=service.url, timeout=30)
-    service.start()
     command = [sys.executable, "-m", "service.cli", "worker", "--name"]
     with service.log.open("a") as log:
         first = subprocess.Popen([*command, "one"], env=environment, stderr=log)

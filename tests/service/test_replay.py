@@ -1,0 +1,84 @@
+"""Real people: recorded scenes, where they lie beside the project; never copied into it."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from models.evaluation.averaged_run import run_averaged
+from models.evaluation.scenes import load_scene
+from tests.conftest import wait_for
+
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}"),
+]
+
+
+def surefoot(*arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "service.cli", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def pose_of(service):
+    body = service.http.get("/cameras/town-centre/pose").json()
+    return body if body["estimated"] else None
+
+
+def test_a_replay_through_http_is_the_offline_evaluation(service):
+    scene = load_scene(SCENES / "town_centre")
+    service.start_again(epochs=3)
+    output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
+    assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
+    body = wait_for(lambda: pose_of(service), timeout_s=180)
+    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=3)
+    served = body["estimates"]["averaged"]
+    assert served["tracks"] == offline.tracks
+    assert served["height_m"] == pytest.approx(offline.height_m, abs=1e-4)
+    assert served["tilt_deg"] == pytest.approx(offline.tilt_deg, abs=1e-3)
+    assert served["roll_deg"] == pytest.approx(offline.roll_deg, abs=1e-3)
+
+
+def test_a_knocked_replay_moves_the_pose_and_fires(service):
+    """The default recipe, trained for a third of its epochs, on real people."""
+    service.start_again(epochs=3, drift_updates=1)
+    surefoot("replay", str(SCENES / "town_centre"), "--url", service.url, "--knock", "6,0,0")
+    body = wait_for(lambda: pose_of(service), timeout_s=180)
+    assert body["state"] == "drifting"
+    assert 3 < body["drift"]["tilt_deg"] < 9
+    (alert,) = service.http.get("/alerts", params={"state": "firing"}).json()["items"]
+    assert alert["kind"] == "drift"
+
+
+def test_every_recorded_camera_can_be_loaded():
+    for folder in sorted(SCENES.iterdir()):
+        if folder.is_dir():
+            scene = load_scene(folder)
+            truth = json.loads((folder / "camera.json").read_text())["true_pose"]
+            assert math.degrees(scene.true_pose.tilt_rad) == pytest.approx(truth["tilt_deg"])
+            assert len(scene.tracks) > 20
+
+
+def test_evaluate_prints_a_table_and_writes_json_and_a_plot(tmp_path):
+    output, plot = tmp_path / "out.json", tmp_path / "out.png"
+    text = surefoot(
+        "evaluate", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0,1",
+        "--speeds", "1.4", "--processes", "2", "--output", str(output), "--plot", str(plot),
+    )  # fmt: skip
+    assert "town-centre" in text
+    runs = json.loads(output.read_text())["runs"]
+    assert [run["seed"] for run in runs] == [0, 1]
+    assert plot.stat().st_size > 5000
