@@ -53,7 +53,7 @@ def settings(tmp_path: Path) -> Settings:
     return made
 
 
-def track(track_id: str, start_s: float = 1_780_000_000.0, count: int = 20) -> dict[str, Any]:
+def track(track_id: str, start_s: float = 1_700_000_000.0, count: int = 20) -> dict[str, Any]:
     """A walk across the picture at 0.4 s."""
     points = [[start_s + 0.4 * n, 300.0 + 12 * n, 400.0 + 5 * n] for n in range(count)]
     return {"id": track_id, "points": points}

@@ -1,6 +1,7 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
 import math
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,9 @@ MAX_BODY_BYTES = 32 * 1024 * 1024
 MAX_ID_LENGTH = 200
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
-_LATEST_TIME_S = 4_102_444_800.0  # the year 2100: later ones are milliseconds taken for seconds
+# A track from the future would push all others out of the window; milliseconds taken for seconds
+# are the usual cause. Clocks may disagree by a zone.
+MAX_AHEAD_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,11 +112,13 @@ def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) 
             "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
         )
     time_s = rows[:, 0]
-    if len(rows) and not (time_s.min() >= 0 and time_s.max() < _LATEST_TIME_S):
-        at = int(np.argmax((time_s < 0) | (time_s >= _LATEST_TIME_S)))
+    latest_s = time.time() + MAX_AHEAD_S
+    in_range = (time_s >= 0) & (time_s <= latest_s)
+    if not in_range.all():
+        at = int(np.argmin(in_range))
         raise TrackRejectedError(
             "time_out_of_range",
-            f"points/{at}/0: seconds since 1970 below {_LATEST_TIME_S:.0f} are needed, "
+            f"points/{at}/0: seconds from 1970 to a day ahead of now, {latest_s:.0f}, are needed, "
             f"got {time_s[at]:.3f}",
         )
     increasing = np.diff(time_s) > 0

@@ -10,6 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError, NotFoundError, PreconditionFailedError
 from service.job_queue import JobQueue
+from service.recalibration.alerts import close_alert
 from service.recalibration.trainings import queue_training, stop_trainings
 from service.settings import Settings
 from service.store import cameras, tracks, trainings
@@ -140,6 +141,9 @@ def change_camera(
     if change.intrinsics is not None or change.prior_pose is not None or speed_changed:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         add_prior_pose(session, camera_id, change.prior_pose or view.prior_pose, "changed", None)
+        if change.prior_pose is not None:
+            for kind in ("drift", "out_of_range"):
+                close_alert(session, camera_id, kind, "accepted", None)
         stop_trainings(session, camera_id)
         queue_training(session, queue, settings, camera_id)
     session.flush()

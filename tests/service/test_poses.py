@@ -234,6 +234,15 @@ def test_accepting_makes_the_served_pose_the_prior(bench):
     assert bench.http.get("/cameras/corner/trainings").json()["items"][0]["state"] == "queued"
 
 
+def test_another_prior_pose_ends_the_alert_against_the_old_one(bench):
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    change = {"prior_pose": {"height_m": 6.0, "tilt_deg": 27.0, "roll_deg": 1.0}}
+    bench.http.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
+    assert [alert["outcome"] for alert in bench.alerts()] == ["accepted"]
+    assert bench.pose()["estimated"] == []  # what was measured against the old one is gone
+
+
 def test_history_is_a_series_between_two_times(bench):
     for tilt_deg in (0.0, 0.5, 1.0):
         bench.see(moved(tilt_deg=tilt_deg))

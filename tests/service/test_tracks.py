@@ -1,6 +1,7 @@
 """Tracks in all their forms, and bad input that loses nothing beside it."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from service.store.tables import TrackRecord
 from tests.conftest import track
 from tests.service.conftest import problem
 
-T0 = 1_780_000_000.0
+T0 = 1_700_000_000.0
 
 
 def post(http, tracks, **fields):
@@ -47,7 +48,7 @@ def test_the_foot_of_a_box_is_the_middle_of_its_bottom_edge(corner, settings):
 def test_frames_become_times_by_rate_and_start(corner, settings):
     frames = [[n * 20, 100.0 + n, 200.0] for n in range(6)]
     answer = post(
-        corner, [{"id": "f", "frames": frames}], frame_rate_hz=10, started_at="2026-05-28T20:26:40Z"
+        corner, [{"id": "f", "frames": frames}], frame_rate_hz=10, started_at="2023-11-14T22:13:20Z"
     )
     assert answer["accepted"] == 1
     np.testing.assert_allclose(unpack(stored(settings)[0].points, 3)[:, 0] - T0, 2.0 * np.arange(6))
@@ -80,7 +81,7 @@ def test_motchallenge_text_in_any_order_of_lines(corner, settings):
     rows = [f"{n * 10},7,100,50,40,{150 + n},1,-1,-1,-1" for n in range(8)]
     rows += ["5,7,0,0,10,10,0,-1,-1,-1"]  # conf 0: to be ignored
     answer = corner.post(
-        "/cameras/corner/tracks?frame_rate_hz=10&started_at=2026-05-28T20:26:40Z",
+        "/cameras/corner/tracks?frame_rate_hz=10&started_at=2023-11-14T22:13:20Z",
         content="\n".join(reversed(rows)),
         headers={"Content-Type": "text/csv"},
     )
@@ -110,7 +111,7 @@ def test_bad_id(corner, bad_id):
 
 def test_nan(corner):
     body = json.dumps({"tracks": [track("good"), {**track("bad")}, track("fine")]})
-    body = body.replace("[1780000001.2, 336.0, 415.0]", "[1780000001.2, NaN, 415.0]")
+    body = body.replace("[1700000001.2, 336.0, 415.0]", "[1700000001.2, NaN, 415.0]")
     assert body.count("NaN") == 3
     body = json.loads(body)
     body["tracks"][0], body["tracks"][2] = track("good"), track("fine")
@@ -147,6 +148,12 @@ def test_time_that_does_not_increase(corner):
 def test_milliseconds_are_no_seconds(corner):
     bad = track("bad", start_s=T0 * 1000)
     assert refused(corner, bad)["code"] == "time_out_of_range"
+
+
+def test_a_track_from_the_future_cannot_push_the_others_out_of_the_window(corner):
+    ahead = track("ahead", start_s=time.time() + 2 * 86_400)
+    assert refused(corner, ahead)["code"] == "time_out_of_range"
+    assert post(corner, [track("now", start_s=time.time())])["accepted"] == 1
 
 
 def test_too_short(corner):
@@ -207,7 +214,7 @@ def test_malformed_text_costs_only_its_own_track(corner, settings):
     lines += [f"{n * 25},2,100,50,40,150,1" for n in range(6)]
     lines[8] = "50,2,oops,50,40,150,1"
     answer = corner.post(
-        "/cameras/corner/tracks?started_at=2026-05-28T20:26:40Z",
+        "/cameras/corner/tracks?started_at=2023-11-14T22:13:20Z",
         content="\n".join(lines),
         headers={"Content-Type": "text/csv"},
     ).json()
@@ -242,9 +249,9 @@ def test_csv_that_is_none_or_lacks_its_clock(corner):
     headers = {"Content-Type": "text/csv"}
     url = "/cameras/corner/tracks"
     problem(corner.post(url, content="1,1,1,1,1,1,1", headers=headers), 422, "malformed")
-    answer = corner.post(f"{url}?started_at=1780000000", content="a;b;c", headers=headers)
+    answer = corner.post(f"{url}?started_at=1700000000", content="a;b;c", headers=headers)
     problem(answer, 422, "malformed")
-    answer = corner.post(f"{url}?started_at=2026-05-28T20:26:40Z", content="a;b", headers=headers)
+    answer = corner.post(f"{url}?started_at=2023-11-14T22:13:20Z", content="a;b", headers=headers)
     problem(answer, 422, "malformed")
 
 
