@@ -35,6 +35,8 @@ class Trajectory:
             raise ShapeError(
                 f"uv: ({self.time_s.size}, 2) is needed beside time_s, got {self.uv.shape}"
             )
+        if not self.time_s.size:
+            raise ShapeError("time_s: at least 1 point is needed, got 0")
         if not (np.isfinite(self.time_s).all() and np.isfinite(self.uv).all()):
             raise ShapeError("time_s, uv: must be finite")
         if not (np.diff(self.time_s) > 0).all():
@@ -43,7 +45,7 @@ class Trajectory:
     @property
     def duration_s(self) -> float:
         """Seconds from the first point to the last."""
-        return float(self.time_s[-1] - self.time_s[0]) if self.time_s.size else 0.0
+        return float(self.time_s[-1] - self.time_s[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,13 +71,15 @@ def choose_step_s(trajectories: Sequence[Trajectory]) -> float:
     one interval, until four of five tracks give the eleven points that a window needs. Tracks
     sparser than 0.4 s give their own interval.
     """
-    if not trajectories:
+    intervals = [np.diff(t.time_s) for t in trajectories if t.time_s.size > 1]
+    if not intervals:
         return DEFAULT_STEP_S
-    interval_s = float(np.median(np.concatenate([np.diff(t.time_s) for t in trajectories])))
+    interval_s = float(np.median(np.concatenate(intervals)))
     short_s = float(np.quantile([t.duration_s for t in trajectories], 0.2))
     wanted_s = min(DEFAULT_STEP_S, short_s / (WINDOW_MIN_POINTS - 1))
     multiple = max(1, math.floor(wanted_s / interval_s + 0.05))
-    return round(multiple * interval_s, 3)
+    # To whole milliseconds, never up: a step a hair too long loses the last point of every track.
+    return math.floor(multiple * interval_s * 1000 + 1e-6) / 1000
 
 
 def cut_windows(

@@ -26,7 +26,7 @@ from models.evaluation.scenes import Knock, SceneTrack
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import angle_between
-from models.simulation.poses import PoseSet
+from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
 from service.replay import post_tracks
@@ -202,16 +202,8 @@ def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
 def _people(pose: CameraPose, count: int, seed: int) -> list[SceneTrack]:
     """People seen by a camera; each walk ends at time 0."""
     rng = np.random.default_rng(seed)
-    poses = PoseSet(
-        height_m=np.full(count, pose.height_m),
-        tilt_rad=np.full(count, pose.tilt_rad),
-        roll_rad=np.full(count, pose.roll_rad),
-        heading_rad=pose.heading_rad,
-        x_m=pose.x_m,
-        y_m=pose.y_m,
-    )
     walk = WalkConfig(speed_sd_mps=0.2, farthest_m=40.0)
-    walks = simulate_walks(LENS, poses, walk, rng)
+    walks = simulate_walks(LENS, repeated_pose(pose, count), walk, rng)
     tracks = []
     for number, (uv, length) in enumerate(zip(walks.uv, walks.lengths, strict=True)):
         time_s = (np.arange(length) - length + 1) * walk.step_s

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import ShapeError
+from models.errors import CalibrationError, ShapeError
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -83,7 +83,9 @@ def load_scene(folder: Path) -> Scene:
             frame_rate_hz=camera["frame_rate_hz"],
             tracks=_tracks(rows),
         )
-    except (OSError, KeyError, json.JSONDecodeError) as error:
+    except CalibrationError:
+        raise
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise ShapeError(f"scene {folder}: camera.json or tracks.csv: {error!r}") from error
 
 

@@ -85,6 +85,7 @@ class Intrinsics:
         target = (np.asarray(uv, np.float64) - (self.cx, self.cy)) / (self.fx, self.fy)
         estimate = target
         if any(self.distortion):
+            estimate = target * self._undistorted_share(target)
             for _ in range(_NEWTON_STEPS):
                 value, jacobian = self._distort(estimate)
                 miss = value - target
@@ -111,6 +112,20 @@ class Intrinsics:
         u, v = uv[..., 0], uv[..., 1]
         across = (u >= -0.5 - margin_px) & (u <= self.width - 0.5 + margin_px)
         return np.asarray(across & (v >= -0.5 - margin_px) & (v <= self.height - 0.5 + margin_px))
+
+    def _undistorted_share(self, distorted: Array) -> Array:
+        """About how much longer (..., 1) the undistorted rays are, by the radial terms alone.
+
+        Newton's method must start within the lens: the distorted radius may lie beyond its edge.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        radius = np.linspace(0, min(0.999 * self.max_radius, 10.0), 512)[1:]
+        s = radius * radius
+        table = radius * (1 + s * (k1 + s * (k2 + s * k3)))
+        wanted = np.linalg.norm(distorted, axis=-1)
+        start = np.interp(wanted, table, radius, left=0.0)
+        near_centre = wanted <= table[0]
+        return np.where(near_centre, 1.0, start / np.where(near_centre, 1.0, wanted))[..., None]
 
     def _distort(self, rays: Array) -> tuple[Array, Array]:
         """Distorted rays (..., 2) and the Jacobian (..., 2, 2)."""

@@ -91,12 +91,14 @@ def plan_training(
     """The plan of a named recipe, with its number of epochs replaced where one is given.
 
     Raises:
-        ShapeError: there is no recipe of that name.
+        ShapeError: there is no recipe of that name, or no epoch.
     """
     if recipe_name not in RECIPES:
         raise ShapeError(f"recipe: one of {sorted(RECIPES)} is needed, got {recipe_name!r}")
     recipe = RECIPES[recipe_name]
     if epochs is not None:
+        if epochs < 1:
+            raise ShapeError(f"epochs: must be at least 1, got {epochs}")
         recipe = replace(recipe, epochs=epochs)
     return TrainingPlan(
         intrinsics=intrinsics, prior_pose=prior_pose, recipe=recipe, walk=walk, seed=seed

@@ -86,6 +86,16 @@ def random_poses(
     return _around(prior, height, prior.tilt_rad + tilt, prior.roll_rad + roll)
 
 
+def repeated_pose(pose: CameraPose, count: int) -> PoseSet:
+    """One pose, so many times: a camera that stays while people come."""
+    return _around(
+        pose,
+        np.full(count, pose.height_m),
+        np.full(count, pose.tilt_rad),
+        np.full(count, pose.roll_rad),
+    )
+
+
 def _around(prior: CameraPose, height: Array, tilt: Array, roll: Array) -> PoseSet:
     return PoseSet(
         height_m=height,

@@ -1,0 +1,58 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.errors import ShapeError
+from models.estimation.averaged import average_windows, averaged_estimate
+from models.regression.prediction import predict_windows
+from models.regression.recipe import PAPER, plan_training
+from models.regression.training import check_held_out, train
+from models.simulation.poses import repeated_pose
+from models.simulation.walkers import WalkConfig, simulate_walks
+from models.trajectory import Windows
+
+
+def test_the_papers_numbers():
+    assert (PAPER.learning_rate, PAPER.batch, PAPER.epochs, PAPER.alpha) == (0.01, 1024, 50, 1.0)
+    assert (PAPER.poses, PAPER.walks_per_pose, PAPER.target) == ("grid", 10, "pose")
+    assert (PAPER.schedule, PAPER.noise_px, PAPER.inputs) == ("constant", 0.0, "points")
+
+
+def test_an_unknown_recipe_is_named(lens, pose):
+    with pytest.raises(ShapeError, match="recipe: one of .* got 'best'"):
+        plan_training(
+            intrinsics=lens, prior_pose=pose, recipe_name="best", walk=WalkConfig(), seed=0
+        )
+
+
+def test_a_training_without_an_epoch_is_none(lens, pose):
+    with pytest.raises(ShapeError, match="epochs: must be at least 1, got 0"):
+        plan_training(
+            intrinsics=lens,
+            prior_pose=pose,
+            recipe_name="default",
+            walk=WalkConfig(),
+            seed=0,
+            epochs=0,
+        )
+
+
+@pytest.mark.slow
+def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
+    plan = plan_training(
+        intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0, epochs=3
+    )
+    network, metrics = train(plan)
+    check_held_out(metrics)
+    assert metrics.median_angle_error_deg < 0.6 * metrics.prior_angle_error_deg
+    # Its own walks, seen from a camera knocked by 6 deg of tilt: the mean says so.
+    knocked = replace(pose, tilt_rad=pose.tilt_rad + math.radians(6))
+    walks = simulate_walks(
+        lens, repeated_pose(knocked, 300), WalkConfig(), np.random.default_rng(9)
+    )
+    windows = Windows(uv=walks.uv, lengths=walks.lengths, owner_idx=np.arange(300))
+    height, q = predict_windows(network, windows, plan)
+    estimate = averaged_estimate(average_windows(height, q, windows.owner_idx)[1], 0)
+    assert 3.5 < math.degrees(estimate.tilt_rad - pose.tilt_rad) < 7.5
