@@ -1,0 +1,44 @@
+"""The engine's own housekeeping, in a process of its own: the engine is global to a process."""
+
+import subprocess
+import sys
+
+PROGRAM = """
+import sys
+from datetime import timedelta
+from pathlib import Path
+
+from dbos import DBOS
+
+from service.job_queue import engine_config
+from service.jobs import worker
+from service.settings import Settings
+
+settings = Settings(data_dir=Path(sys.argv[1]))
+DBOS(config=engine_config(settings, "w"))
+
+@DBOS.workflow(name="noop")
+def noop():
+    pass
+
+DBOS.launch()
+for _ in range(3):
+    noop()
+worker._forget_finished()
+print(len(DBOS.list_workflows()))
+worker._KEEP_FINISHED = timedelta(hours=-1)
+worker._forget_finished()
+print(len(DBOS.list_workflows()))
+DBOS.destroy()
+"""
+
+
+def test_jobs_that_ended_a_while_ago_are_forgotten(settings):
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(settings.data_dir)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.stdout.split() == ["3", "0"], done.stderr
