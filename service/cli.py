@@ -40,7 +40,9 @@ def serve(
 
 @app.command()
 def worker(
-    name: Annotated[str, typer.Option(help="Stable name: finds its unfinished jobs again.")],
+    name: Annotated[
+        str, typer.Option(help="Stable and its own: by it a worker finds its unfinished jobs.")
+    ] = "standalone",
     data_dir: DataDir = None,
     follow_stdin: Annotated[bool, typer.Option(help="End when stdin ends.")] = False,
 ) -> None:
