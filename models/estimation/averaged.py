@@ -1,6 +1,6 @@
 """The averaged estimate: the mean of what a regressor says of each track."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -99,13 +99,11 @@ def averaged_estimate(predictions: TrackPredictions, seed: int) -> PoseEstimate:
 
 def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
     """The estimate as a pose; what tracks cannot tell (x, y, heading) is the prior pose's."""
-    return CameraPose(
+    return replace(
+        prior,
         height_m=max(estimate.height_m, 1e-3),
         tilt_rad=estimate.tilt_rad,
         roll_rad=estimate.roll_rad,
-        heading_rad=prior.heading_rad,
-        x_m=prior.x_m,
-        y_m=prior.y_m,
     )
 
 

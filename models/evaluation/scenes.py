@@ -4,7 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -45,13 +45,11 @@ class Knock:
 
     def apply(self, pose: CameraPose) -> CameraPose:
         """The pose after the move."""
-        return CameraPose(
+        return replace(
+            pose,
             height_m=pose.height_m * math.exp(self.log_height),
             tilt_rad=pose.tilt_rad + self.tilt_rad,
             roll_rad=pose.roll_rad + self.roll_rad,
-            heading_rad=pose.heading_rad,
-            x_m=pose.x_m,
-            y_m=pose.y_m,
         )
 
 

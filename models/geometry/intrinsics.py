@@ -118,14 +118,18 @@ class Intrinsics:
 
         Newton's method must start within the lens: the distorted radius may lie beyond its edge.
         """
-        k1, k2, _, _, k3 = self.distortion
         radius = np.linspace(0, min(0.999 * self.max_radius, 10.0), 512)[1:]
-        s = radius * radius
-        table = radius * (1 + s * (k1 + s * (k2 + s * k3)))
+        table = radius * self._radial(radius * radius)
         wanted = np.linalg.norm(distorted, axis=-1)
         start = np.interp(wanted, table, radius, left=0.0)
         near_centre = wanted <= table[0]
         return np.where(near_centre, 1.0, start / np.where(near_centre, 1.0, wanted))[..., None]
+
+    def _radial(self, squared_radius: Array) -> Array:
+        """By how much the lens lengthens a ray of a squared radius (...)."""
+        k1, k2, _, _, k3 = self.distortion
+        s = squared_radius
+        return 1 + s * (k1 + s * (k2 + s * k3))
 
     def _distort(self, rays: Array) -> tuple[Array, Array]:
         """Distorted rays (..., 2) and the Jacobian (..., 2, 2)."""
@@ -133,7 +137,7 @@ class Intrinsics:
         x, y = rays[..., 0], rays[..., 1]
         s = x * x + y * y
         with np.errstate(over="ignore", invalid="ignore"):
-            radial = 1 + s * (k1 + s * (k2 + s * k3))
+            radial = self._radial(s)
             slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))  # d radial / d(s) times 2
             value = np.stack(
                 [

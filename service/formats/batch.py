@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterable
 from datetime import datetime
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -67,17 +67,15 @@ def read_ndjson(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -
     """
     lines = [line for line in body.split(b"\n") if line.strip()]
     _check_count(len(lines))
-
-    def read(line: bytes) -> IncomingTrack:
+    items: list[tuple[int, Any, Callable[[], IncomingTrack]]] = []
+    for index, line in enumerate(lines):
         try:
             raw = json.loads(line)
         except (ValueError, RecursionError) as error:
-            raise TrackRejectedError("malformed", f"not JSON: {error}") from error
-        return read_track(raw, source, clock, size)
-
-    return _collect(
-        (index, _quiet_json(line), partial(read, line)) for index, line in enumerate(lines)
-    )
+            items.append((index, None, partial(_refuse, f"not JSON: {error}")))
+        else:
+            items.append((index, raw, partial(read_track, raw, source, clock, size)))
+    return _collect(items)
 
 
 def read_mot(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> Batch:
@@ -116,7 +114,7 @@ def read_mot(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> B
 
     def read(track_id: str) -> IncomingTrack:
         if track_id in broken:
-            raise TrackRejectedError("malformed", broken[track_id])
+            _refuse(broken[track_id])
         array = np.array(rows[track_id], dtype=np.float64).reshape(-1, 5)
         return check_track(track_id, source, array[np.argsort(array[:, 0], kind="stable")], size)
 
@@ -185,11 +183,8 @@ def _collect(items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]]) -> B
     return Batch(tracks=tuple(tracks), rejections=tuple(rejections))
 
 
-def _quiet_json(line: bytes) -> Any:
-    try:
-        return json.loads(line)
-    except (ValueError, RecursionError):
-        return None
+def _refuse(detail: str) -> NoReturn:
+    raise TrackRejectedError("malformed", detail)
 
 
 def _check_count(count: int) -> None:

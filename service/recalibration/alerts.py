@@ -46,11 +46,12 @@ def open_alert(
     return record
 
 
-def close_alert(session: Session, camera_id: str, kind: str, outcome: str, by: str | None) -> None:
-    """End the open alert of a camera and kind, if there is one."""
-    record = alerts.firing(session, camera_id, kind)
-    if record is not None:
-        _end(session, record, outcome, None, by)
+def close_pose_alerts(session: Session, camera_id: str, outcome: str, by: str | None) -> None:
+    """End the open alerts that measure a camera against its prior pose, if there are any."""
+    for kind in ("drift", "out_of_range"):
+        record = alerts.firing(session, camera_id, kind)
+        if record is not None:
+            _end(session, record, outcome, None, by)
 
 
 def list_alerts(

@@ -10,7 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError, NotFoundError, PreconditionFailedError
 from service.job_queue import JobQueue
-from service.recalibration.alerts import close_alert
+from service.recalibration.alerts import close_pose_alerts
 from service.recalibration.trainings import queue_training, stop_trainings
 from service.settings import Settings
 from service.store import cameras, tracks, trainings
@@ -140,12 +140,10 @@ def change_camera(
     speed_changed = change.walking_speed_mean_mps is not None
     if change.intrinsics is not None or change.prior_pose is not None or speed_changed:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
-        add_prior_pose(session, camera_id, change.prior_pose or view.prior_pose, "changed", None)
         if change.prior_pose is not None:
-            for kind in ("drift", "out_of_range"):
-                close_alert(session, camera_id, kind, "accepted", None)
-        stop_trainings(session, camera_id)
-        queue_training(session, queue, settings, camera_id)
+            close_pose_alerts(session, camera_id, "accepted", None)
+        pose = change.prior_pose or view.prior_pose
+        renew_prior_pose(session, queue, settings, camera_id, pose, "changed", None)
     session.flush()
     return view_camera(session, camera_id)
 
@@ -172,6 +170,21 @@ def require_camera(session: Session, camera_id: str) -> CameraRecord:
     if record is None:
         raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
     return record
+
+
+def renew_prior_pose(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    pose: CameraPose,
+    origin: str,
+    by: str | None,
+) -> None:
+    """Make a pose the prior pose, and train at it instead of whatever training is under way."""
+    add_prior_pose(session, camera_id, pose, origin, by)
+    stop_trainings(session, camera_id)
+    queue_training(session, queue, settings, camera_id)
 
 
 def add_prior_pose(

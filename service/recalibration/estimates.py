@@ -17,7 +17,7 @@ from models.estimation.averaged import (
     pose_of,
 )
 from models.geometry.pose import CameraPose
-from service.recalibration.alerts import close_alert, open_alert
+from service.recalibration.alerts import close_pose_alerts, open_alert
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, events, tracks, trainings
 from service.store.packing import pose_of_prior
@@ -77,30 +77,26 @@ def store_estimate(session: Session, settings: Settings, camera_id: str) -> Esti
         return None
     prior_record = cameras.prior_pose(session, camera_id)
     last = estimates.newest(session, camera_id)
-    if (
-        last is not None
-        and (last.model_id, last.prior_pose_id) == (model.id, prior_record.id)
-        and (last.newest_track_pk, last.tracks) == (window.newest_pk, len(predictions))
+    if last is not None and (last.model_id, last.prior_pose_id) != (model.id, prior_record.id):
+        last = None  # a streak belongs to one model and one prior pose
+    if last is not None and (last.newest_track_pk, last.tracks) == (
+        window.newest_pk,
+        len(predictions),
     ):
         return None
     estimate = averaged_estimate(_as_predictions(predictions), settings.seed)
     prior = pose_of_prior(prior_record)
     drift = drift_between(estimate, prior)
-    # A streak belongs to one model and one prior pose.
-    goes_on = last is not None and (last.model_id, last.prior_pose_id) == (
-        model.id,
-        prior_record.id,
-    )
     limits = _limits(settings)
     was_drifting = alerts.firing(session, camera_id, "drift") is not None
-    streak = last.drift_streak if goes_on and last is not None else 0
+    streak = 0 if last is None else last.drift_streak
     if last is not None and last.state == "drifting" and not was_drifting:
         streak = 0  # a person resolved the alert: it has to earn its updates anew
     verdict = judge(drift, estimate, limits, streak, was_drifting)
     since = None
     if verdict.streak > 0 or verdict.drifting:
-        since = last.drift_since if goes_on and last is not None else None
-        since = since or datetime.fromtimestamp(window.to_s, UTC)
+        known = None if last is None else last.drift_since
+        since = known or datetime.fromtimestamp(window.to_s, UTC)
     edge = _beyond_range(estimate, model)
     state = "out_of_range" if edge else "drifting" if verdict.drifting else "ok"
     reason = edge or _describe(drift, estimate, verdict.drifting, verdict.streak, limits)
@@ -137,8 +133,7 @@ def store_estimate(session: Session, settings: Settings, camera_id: str) -> Esti
         severity = "critical" if edge or verdict.excess >= 2 else "warning"
         open_alert(session, camera_id, kind, severity, _drift(drift), since)
     else:
-        close_alert(session, camera_id, "drift", "cleared", None)
-        close_alert(session, camera_id, "out_of_range", "cleared", None)
+        close_pose_alerts(session, camera_id, "cleared", None)
     return record
 
 

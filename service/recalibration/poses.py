@@ -3,7 +3,7 @@
 import time
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
@@ -13,9 +13,8 @@ from models.estimation.averaged import FEWEST_TRACKS
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
-from service.recalibration.alerts import close_alert
-from service.recalibration.cameras import add_prior_pose, require_camera
-from service.recalibration.trainings import queue_training, stop_trainings
+from service.recalibration.alerts import close_pose_alerts
+from service.recalibration.cameras import renew_prior_pose, require_camera
 from service.settings import Settings
 from service.store import cameras, estimates, tracks, trainings
 from service.store.packing import pose_of_prior
@@ -56,13 +55,11 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     state, reason = _state(session, settings, camera_id, estimate, model, stored)
     pose = prior
     if estimate is not None:
-        pose = CameraPose(
+        pose = replace(
+            prior,
             height_m=estimate.height_m,
             tilt_rad=estimate.tilt_rad,
             roll_rad=estimate.roll_rad,
-            heading_rad=prior.heading_rad,
-            x_m=prior.x_m,
-            y_m=prior.y_m,
         )
     version = 0 if estimate is None else estimate.id
     model_id = None if model is None else model.id
@@ -104,11 +101,8 @@ def accept_pose(
     view = view_pose(session, settings, camera_id)
     if view.estimate is None:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
-    add_prior_pose(session, camera_id, view.pose, "accepted", by)
-    close_alert(session, camera_id, "drift", "accepted", by)
-    close_alert(session, camera_id, "out_of_range", "accepted", by)
-    stop_trainings(session, camera_id)
-    queue_training(session, queue, settings, camera_id)
+    close_pose_alerts(session, camera_id, "accepted", by)
+    renew_prior_pose(session, queue, settings, camera_id, view.pose, "accepted", by)
     return view_pose(session, settings, camera_id)
 
 
