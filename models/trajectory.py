@@ -22,6 +22,8 @@ class Trajectory:
     """Foot points of one pedestrian in time order.
 
     `time_s` is (N,), strictly increasing, seconds since the Unix epoch; `uv` is (N, 2) in pixels.
+    `top_v` (N,) is the upper edge of the person's box in pixels, NaN where none is known; None
+    where there are no boxes at all.
 
     Raises:
         ShapeError: the arrays do not fit, a number is not finite, or time does not increase.
@@ -29,11 +31,16 @@ class Trajectory:
 
     time_s: Array
     uv: Array
+    top_v: Array | None = None
 
     def __post_init__(self) -> None:
         if self.time_s.ndim != 1 or self.uv.shape != (self.time_s.size, 2):
             raise ShapeError(
                 f"uv: ({self.time_s.size}, 2) is needed beside time_s, got {self.uv.shape}"
+            )
+        if self.top_v is not None and self.top_v.shape != self.time_s.shape:
+            raise ShapeError(
+                f"top_v: ({self.time_s.size},) is needed beside time_s, got {self.top_v.shape}"
             )
         if not self.time_s.size:
             raise ShapeError("time_s: at least 1 point is needed, got 0")
@@ -41,6 +48,11 @@ class Trajectory:
             raise ShapeError("time_s, uv: must be finite")
         if not (np.diff(self.time_s) > 0).all():
             raise ShapeError("time_s: must increase strictly")
+
+    def part(self, indices: npt.NDArray[np.int64]) -> "Trajectory":
+        """The points of some indices, in time order."""
+        top_v = None if self.top_v is None else self.top_v[indices]
+        return Trajectory(time_s=self.time_s[indices], uv=self.uv[indices], top_v=top_v)
 
     @property
     def duration_s(self) -> float:

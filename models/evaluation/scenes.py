@@ -13,15 +13,23 @@ from models.errors import CalibrationError, ShapeError
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.upright import statures, tops_of_boxes, tops_seen
 from models.trajectory import Trajectory
+
+# How WILDTRACK's notes say that a track's number is a person's and a running one.
+_PERSON_IN_HUNDREDS = "track_id//100 = personID"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneTrack:
-    """One recorded person: the tracker's name for them and their foot points."""
+    """One recorded track: the tracker's name for it, and who it is, where the scene knows.
+
+    Several tracks may be of one person, who left the picture and came back.
+    """
 
     track_id: str
     trajectory: Trajectory
+    person_id: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,20 +64,31 @@ class Knock:
 def load_scene(folder: Path) -> Scene:
     """The scene of a folder with `camera.json` and `tracks.csv`; tracks by their first time.
 
+    Boxes are read from `boxes.csv` where there is one.
+
     Raises:
         ShapeError: a file is missing or lacks a field.
     """
     try:
         camera = json.loads((folder / "camera.json").read_text())
+        lens, pose = camera["intrinsics"], camera["true_pose"]
+        intrinsics = Intrinsics(**{**lens, "distortion": tuple(lens["distortion"])})
+        tops = _tops(folder / "boxes.csv", intrinsics)
         with (folder / "tracks.csv").open(newline="") as lines:
             rows = [
-                (row["track_id"], float(row["time_s"]), float(row["u_px"]), float(row["v_px"]))
+                (
+                    row["track_id"],
+                    float(row["time_s"]),
+                    float(row["u_px"]),
+                    float(row["v_px"]),
+                    tops.get((row["track_id"], row["frame"]), np.nan),
+                )
                 for row in csv.DictReader(lines)
             ]
-        lens, pose = camera["intrinsics"], camera["true_pose"]
+        persons = _PERSON_IN_HUNDREDS in camera.get("notes", "")
         return Scene(
             scene_id=camera["id"],
-            intrinsics=Intrinsics(**{**lens, "distortion": tuple(lens["distortion"])}),
+            intrinsics=intrinsics,
             true_pose=CameraPose(
                 height_m=pose["height_m"],
                 tilt_rad=math.radians(pose["tilt_deg"]),
@@ -79,7 +98,7 @@ def load_scene(folder: Path) -> Scene:
                 y_m=pose["y_m"],
             ),
             frame_rate_hz=camera["frame_rate_hz"],
-            tracks=_tracks(rows),
+            tracks=_tracks(rows, has_boxes=bool(tops), person_in_hundreds=persons),
         )
     except CalibrationError:
         raise
@@ -90,11 +109,10 @@ def load_scene(folder: Path) -> Scene:
 def knock_trajectory(
     trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, knocked: CameraPose
 ) -> Trajectory | None:
-    """What the camera sees of the same feet after a move; the longest run inside the image.
+    """What the camera sees of the same people after a move; the longest run inside the image.
 
-    None where fewer than two points stay in the picture.
-
-    Source: virtual knock; exact, since foot points lie on the ground.
+    None where fewer than two points stay in the picture. Exact for the feet, which lie on the
+    ground; the boxes' upper edges are those of upright people of the same height.
     """
     ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, trajectory.uv)
     uv, _ = pixel_from_ground(intrinsics, knocked.rotation, knocked.centre_m, ground)
@@ -103,16 +121,41 @@ def knock_trajectory(
     longest = max((run for run in runs if seen[run[0]]), key=len, default=np.arange(0))
     if longest.size < 2:
         return None
-    return Trajectory(time_s=trajectory.time_s[longest], uv=uv[longest])
+    top_v = None
+    if trajectory.top_v is not None:
+        tall, _ = statures(
+            intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
+        )
+        top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
+    return replace(trajectory, uv=uv, top_v=top_v).part(longest)
 
 
-def _tracks(rows: Sequence[tuple[str, float, float, float]]) -> tuple[SceneTrack, ...]:
-    by_id: dict[str, list[tuple[float, float, float]]] = {}
+def _tops(path: Path, intrinsics: Intrinsics) -> dict[tuple[str, str], float]:
+    """The upper edge of each box by track and frame; empty where the scene has no boxes."""
+    if not path.exists():
+        return {}
+    with path.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    boxes = np.array([[float(row[side]) for side in ("x1", "y1", "x2", "y2")] for row in rows])
+    tops = tops_of_boxes(intrinsics, boxes.reshape(-1, 4))
+    return {(row["track_id"], row["frame"]): top for row, top in zip(rows, tops, strict=True)}
+
+
+def _tracks(
+    rows: Sequence[tuple[str, float, float, float, float]],
+    *,
+    has_boxes: bool,
+    person_in_hundreds: bool,
+) -> tuple[SceneTrack, ...]:
+    by_id: dict[str, list[tuple[float, float, float, float]]] = {}
     for track_id, *point in rows:
-        by_id.setdefault(track_id, []).append((point[0], point[1], point[2]))
+        by_id.setdefault(track_id, []).append((point[0], point[1], point[2], point[3]))
     tracks = []
     for track_id, points in by_id.items():
         array = np.array(sorted(points))
-        trajectory = Trajectory(time_s=array[:, 0], uv=array[:, 1:])
-        tracks.append(SceneTrack(track_id=track_id, trajectory=trajectory))
+        trajectory = Trajectory(
+            time_s=array[:, 0], uv=array[:, 1:3], top_v=array[:, 3] if has_boxes else None
+        )
+        person = str(int(track_id) // 100) if person_in_hundreds else track_id
+        tracks.append(SceneTrack(track_id=track_id, trajectory=trajectory, person_id=person))
     return tuple(sorted(tracks, key=lambda track: track.trajectory.time_s[0]))

@@ -1,0 +1,158 @@
+"""The virtual knock: real tracks of a still camera, split, moved and given to an estimator."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.evaluation.scenes import Knock, Scene, knock_trajectory
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array, angle_between
+from models.trajectory import Trajectory
+
+NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
+_Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnockRange:
+    """How far a knock may go: uniform in tilt and roll, and in the logarithm of the height."""
+
+    angle_rad: float
+    log_height: float
+
+
+STILL = KnockRange(angle_rad=0.0, log_height=0.0)
+KNOCKED = KnockRange(angle_rad=math.radians(8), log_height=0.15)
+HARD = KnockRange(angle_rad=math.radians(15), log_height=0.35)
+RANGES = {"still": STILL, "knock": KNOCKED, "hard": HARD}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProtocolCase:
+    """What the service would see: tracks at the prior pose, then tracks after a knock.
+
+    `prior_pose` is the scene's true pose; `true_pose` where the camera is after the knock.
+    """
+
+    scene_id: str
+    seed: int
+    intrinsics: Intrinsics
+    prior_pose: CameraPose
+    true_pose: CameraPose
+    reference: tuple[Trajectory, ...]
+    seen: tuple[Trajectory, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
+
+    `weak` names those of the three that it declares the tracks cannot tell.
+    """
+
+    values: Array
+    covariance: Array
+    tracks: int
+    weak: tuple[str, ...] = ()
+
+
+Estimator = Callable[[ProtocolCase], Answer]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """One case of one estimator. Triples are tilt and roll in degrees and log height."""
+
+    scene_id: str
+    estimator: str
+    seed: int
+    tracks: int
+    true_drift: tuple[float, float, float]
+    drift: tuple[float, float, float]
+    sd: tuple[float, float, float]
+    angle_error_deg: float
+    height_error: float
+    covered: tuple[bool, bool, bool]
+    degenerate: bool
+    seconds: float
+
+
+def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
+    """Split a scene's people in halves and knock the camera before the second.
+
+    Source: `estimation.md`, section 4. The same scene and seed give the same halves and, up to
+    the range, the same direction of the knock.
+    """
+    rng = np.random.default_rng(seed)
+    people = sorted({track.person_id for track in scene.tracks})
+    first = {people[index] for index in rng.permutation(len(people))[: len(people) // 2]}
+    tilt, roll = rng.uniform(-1, 1, 2) * knock_range.angle_rad
+    knock = Knock(
+        tilt_rad=tilt, roll_rad=roll, log_height=rng.uniform(-1, 1) * knock_range.log_height
+    )
+    knocked = knock.apply(scene.true_pose)
+    seen = [
+        knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
+        for track in scene.tracks
+        if track.person_id not in first
+    ]
+    return ProtocolCase(
+        scene_id=scene.scene_id,
+        seed=seed,
+        intrinsics=scene.intrinsics,
+        prior_pose=scene.true_pose,
+        true_pose=knocked,
+        reference=tuple(track.trajectory for track in scene.tracks if track.person_id in first),
+        seen=tuple(trajectory for trajectory in seen if trajectory is not None),
+    )
+
+
+def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: float) -> Outcome:
+    """An estimator's answer beside the truth."""
+    true, prior = numbers_of(case.true_pose), numbers_of(case.prior_pose)
+    error = answer.values - true
+    error[1] = math.remainder(error[1], 2 * math.pi)
+    sd = np.sqrt(np.diag(answer.covariance))
+    pose = pose_of_numbers(answer.values, case.prior_pose)
+    covered = np.abs(error) <= _Z90 * sd
+    return Outcome(
+        scene_id=case.scene_id,
+        estimator=estimator,
+        seed=case.seed,
+        tracks=answer.tracks,
+        true_drift=_printed(true - prior),
+        drift=_printed(true + error - prior),
+        sd=_printed(sd),
+        angle_error_deg=math.degrees(
+            float(angle_between(pose.quaternion_wxyz, case.true_pose.quaternion_wxyz))
+        ),
+        height_error=abs(math.expm1(error[2])),
+        covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
+        degenerate=bool(answer.weak),
+        seconds=seconds,
+    )
+
+
+def numbers_of(pose: CameraPose) -> Array:
+    """Tilt, roll (radians) and log height of a pose, (3,)."""
+    return np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+
+
+def pose_of_numbers(numbers: Array, prior: CameraPose) -> CameraPose:
+    """The pose of tilt, roll and log height; x, y and heading are the prior pose's."""
+    tilt, roll, log_height = (float(number) for number in numbers)
+    return CameraPose(
+        height_m=math.exp(log_height),
+        tilt_rad=float(np.clip(tilt, -math.pi / 2, math.pi / 2)),
+        roll_rad=roll,
+        heading_rad=prior.heading_rad,
+        x_m=prior.x_m,
+        y_m=prior.y_m,
+    )
+
+
+def _printed(triple: Array) -> tuple[float, float, float]:
+    return (math.degrees(triple[0]), math.degrees(triple[1]), float(triple[2]))

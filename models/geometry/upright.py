@@ -1,0 +1,61 @@
+"""Upright people: how tall a vertical pole on the ground is, from its foot and its top edge."""
+
+import numpy as np
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array, Mask
+
+
+def stature_ratio(rotation: Array, foot_rays: Array, top_y: Array) -> tuple[Array, Array]:
+    """Heights (N,) of poles as shares of the camera's height, and ground points (N, 2) likewise.
+
+    Args:
+        rotation: `camera_from_world` (3, 3).
+        foot_rays: directions (N, 3), z = 1, of the feet in the camera frame, below the horizon.
+        top_y: undistorted, normalised image y (N,) of the top edge: y / z in the camera frame.
+
+    Only the top edge's y is used: the box of a person in a rolled picture is wider than they are,
+    and its middle is not their head. The pole's top (p, s - 1), camera at the origin and of height
+    1, has y / z = (down . top) / (forward . top), which is linear in s.
+    """
+    world = foot_rays @ rotation
+    on_ground = world / -world[..., 2:3]  # (p, -1)
+    _, down, forward = rotation
+    lever = down[2] - top_y * forward[2]
+    ratio = (top_y * (on_ground @ forward) - on_ground @ down) / lever
+    return ratio, on_ground[..., :2]
+
+
+def statures(
+    intrinsics: Intrinsics, rotation: Array, height_m: float, uv: Array, top_v: Array
+) -> tuple[Array, Mask]:
+    """Heights in metres (N,) of upright people with feet (N, 2) and top edges (N,) in pixels.
+
+    Not valid (N,) and NaN where a foot is above the horizon or the top edge is not known.
+    """
+    feet, on_ray = intrinsics.rays(uv)
+    tops, top_on_ray = intrinsics.rays(np.stack([uv[:, 0], top_v], axis=-1))
+    valid = on_ray & top_on_ray & ((feet @ rotation)[:, 2] < 0)
+    ratio, _ = stature_ratio(
+        rotation, np.where(valid[:, None], feet, (0.0, 1e6, 1.0)), np.where(valid, tops[:, 1], 0.0)
+    )
+    tall = np.where(valid, ratio * height_m, np.nan)
+    valid = valid & (np.nan_to_num(tall) > 0)
+    return np.where(valid, tall, np.nan), valid
+
+
+def tops_seen(
+    intrinsics: Intrinsics, rotation: Array, centre_m: Array, ground_m: Array, tall_m: Array
+) -> Array:
+    """The v (N,) in pixels of the tops of poles at ground points (N, 2), NaN where not in view."""
+    tops = np.concatenate([ground_m, tall_m[:, None]], axis=-1) - centre_m
+    uv, valid = intrinsics.project(tops @ rotation.T)
+    inside = valid & (uv[:, 1] > 1) & (uv[:, 1] < intrinsics.height - 2)
+    return np.where(inside, uv[:, 1], np.nan)
+
+
+def tops_of_boxes(intrinsics: Intrinsics, boxes: Array) -> Array:
+    """The upper edges (N,) of boxes x1, y1, x2, y2 (N, 4); NaN where the image border cuts them."""
+    x1, y1, x2, y2 = boxes.T
+    whole = (x1 > 1) & (y1 > 1) & (x2 < intrinsics.width - 2) & (y2 < intrinsics.height - 2)
+    return np.where(whole & (y2 > y1), y1, np.nan)
