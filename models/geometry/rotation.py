@@ -37,6 +37,22 @@ def rotation_from_angles(tilt_rad: Any, roll_rad: Any, heading_rad: Any) -> Arra
     return np.stack([right, down, forward], axis=-2)
 
 
+def rotation_and_derivatives(
+    tilt_rad: float, roll_rad: float, heading_rad: float
+) -> tuple[Array, Array]:
+    """A rotation `camera_from_world` (3, 3) and its derivatives (2, 3, 3) by tilt and roll.
+
+    Tilting turns forward towards down0 and down0 away from forward; rolling turns right towards
+    down and down away from right.
+    """
+    level = rotation_from_angles(tilt_rad, 0.0, heading_rad)  # right0, down0, forward
+    rotation = rotation_from_angles(tilt_rad, roll_rad, heading_rad)
+    turn = rotation @ level.T
+    by_tilt = turn @ np.stack([np.zeros(3), -level[2], level[1]])
+    by_roll = np.stack([rotation[1], -rotation[0], np.zeros(3)])
+    return rotation, np.stack([by_tilt, by_roll])
+
+
 def angles_from_rotation(rotation: Array) -> tuple[Array, Array, Array]:
     """Tilt, roll and heading in radians, each (...), of rotations (..., 3, 3).
 

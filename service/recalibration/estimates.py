@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift import Drift, DriftLimits, drift_between, judge
+from models.drift.verdict import Drift, DriftLimits, drift_between, judge
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from models.drift import DriftLimits, drift_between, judge
+from models.drift.verdict import DriftLimits, drift_between, judge
 from models.estimation.averaged import PoseEstimate
 from models.geometry.pose import CameraPose
 

@@ -1,0 +1,1 @@
+"""Has the camera moved, and when."""

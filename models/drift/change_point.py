@@ -1,0 +1,108 @@
+"""When a camera moved, as far as its tracks tell: the best place to cut a window in two."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.estimation.joint.fit import Fit, fit_pose, per_track, track_goodness
+from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own
+# Two poses from one differ by this much (chi-squared, 3 degrees of freedom) once in a million
+# windows; a window has a few hundred places to cut, which are far from independent.
+_LIMIT = 30.7
+_ROUNDS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangePoint:
+    """The first track after a move, and how far the two poses are apart: 1 is the limit."""
+
+    track_idx: int
+    excess: float
+
+
+def find_change(
+    observations: Observations, prior: CameraPose, reference: SiteReference
+) -> ChangePoint | None:
+    """The move within tracks that are in time order; None where one pose explains them all.
+
+    The scores of the tracks, linear in a small move, say where to cut first (a likelihood ratio
+    over all cuts); then both sides are fitted, each track is given to the side that explains it
+    better, and the cut moves to where that is most so. The two poses must then differ beyond
+    doubt, by their own covariances.
+    """
+    if observations.tracks < 2 * FEWEST_BESIDE:
+        return None
+    cut = _first_cut(observations, prior, reference)
+    before = after = None
+    for _ in range(_ROUNDS):
+        before = _fit(observations, np.arange(cut), prior, reference)
+        after = _fit(observations, np.arange(cut, observations.tracks), prior, reference)
+        channels = channels_of(observations, reference, prior)
+        gain = track_goodness(channels, after.candidate) - track_goodness(
+            channels, before.candidate
+        )
+        moved = _best_cut(np.cumsum(gain[::-1])[::-1])
+        if moved == cut:
+            break
+        cut = moved
+    assert before is not None
+    assert after is not None
+    apart = after.candidate - before.candidate
+    covariance = (before.covariance + after.covariance) * reference.inflation
+    excess = float(apart @ np.linalg.solve(covariance, apart)) / _LIMIT
+    return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None
+
+
+def _first_cut(observations: Observations, prior: CameraPose, reference: SiteReference) -> int:
+    """The cut with the highest likelihood ratio, by scores at the prior pose or at one for all.
+
+    The first is the better one for a small move, the second where most tracks are after it.
+    """
+    channels = channels_of(observations, reference, prior)
+    at_prior = numbers_of(prior) + reference.offset
+    whole = fit_pose(channels, at_prior, pose_prior(prior)).candidate
+    best, place = -np.inf, FEWEST_BESIDE
+    for candidate in (at_prior, whole):
+        sums = per_track(channels, candidate)
+        ratio = _ratios(np.cumsum(sums.matrix, axis=0), np.cumsum(sums.gradient, axis=0))
+        cut = _best_cut(ratio)
+        if ratio[cut] > best:
+            best, place = float(ratio[cut]), cut
+    return place
+
+
+def _ratios(matrix: Array, gradient: Array) -> Array:
+    """Twice the log likelihood ratio (N,) of cutting before each track, from running sums."""
+    floor = 1e-6 * np.eye(3)
+
+    def explained(matrices: Array, gradients: Array) -> Array:
+        solved = np.linalg.solve(matrices + floor, gradients[..., None])[..., 0]
+        return np.asarray((solved * gradients).sum(axis=-1))
+
+    ratio = np.full(len(matrix), -np.inf)
+    before, after = slice(0, -1), slice(1, None)
+    ratio[after] = (
+        explained(matrix[before], gradient[before])
+        + explained(matrix[-1] - matrix[before], gradient[-1] - gradient[before])
+        - explained(matrix[-1], gradient[-1])
+    )
+    return ratio
+
+
+def _best_cut(gain: Array) -> int:
+    """Where a gain (N,) is highest that leaves enough tracks on both sides."""
+    allowed = gain[FEWEST_BESIDE : len(gain) - FEWEST_BESIDE + 1]
+    return FEWEST_BESIDE + int(np.argmax(allowed))
+
+
+def _fit(
+    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SiteReference
+) -> Fit:
+    part = of_tracks(observations, chosen)
+    start = numbers_of(prior) + reference.offset
+    return fit_pose(channels_of(part, reference, prior), start, pose_prior(prior))

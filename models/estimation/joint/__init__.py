@@ -1,0 +1,1 @@
+"""The joint estimator: one pose for all tracks at once, no network."""

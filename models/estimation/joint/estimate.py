@@ -1,0 +1,114 @@
+"""The joint estimate: one pose for all tracks, with a covariance, and what it cannot tell."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.estimation.joint.fit import Fit, fit_pose
+from models.estimation.joint.groups import count_parties
+from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.estimation.joint.starts import starts
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+NUMBERS = ("tilt", "roll", "height")
+_STARTS = 2
+_START_TRACKS = 80
+# Beyond these standard deviations tracks do not tell a number: angles in radians, log height.
+_TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12])
+_FEWEST_PARTIES = 5
+_SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointEstimate:
+    """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
+
+    `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
+    tell; `reason` says it in words and is empty where they tell all. `walkers` is the number of
+    tracks that were used, `parties` that of people or groups who walked independently.
+    """
+
+    values: Array
+    covariance: Array
+    raw: Array
+    walkers: int
+    parties: int
+    weak: tuple[str, ...]
+    reason: str
+
+
+def joint_estimate(
+    observations: Observations, prior: CameraPose, reference: SiteReference
+) -> JointEstimate:
+    """The pose that explains all tracks best, whatever it was before."""
+    channels = channels_of(observations, reference, prior)
+    few = of_tracks(observations, _some(observations))
+    begin = starts(channels_of(few, reference, prior), numbers_of(prior), _STARTS)
+    ends = [fit_pose(channels, start, pose_prior(prior)) for start in begin]
+    best = max(ends, key=lambda end: end.score)
+    covariance = best.covariance * reference.inflation + _elsewhere(ends, best, reference)
+    parties = count_parties(channels[0].measure(best.candidate))
+    # One party is one draw of pace and pauses, however many tracks it has.
+    covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
+    covariance = covariance + reference.offset_covariance
+    sd = np.sqrt(np.diag(covariance))
+    weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _TELLING_SD, strict=True) if is_weak)
+    reason = _words(weak, sd, covariance)
+    if parties < _FEWEST_PARTIES:
+        weak = NUMBERS
+        reason = (
+            f"the {observations.walkers} tracks are of {parties} "
+            f"{'party' if parties == 1 else 'parties'} walking together, at least "
+            f"{_FEWEST_PARTIES} are needed to tell the camera's drift from theirs"
+        )
+    return JointEstimate(
+        values=best.candidate - reference.offset,
+        covariance=covariance,
+        raw=best.candidate,
+        walkers=observations.walkers,
+        parties=parties,
+        weak=weak,
+        reason=reason,
+    )
+
+
+def _some(observations: Observations) -> np.ndarray:
+    """Ascending indices of tracks, evenly spaced, enough for a start."""
+    walkers = np.unique(observations.steps.rows.owner_idx)
+    places = np.linspace(0, walkers.size - 1, min(_START_TRACKS, walkers.size)).astype(np.int64)
+    return np.asarray(walkers[places])
+
+
+def _elsewhere(ends: list[Fit], best: Fit, reference: SiteReference) -> Array:
+    """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
+    distinct: list[Fit] = []
+    for end in sorted(ends, key=lambda end: -end.score):
+        if all((np.abs(end.candidate - d.candidate) > _SAME_END).any() for d in distinct):
+            distinct.append(end)
+    chances = np.exp([(end.score - best.score) / reference.inflation for end in distinct])
+    chances = chances / chances.sum()
+    apart = np.array([end.candidate - best.candidate for end in distinct])
+    return np.asarray((apart * chances[:, None]).T @ apart)
+
+
+def _words(weak: tuple[str, ...], sd: Array, covariance: Array) -> str:
+    if not weak:
+        return ""
+    said = {
+        "tilt": f"tilt (sd {math.degrees(sd[0]):.1f} deg)",
+        "roll": f"roll (sd {math.degrees(sd[1]):.1f} deg)",
+        "height": f"height (sd {100 * sd[2]:.0f} %)",
+    }
+    text = "the tracks cannot tell " + " and ".join(said[name] for name in weak)
+    together = covariance / np.outer(sd, sd)
+    pairs = [(0, 2), (1, 2), (0, 1)]
+    first, second = max(pairs, key=lambda pair: abs(together[pair]))
+    if abs(together[first, second]) > 0.9:
+        text += (
+            f": people walk too much alike, one way or along one path, and {NUMBERS[first]} "
+            f"makes up for {NUMBERS[second]}"
+        )
+    return text

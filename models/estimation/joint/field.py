@@ -1,0 +1,120 @@
+"""What is usual at a site: the mean of log speed or log stature by place and direction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.estimation.joint.measures import Measured
+from models.geometry.rotation import Array
+
+# Gaussian bumps one length apart sum to 2 pi / (length ** 2) of themselves, squared to pi.
+_BUMP_SHARE = np.pi / 2
+_MOST_BUMPS = 150
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldShape:
+    """How much a field may vary: by place (over a length) and by direction, and its own level.
+
+    All spreads are standard deviations of a logarithm.
+    """
+
+    level: float
+    level_sd: float
+    length_m: float
+    place_sd: float
+    direction_sd: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """A linear model of the mean: a level, four directions, and bumps centred at (K, 2).
+
+    A field without directions has a level and bumps only. A prior variance for each of its P
+    coefficients is in `prior_variance` (P,); `prior_mean` (P,) is the level and zeros.
+    """
+
+    centres: Array
+    length_m: float
+    directional: bool
+    prior_mean: Array
+    prior_variance: Array
+
+    def features(self, measured: Measured) -> Array:
+        """The rows (M, P) that the coefficients are multiplied by."""
+        columns = [np.ones((len(measured.value), 1))]
+        if self.directional:
+            assert measured.direction is not None
+            x, y = measured.direction.T
+            columns.append(np.stack([x, y, x * x - y * y, 2 * x * y], axis=1))
+        return np.concatenate([*columns, self._bumps(measured.place)], axis=1)
+
+    def slopes(self, measured: Measured, coefficients: Array) -> Array:
+        """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
+        bumps = self._bumps(measured.place)
+        first = 5 if self.directional else 1
+        weighted = bumps * coefficients[first:]
+        by_place = (
+            weighted @ self.centres - weighted.sum(axis=1, keepdims=True) * measured.place
+        ) / self.length_m**2
+        slopes = np.einsum("mi,mik->mk", by_place, measured.d_place)
+        if self.directional:
+            assert measured.direction is not None
+            assert measured.d_direction is not None
+            x, y = measured.direction.T
+            a, b, c, d = coefficients[1:5]
+            by_direction = np.stack([a + 2 * (c * x + d * y), b + 2 * (d * x - c * y)], axis=1)
+            slopes = slopes + np.einsum("mi,mik->mk", by_direction, measured.d_direction)
+        return np.asarray(slopes)
+
+    def _bumps(self, place: Array) -> Array:
+        apart = (
+            (place**2).sum(axis=1)[:, None]
+            + (self.centres**2).sum(axis=1)
+            - 2 * place @ self.centres.T
+        )
+        return np.asarray(np.exp(-apart / (2 * self.length_m**2)))
+
+
+def field_over(measured: Measured, shape: FieldShape) -> Field:
+    """An unlearned field over the ground where something was measured.
+
+    Bumps stand on a square grid one length apart; where a site would need more than 150 of them,
+    the length grows until it does not.
+    """
+    places = measured.place[measured.valid]
+    length_m = shape.length_m
+    centres = _centres(places, length_m)
+    while len(centres) > _MOST_BUMPS:
+        length_m *= 1.25
+        centres = _centres(places, length_m)
+    directional = measured.direction is not None
+    variances = [
+        np.array([shape.level_sd**2]),
+        np.full(4 if directional else 0, shape.direction_sd**2),
+        np.full(len(centres), shape.place_sd**2 / _BUMP_SHARE),
+    ]
+    variance = np.concatenate(variances)
+    mean = np.zeros(variance.size)
+    mean[0] = shape.level
+    return Field(
+        centres=centres,
+        length_m=length_m,
+        directional=directional,
+        prior_mean=mean,
+        prior_variance=variance,
+    )
+
+
+def _centres(places: Array, length_m: float) -> Array:
+    """Grid points (K, 2) that have a measured place within one length."""
+    if not len(places):
+        return np.empty((0, 2))
+    low, high = (np.quantile(places, share, axis=0) for share in (0.01, 0.99))
+    inside = ((places >= low) & (places <= high)).all(axis=1)
+    kept = places[inside] if inside.any() else places
+    cells = np.unique(np.round(kept / length_m).astype(np.int64), axis=0)
+    around = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    grid = np.unique((cells[:, None] + around).reshape(-1, 2), axis=0) * length_m
+    apart = np.linalg.norm(grid[:, None] - kept[:: max(1, len(kept) // 2000)], axis=-1)
+    return np.asarray(grid[apart.min(axis=1) < length_m])

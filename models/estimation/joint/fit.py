@@ -1,0 +1,174 @@
+"""Gauss-Newton on one pose for all tracks, with the site's own mean as a nuisance."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.estimation.joint.field import Field
+from models.estimation.joint.hierarchy import (
+    Curvature,
+    Spread,
+    Weights,
+    curvature,
+    goodness,
+    relearn,
+    reweigh,
+    track_curvatures,
+)
+from models.estimation.joint.measures import Measured
+from models.estimation.joint.observations import Rows
+from models.geometry.rotation import Array
+
+_MOST_ROUNDS = 40
+_LEARNING_ROUNDS = 40
+_LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round, in tilt, roll, log height
+_CONVERGED = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learned:
+    """A field with the mean (P,) and covariance (P, P) of its coefficients, and the spread."""
+
+    field: Field
+    mean: Array
+    covariance: Array
+    spread: Spread
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One kind of evidence: how to measure it at a candidate, and what is usual at the site."""
+
+    measure: Callable[[Array], Measured]
+    learned: Learned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PosePrior:
+    """A weak Gaussian on tilt, roll, log height: mean (3,) and standard deviations (3,)."""
+
+    mean: Array
+    sd: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature.
+
+    `score` compares ends of different starts: goodness, less the prior's penalty.
+    """
+
+    candidate: Array
+    covariance: Array
+    score: float
+
+
+def assumed(field: Field, spread: Spread) -> Learned:
+    """A field that nothing has been learned of yet."""
+    return Learned(
+        field=field,
+        mean=field.prior_mean,
+        covariance=np.diag(field.prior_variance),
+        spread=spread,
+    )
+
+
+def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
+    """The field and the spread that explain what was measured at a known pose.
+
+    The spread is learned anew so many times; with 0 it is taken as given.
+    """
+    spread = start.spread
+    precision = np.linalg.inv(start.covariance)
+    features = start.field.features(measured)
+    mean, covariance = start.mean, start.covariance
+    for round_ in range(spread_rounds + 1):
+        for _ in range(_LEARNING_ROUNDS):
+            residual = measured.value - features @ mean
+            weights = reweigh(residual, measured.value, measured.valid, measured.rows, spread)
+            sums = curvature(-features, residual, weights, measured.rows, spread)
+            covariance = np.linalg.inv(sums.matrix + precision)
+            move = -covariance @ (sums.gradient + precision @ (mean - start.mean))
+            mean = mean + move
+            if np.abs(features @ move).max(initial=0.0) < 1e-4:
+                break
+        if round_ < spread_rounds:
+            residual = measured.value - features @ mean
+            spread = relearn(
+                residual, measured.value, measured.valid, measured.rows, weights, spread
+            )
+    return Learned(field=start.field, mean=mean, covariance=covariance, spread=spread)
+
+
+def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit:
+    """Tilt, roll and log height from a start (3,), together with the fields' coefficients."""
+    candidate = start.astype(np.float64)
+    means = [channel.learned.mean for channel in channels]
+    precisions = [np.linalg.inv(channel.learned.covariance) for channel in channels]
+    pose_precision = np.diag(prior.sd**-2.0)
+    for _ in range(_MOST_ROUNDS):
+        # Given the pose, the fields are independent: each is eliminated by itself.
+        matrix = pose_precision.copy()
+        gradient = pose_precision @ (candidate - prior.mean)
+        solved = []
+        for channel, mean, precision in zip(channels, means, precisions, strict=True):
+            sums = curvature(*_linear(channel, candidate, mean))
+            own = sums.matrix[3:, 3:] + precision
+            own_gradient = sums.gradient[3:] + precision @ (mean - channel.learned.mean)
+            cross = sums.matrix[:3, 3:]
+            both = np.linalg.solve(own, np.column_stack([cross.T, own_gradient]))
+            matrix += sums.matrix[:3, :3] - cross @ both[:, :3]
+            gradient += sums.gradient[:3] - cross @ both[:, 3]
+            solved.append(both)
+        move = -np.linalg.solve(matrix, gradient)
+        share = min(1.0, 1 / max(float((np.abs(move) / _LONGEST_MOVE).max()), 1e-12))
+        candidate = candidate + share * move
+        means = [
+            mean - share * (both[:, 3] + both[:, :3] @ move)
+            for mean, both in zip(means, solved, strict=True)
+        ]
+        if np.abs(share * move).max() < _CONVERGED:
+            break
+    score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
+    for channel, mean in zip(channels, means, strict=True):
+        score += float(_goodness(channel, candidate, mean).sum())
+    return Fit(candidate=candidate, covariance=np.asarray(np.linalg.inv(matrix)), score=score)
+
+
+def per_track(channels: Sequence[Channel], candidate: Array) -> Curvature:
+    """Each track's own sums (N, 3, 3) and (N, 3) for tilt, roll, log height at a candidate."""
+    each = []
+    for channel in channels:
+        linear = _linear(channel, candidate, channel.learned.mean)
+        each.append(track_curvatures(linear[0][:, :3], *linear[1:]))
+    return Curvature(
+        matrix=np.sum([sums.matrix for sums in each], axis=0),
+        gradient=np.sum([sums.gradient for sums in each], axis=0),
+    )
+
+
+def track_goodness(channels: Sequence[Channel], candidate: Array) -> Array:
+    """How well a candidate explains each track (N,)."""
+    each = [_goodness(channel, candidate, channel.learned.mean) for channel in channels]
+    return np.asarray(np.sum(each, axis=0))
+
+
+def _linear(
+    channel: Channel, candidate: Array, mean: Array
+) -> tuple[Array, Array, Weights, Rows, Spread]:
+    """Derivatives (M, 3 + P), residuals (M,) and what weighs them, at a candidate."""
+    measured = channel.measure(candidate)
+    learned = channel.learned
+    features = learned.field.features(measured)
+    residual = np.where(measured.valid, measured.value - features @ mean, 0.0)
+    weights = reweigh(residual, measured.value, measured.valid, measured.rows, learned.spread)
+    by_pose = measured.d_value - learned.field.slopes(measured, mean)
+    jacobian = np.concatenate([by_pose, -features], axis=1)
+    return jacobian, residual, weights, measured.rows, learned.spread
+
+
+def _goodness(channel: Channel, candidate: Array, mean: Array) -> Array:
+    measured = channel.measure(candidate)
+    residual = measured.value - channel.learned.field.features(measured) @ mean
+    return goodness(residual, measured.value, measured.valid, measured.rows, channel.learned.spread)

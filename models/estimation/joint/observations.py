@@ -1,0 +1,221 @@
+"""What the joint estimator reads of tracks: steps of walkers and the tops of their boxes.
+
+Nothing here depends on the pose, so it is worked out once for all poses that are tried.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array, Mask
+from models.trajectory import Trajectory
+
+STEP_S = 1.5  # longer than a stride, shorter than a change of mind
+_KERNEL_S = 0.7  # half the width of the smoothing around a node
+_LONGEST_GAP_S = 1.1
+_FEWEST_POINTS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """Whose each of M rows is; the rows of a track stand together, in time order.
+
+    `owner_idx` (M,) is the track, `linked` (M,) says that a row follows the one before it without
+    a gap, `time_s` (M,) is when it was and `when` (M,) how long after the middle of its track's
+    rows, in units of 10 s. `owners` is the number of tracks, with and without rows.
+    """
+
+    owner_idx: npt.NDArray[np.int64]
+    linked: Mask
+    time_s: Array
+    when: Array
+    owners: int
+
+    def __len__(self) -> int:
+        return int(self.owner_idx.size)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """Pieces of walks about 1.5 s long: rays of both ends (M, 3), z = 1, and seconds (M,)."""
+
+    start_rays: Array
+    end_rays: Array
+    seconds: Array
+    rows: Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tops:
+    """Boxes: rays of the feet (M, 3), z = 1, and the undistorted y (M,) of the upper edges."""
+
+    foot_rays: Array
+    top_y: Array
+    rows: Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observations:
+    """All that is read of a set of tracks."""
+
+    steps: Steps
+    tops: Tops
+    tracks: int
+
+    @property
+    def walkers(self) -> int:
+        """How many tracks have at least one step."""
+        return int(np.unique(self.steps.rows.owner_idx).size)
+
+
+def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:
+    """Steps and box tops of trajectories.
+
+    Each run of points inside the image without a gap is smoothed by a local straight line at nodes
+    1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
+    """
+    starts, ends, seconds, feet, tops = [], [], [], [], []
+    step_owners: list[int] = []
+    step_runs: list[int] = []
+    step_times: list[Array] = []
+    top_owners: list[int] = []
+    top_runs: list[int] = []
+    top_times: list[Array] = []
+    run = 0
+    for owner, trajectory in enumerate(trajectories):
+        for indices in _runs(trajectory, intrinsics):
+            time_s, uv, top_v = _nodes(trajectory, indices)
+            rays, valid = intrinsics.rays(uv)
+            if time_s.size < 2 or not valid.all():
+                continue
+            run += 1
+            starts.append(rays[:-1])
+            ends.append(rays[1:])
+            seconds.append(np.diff(time_s))
+            step_owners += [owner] * (time_s.size - 1)
+            step_runs += [run] * (time_s.size - 1)
+            step_times.append((time_s[:-1] + time_s[1:]) / 2)
+            top_rays, known = intrinsics.rays(np.stack([uv[:, 0], top_v], axis=-1))
+            feet.append(rays[known])
+            tops.append(top_rays[known, 1])
+            top_owners += [owner] * int(known.sum())
+            top_runs += [run] * int(known.sum())
+            top_times.append(time_s[known])
+    count = len(trajectories)
+    return Observations(
+        steps=Steps(
+            start_rays=_joined(starts, (0, 3)),
+            end_rays=_joined(ends, (0, 3)),
+            seconds=_joined(seconds, (0,)),
+            rows=_rows(step_owners, step_runs, step_times, count),
+        ),
+        tops=Tops(
+            foot_rays=_joined(feet, (0, 3)),
+            top_y=_joined(tops, (0,)),
+            rows=_rows(top_owners, top_runs, top_times, count),
+        ),
+        tracks=count,
+    )
+
+
+def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Observations:
+    """The observations of some tracks only, given by ascending indices."""
+    renumber = np.full(observations.tracks, -1)
+    renumber[chosen] = np.arange(chosen.size)
+    steps, tops = observations.steps, observations.tops
+    kept = renumber[steps.rows.owner_idx] >= 0
+    kept_tops = renumber[tops.rows.owner_idx] >= 0
+    return Observations(
+        steps=Steps(
+            start_rays=steps.start_rays[kept],
+            end_rays=steps.end_rays[kept],
+            seconds=steps.seconds[kept],
+            rows=_kept(steps.rows, kept, renumber, chosen.size),
+        ),
+        tops=Tops(
+            foot_rays=tops.foot_rays[kept_tops],
+            top_y=tops.top_y[kept_tops],
+            rows=_kept(tops.rows, kept_tops, renumber, chosen.size),
+        ),
+        tracks=int(chosen.size),
+    )
+
+
+def _runs(trajectory: Trajectory, intrinsics: Intrinsics) -> list[npt.NDArray[np.int64]]:
+    inside = intrinsics.contains(trajectory.uv)
+    intervals = np.diff(trajectory.time_s)
+    usual_s = float(np.median(intervals)) if intervals.size else 0.0
+    gap = intervals > max(2.5 * usual_s, _LONGEST_GAP_S)
+    breaks = np.flatnonzero(gap | ~inside[1:] | ~inside[:-1]) + 1
+    runs = np.split(np.arange(inside.size), breaks)
+    return [run for run in runs if run.size >= _FEWEST_POINTS and inside[run].all()]
+
+
+def _nodes(trajectory: Trajectory, indices: npt.NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Times (K,), smoothed feet (K, 2) and box tops (K,), NaN where unknown, of one run."""
+    time_s = trajectory.time_s[indices]
+    uv = trajectory.uv[indices]
+    duration_s = float(time_s[-1] - time_s[0])
+    count = int(duration_s / STEP_S + 1e-6)
+    if count < 1:
+        return np.empty(0), np.empty((0, 2)), np.empty(0)
+    nodes_s = time_s[0] + (duration_s - count * STEP_S) / 2 + np.arange(count + 1) * STEP_S
+    reach_s = max(_KERNEL_S, 1.01 * float(np.median(np.diff(time_s))))
+    ahead = time_s - nodes_s[:, None]  # (K, N)
+    weight = np.clip(1 - np.abs(ahead) / reach_s, 0, None)
+    feet = np.stack([np.interp(nodes_s, time_s, uv[:, axis]) for axis in (0, 1)], axis=-1)
+    lined, smooth = _local_lines(ahead, weight, uv)
+    feet[lined] = smooth[lined]
+    tops = np.full(nodes_s.size, np.nan)
+    if trajectory.top_v is not None:
+        # The box's height is smoothed, not its top: it is the same all through a stride.
+        tall = uv[:, 1] - trajectory.top_v[indices]
+        known = np.isfinite(tall)
+        if known.sum() >= 2:
+            weight_known, tall = weight[:, known], tall[known]
+            enough, smooth_tall = _local_lines(ahead[:, known], weight_known, tall[:, None])
+            tops[enough] = feet[enough, 1] - smooth_tall[enough, 0]
+    return nodes_s, feet, tops
+
+
+def _local_lines(ahead: Array, weight: Array, values: Array) -> tuple[Mask, Array]:
+    """Where there are two points to go by (K,), and weighted straight lines' values (K, D)."""
+    enough = (weight > 0).sum(axis=1) >= 2
+    total = np.maximum(weight.sum(axis=1), 1e-12)
+    centre = (weight * ahead).sum(axis=1) / total
+    spread = ((weight * (ahead - centre[:, None]) ** 2).sum(axis=1)) / total
+    mean = weight @ values / total[:, None]
+    slope = (weight * (ahead - centre[:, None])) @ values / total[:, None]
+    slope = slope / np.maximum(spread, 1e-9)[:, None]
+    return enough, mean - slope * centre[:, None]
+
+
+def _rows(owners: list[int], runs: list[int], times: list[Array], count: int) -> Rows:
+    owner_idx, run = np.array(owners, dtype=np.int64), np.array(runs, dtype=np.int64)
+    linked = np.zeros(owner_idx.size, dtype=bool)
+    linked[1:] = run[1:] == run[:-1]
+    time_s = _joined(times, (0,))
+    number = np.maximum(np.bincount(owner_idx, minlength=count), 1)
+    # Sums of epoch seconds lose digits: from the first row on.
+    since_s = time_s - (time_s[0] if time_s.size else 0.0)
+    middle_s = np.bincount(owner_idx, since_s, count) / number
+    when = (since_s - middle_s[owner_idx]) / 10
+    return Rows(owner_idx=owner_idx, linked=linked, time_s=time_s, when=when, owners=count)
+
+
+def _kept(rows: Rows, kept: Mask, renumber: npt.NDArray[np.int64], owners: int) -> Rows:
+    owner_idx = renumber[rows.owner_idx[kept]]
+    return Rows(
+        owner_idx=owner_idx,
+        linked=rows.linked[kept],
+        time_s=rows.time_s[kept],
+        when=rows.when[kept],
+        owners=owners,
+    )
+
+
+def _joined(pieces: list[Array], empty: tuple[int, ...]) -> Array:
+    return np.concatenate(pieces) if pieces else np.empty(empty)

@@ -1,0 +1,184 @@
+"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.errors import TooFewTrajectoriesError
+from models.estimation.joint.field import FieldShape, field_over
+from models.estimation.joint.fit import assumed, fit_pose, learn
+from models.estimation.joint.hierarchy import Spread
+from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
+from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+from models.simulation.walkers import WalkConfig
+
+FEWEST_WALKERS = 5
+_STATURE_M = 1.7  # people, give or take 4 %; boxes are drawn a little loose
+_TOPS_SHAPE = FieldShape(
+    level=float(np.log(_STATURE_M)), level_sd=0.06, length_m=8.0, place_sd=0.03, direction_sd=0.0
+)
+_SPEED_SPREAD = Spread(
+    between_sd=0.18,
+    trend_sd=0.05,
+    within_sd=0.11,
+    correlation=0.45,
+    other_share=0.2,
+    other_mean=float(np.log(0.2)),
+    other_sd=1.0,
+)
+_TOPS_SPREAD = Spread(
+    between_sd=0.06,
+    trend_sd=0.02,
+    within_sd=0.04,
+    correlation=0.5,
+    other_share=0.05,
+    other_mean=float(np.log(1.4)),
+    other_sd=0.5,
+)
+_LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
+_SPREAD_ROUNDS = 5
+_FEWEST_BOXED = 8
+_ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
+_FOLDS = 4
+_PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
+# Squared errors against predicted ones, before any is seen, and what that guess weighs.
+_SURPRISE = 2.0
+_SURPRISE_WEIGHT = 4.0
+_LARGEST_SURPRISE = 9.0
+
+
+def assumed_reference(
+    observations: Observations, prior: CameraPose, walk: WalkConfig
+) -> SiteReference:
+    """A site of which nothing is known but an assumed walking speed.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step.
+    """
+    if observations.walkers < FEWEST_WALKERS:
+        raise TooFewTrajectoriesError(
+            f"tracks: at least {FEWEST_WALKERS} that walk for a few seconds inside the image are "
+            f"needed, got {observations.walkers}"
+        )
+    at = numbers_of(prior)
+    relative_sd = walk.speed_sd_mps / walk.speed_mean_mps
+    shape = FieldShape(
+        level=float(np.log(walk.speed_mean_mps)),
+        level_sd=max(relative_sd, _LEAST_SPEED_SD),
+        length_m=6.0,
+        place_sd=0.10,
+        direction_sd=0.08,
+    )
+    speeds = measure_speeds(observations.steps, at, prior.heading_rad)
+    tops = measure_statures(observations.tops, at, prior.heading_rad)
+    usable, words = _judge_boxes(tops)
+    statures = assumed(field_over(tops, _TOPS_SHAPE), _TOPS_SPREAD) if usable else None
+    return SiteReference(
+        speeds=assumed(field_over(speeds, shape), _SPEED_SPREAD),
+        statures=statures,
+        offset=np.zeros(3),
+        offset_covariance=np.zeros((3, 3)),
+        inflation=_SURPRISE,
+        tracks=0,
+        boxes=words,
+    )
+
+
+def learn_reference(
+    observations: Observations, prior: CameraPose, walk: WalkConfig, seed: int
+) -> SiteReference:
+    """What is usual at a site whose camera stands at its prior pose, and our own bias there.
+
+    The bias is what the estimator says of the very tracks that the site was learned from; how far
+    its variances fall short is seen by learning from one half of the tracks and estimating from
+    the other, several times.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step.
+    """
+    blank = assumed_reference(observations, prior, walk)
+    site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
+    whole = fit_pose(channels_of(observations, site, prior), numbers_of(prior), pose_prior(prior))
+    offset = whole.candidate - numbers_of(prior)
+    inflation = _inflation(observations, prior, _with_spreads(blank, site), offset, seed)
+    # A bias is of a degree or so: what the tracks leave free is not taken for one.
+    plausible = np.diag(_PLAUSIBLE_OFFSET**2)
+    noise = whole.covariance * inflation
+    kept = plausible @ np.linalg.inv(plausible + noise)
+    return replace(
+        site,
+        offset=kept @ offset,
+        offset_covariance=kept @ noise,
+        inflation=inflation,
+        tracks=observations.walkers,
+    )
+
+
+def _learned(
+    observations: Observations, prior: CameraPose, blank: SiteReference, rounds: int
+) -> SiteReference:
+    at = numbers_of(prior)
+    speeds = learn(
+        measure_speeds(observations.steps, at, prior.heading_rad),
+        blank.speeds,
+        spread_rounds=rounds,
+    )
+    statures = None
+    if blank.statures is not None:
+        tops = measure_statures(observations.tops, at, prior.heading_rad)
+        statures = learn(tops, blank.statures, spread_rounds=rounds)
+    return replace(blank, speeds=speeds, statures=statures)
+
+
+def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
+    """The blank site's fields with the learned site's spreads."""
+    statures = None
+    if blank.statures is not None and site.statures is not None:
+        statures = replace(blank.statures, spread=site.statures.spread)
+    speeds = replace(blank.speeds, spread=site.speeds.spread)
+    return replace(blank, speeds=speeds, statures=statures)
+
+
+def _inflation(
+    observations: Observations,
+    prior: CameraPose,
+    blank: SiteReference,
+    offset: Array,
+    seed: int,
+) -> float:
+    """How much larger squared errors are than predicted, by halves of the reference itself."""
+    rng = np.random.default_rng(seed)
+    at = numbers_of(prior)
+    surprises = []
+    for _ in range(_FOLDS):
+        order = rng.permutation(observations.tracks)
+        half = observations.tracks // 2
+        for first, second in ((order[:half], order[half:]), (order[half:], order[:half])):
+            known, unknown = (of_tracks(observations, np.sort(part)) for part in (first, second))
+            if min(known.walkers, unknown.walkers) < 2:
+                continue
+            site = _learned(known, prior, blank, 0)
+            fit = fit_pose(channels_of(unknown, site, prior), at, pose_prior(prior))
+            error = fit.candidate - at - offset
+            squared = float(error @ np.linalg.solve(fit.covariance, error)) / 3
+            surprises.append(min(squared, _LARGEST_SURPRISE))
+    guess = _SURPRISE * _SURPRISE_WEIGHT
+    return max(1.0, (sum(surprises) + guess) / (len(surprises) + _SURPRISE_WEIGHT))
+
+
+def _judge_boxes(tops: Measured) -> tuple[bool, str]:
+    """Whether boxes tell how tall people are, and why (not), in words."""
+    owners = np.unique(tops.rows.owner_idx[tops.valid])
+    if owners.size < _FEWEST_BOXED:
+        return False, f"boxes of {owners.size} tracks, at least {_FEWEST_BOXED} are needed"
+    usual = np.array(
+        [np.median(tops.value[tops.valid & (tops.rows.owner_idx == owner)]) for owner in owners]
+    )
+    spread = 1.4826 * float(np.median(np.abs(usual - np.median(usual))))
+    tall = f"{float(np.exp(np.median(usual))):.2f} m give or take {100 * spread:.1f} %"
+    if spread < _ONE_SIZE:
+        return False, f"boxes are all of one size ({tall}): drawn, not measured"
+    return True, f"boxes say that people are {tall}"

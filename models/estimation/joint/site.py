@@ -1,0 +1,70 @@
+"""The reference as a value: what is usual at a site, and how the joint estimator errs there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.estimation.joint.fit import Channel, Learned, PosePrior
+from models.estimation.joint.measures import measure_speeds, measure_statures
+from models.estimation.joint.observations import Observations
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+_PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log height
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SiteReference:
+    """What is usual at a site, and how the joint estimator errs there.
+
+    `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth,
+    with `offset_covariance` (3, 3); its variances are to be multiplied by `inflation`. `tracks`
+    is 0 where nothing was learned and the speed is assumed. `doubt` says in words what does not
+    fit the prior pose, `boxes` why boxes are used or not.
+    """
+
+    speeds: Learned
+    statures: Learned | None
+    offset: Array
+    offset_covariance: Array
+    inflation: float
+    tracks: int
+    doubt: str = ""
+    boxes: str = ""
+
+    @property
+    def walking_speed_mps(self) -> float:
+        """The site's usual speed over the ground where people were seen."""
+        return float(np.exp(self.speeds.mean[0]))
+
+
+def channels_of(
+    observations: Observations, reference: SiteReference, prior: CameraPose
+) -> list[Channel]:
+    """The evidence in a set of tracks: speeds, and statures where boxes tell them."""
+    heading = prior.heading_rad
+    steps, tops = observations.steps, observations.tops
+    found = [
+        Channel(
+            measure=lambda candidate: measure_speeds(steps, candidate, heading),
+            learned=reference.speeds,
+        )
+    ]
+    if reference.statures is not None and len(tops.rows):
+        found.append(
+            Channel(
+                measure=lambda candidate: measure_statures(tops, candidate, heading),
+                learned=reference.statures,
+            )
+        )
+    return found
+
+
+def pose_prior(prior: CameraPose) -> PosePrior:
+    """The weak prior around a prior pose: it holds what the tracks leave free, no more."""
+    return PosePrior(mean=numbers_of(prior), sd=_PRIOR_SD)
+
+
+def numbers_of(pose: CameraPose) -> Array:
+    """Tilt, roll (radians) and log height of a pose, (3,)."""
+    return np.array([pose.tilt_rad, pose.roll_rad, np.log(pose.height_m)])

@@ -1,0 +1,56 @@
+"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models.estimation.joint.fit import Channel
+from models.estimation.joint.hierarchy import goodness
+from models.geometry.rotation import Array
+
+_REACH_RAD = np.radians(20)
+_PLACES = 11  # of each angle: 4 deg apart
+_APART_RAD = np.radians(5)
+_LEAST_VALID = 0.9
+_SPEED_QUANTILES = (0.4, 0.6, 0.75)  # of all speeds, standing people's too, to be the usual one
+
+
+def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array]:
+    """The best few poses (3,) of a grid around a centre, at least 5 deg apart, and the centre.
+
+    For each tilt and roll of the grid the log height is that which brings a middle quantile of the
+    speeds to the site's usual one. Places and directions are not looked at: this is only a start.
+    """
+    found = []
+    offsets = np.linspace(-_REACH_RAD, _REACH_RAD, _PLACES)
+    for tilt in centre[0] + offsets:
+        for roll in centre[1] + offsets:
+            found += _at(channels, np.array([tilt, roll, centre[2]]))
+    found.sort(key=lambda pair: -pair[0])
+    chosen: list[Array] = []
+    for _, candidate in found:
+        if len(chosen) == count:
+            break
+        if all(np.abs((candidate - other)[:2]).max() > _APART_RAD for other in chosen):
+            chosen.append(candidate)
+    return [*chosen, centre]
+
+
+def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Array]]:
+    measures = [channel.measure(candidate) for channel in channels]
+    speeds = measures[0]
+    if not speeds.valid.size or speeds.valid.mean() < _LEAST_VALID:
+        return []
+    usual = channels[0].learned.mean[0]
+    found = []
+    for quantile in np.quantile(speeds.value[speeds.valid], _SPEED_QUANTILES):
+        taller = usual - float(quantile)
+        total = 0.0
+        for channel, measured in zip(channels, measures, strict=True):
+            value = measured.value + taller
+            residual = np.where(measured.valid, value - channel.learned.mean[0], 0.0)
+            spread = channel.learned.spread
+            each = goodness(residual, value, measured.valid, measured.rows, spread)
+            total += float(each.sum())
+        found.append((total, candidate + [0.0, 0.0, taller]))
+    return found
