@@ -14,6 +14,8 @@ from models.geometry.rotation import Array
 WINDOW_MIN_POINTS = 11
 WINDOW_MAX_POINTS = 31  # N in [11, 31]: Xu et al. 2020, section 4.1
 DEFAULT_STEP_S = 0.4
+TRACK_MIN_POINTS = 5  # what is shorter tells nothing and is not taken
+TRACK_MIN_DURATION_S = 2.0
 _LONGEST_GAP_STEPS = 2.5
 
 
@@ -48,6 +50,12 @@ class Trajectory:
             raise ShapeError("time_s, uv: must be finite")
         if not (np.diff(self.time_s) > 0).all():
             raise ShapeError("time_s: must increase strictly")
+
+    @property
+    def long_enough(self) -> bool:
+        """Whether it is taken at all: at least 5 points over at least 2 s."""
+        enough_s = TRACK_MIN_DURATION_S - 1e-6
+        return self.time_s.size >= TRACK_MIN_POINTS and self.duration_s >= enough_s
 
     def part(self, indices: npt.NDArray[np.int64]) -> "Trajectory":
         """The points of some indices, in time order."""

@@ -10,7 +10,6 @@ from typing import Any
 import httpx
 
 from models.evaluation.scenes import Knock, Scene, SceneTrack, knock_trajectory, load_scene
-from service.formats.track import MIN_DURATION_S, MIN_POINTS
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
@@ -102,11 +101,7 @@ def _seen(scene: Scene, knock: Knock) -> Iterator[SceneTrack]:
     knocked = knock.apply(scene.true_pose)
     for track in scene.tracks:
         seen = knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
-        if (
-            seen is not None
-            and seen.time_s.size >= MIN_POINTS
-            and seen.duration_s >= MIN_DURATION_S
-        ):
+        if seen is not None and seen.long_enough:
             yield SceneTrack(track_id=track.track_id, trajectory=seen)
 
 

@@ -105,8 +105,8 @@ def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
         intrinsics=scene.intrinsics,
         prior_pose=scene.true_pose,
         true_pose=knocked,
-        reference=tuple(track.trajectory for track in scene.tracks if track.person_id in first),
-        seen=tuple(trajectory for trajectory in seen if trajectory is not None),
+        reference=_taken([track.trajectory for track in scene.tracks if track.person_id in first]),
+        seen=_taken([trajectory for trajectory in seen if trajectory is not None]),
     )
 
 
@@ -152,6 +152,12 @@ def pose_of_numbers(numbers: Array, prior: CameraPose) -> CameraPose:
         x_m=prior.x_m,
         y_m=prior.y_m,
     )
+
+
+def _taken(trajectories: list[Trajectory]) -> tuple[Trajectory, ...]:
+    """What the service takes, in the order that trackers post: as the tracks end."""
+    taken = [trajectory for trajectory in trajectories if trajectory.long_enough]
+    return tuple(sorted(taken, key=lambda trajectory: float(trajectory.time_s[-1])))
 
 
 def _printed(triple: Array) -> tuple[float, float, float]:

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from models.geometry.rotation import Array
+from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 
-MIN_POINTS = 5
-MIN_DURATION_S = 2.0
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
 MAX_BODY_BYTES = 32 * 1024 * 1024
@@ -130,11 +129,11 @@ def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) 
             f"got {time_s[at]:.3f}",
         )
     duration_s = float(time_s[-1] - time_s[0]) if len(rows) else 0.0
-    if len(rows) < MIN_POINTS or duration_s < MIN_DURATION_S - 1e-6:
+    if len(rows) < TRACK_MIN_POINTS or duration_s < TRACK_MIN_DURATION_S - 1e-6:
         raise TrackRejectedError(
             "too_short",
-            f"{len(rows)} points over {duration_s:.1f} s; at least {MIN_POINTS} points over "
-            f"{MIN_DURATION_S:g} s are needed",
+            f"{len(rows)} points over {duration_s:.1f} s; at least {TRACK_MIN_POINTS} points "
+            f"over {TRACK_MIN_DURATION_S:g} s are needed",
         )
     boxes = None
     points = rows

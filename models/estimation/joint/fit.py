@@ -28,12 +28,16 @@ _CONVERGED = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Learned:
-    """A field with the mean (P,) and covariance (P, P) of its coefficients, and the spread."""
+    """A field with the mean (P,) and covariance (P, P) of its coefficients, and the spread.
+
+    `usual` is the field's mean over all that it was learned of.
+    """
 
     field: Field
     mean: Array
     covariance: Array
     spread: Spread
+    usual: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +75,7 @@ def assumed(field: Field, spread: Spread) -> Learned:
         mean=field.prior_mean,
         covariance=np.diag(field.prior_variance),
         spread=spread,
+        usual=float(field.prior_mean[0]),
     )
 
 
@@ -98,7 +103,14 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
             spread = relearn(
                 residual, measured.value, measured.valid, measured.rows, weights, spread
             )
-    return Learned(field=start.field, mean=mean, covariance=covariance, spread=spread)
+    usual = weights.usual
+    return Learned(
+        field=start.field,
+        mean=mean,
+        covariance=covariance,
+        spread=spread,
+        usual=float((usual * (features @ mean)).sum() / max(float(usual.sum()), 1e-9)),
+    )
 
 
 def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit:

@@ -46,7 +46,9 @@ def _sampled(speeds: Measured) -> tuple[Array, Array, Array, npt.NDArray[np.int6
     """One moving row for each track and time bin: bins (K,), places, directions (K, 2), owners."""
     assert speeds.direction is not None
     moving = np.flatnonzero(speeds.valid & (speeds.value > np.log(_STANDING_MPS)))
-    owner, time_bin = speeds.rows.owner_idx[moving], speeds.rows.time_s[moving] // _BIN_S
+    owner = speeds.rows.owner_idx[moving]
+    since_s = speeds.rows.time_s[moving] - speeds.rows.time_s.min(initial=np.inf)
+    time_bin = np.floor(since_s / _BIN_S + 1e-3)
     _, first = np.unique(np.stack([time_bin, owner]), axis=1, return_index=True)
     chosen = moving[first]
     return time_bin[first], speeds.place[chosen], speeds.direction[chosen], owner[first]

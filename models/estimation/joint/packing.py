@@ -69,6 +69,7 @@ def _learned_arrays(name: str, learned: Learned) -> dict[str, Any]:
         f"{name}_prior_variance": field.prior_variance,
         f"{name}_mean": learned.mean,
         f"{name}_covariance": learned.covariance,
+        f"{name}_usual": learned.usual,
         **{f"{name}_{key}": value for key, value in asdict(learned.spread).items()},
     }
 
@@ -86,4 +87,5 @@ def _learned_of(name: str, values: dict[str, Any]) -> Learned:
         mean=values[f"{name}_mean"],
         covariance=values[f"{name}_covariance"],
         spread=Spread(**spread),
+        usual=float(values[f"{name}_usual"]),
     )

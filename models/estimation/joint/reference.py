@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
+from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
 from models.estimation.joint.fit import assumed, fit_pose, learn
 from models.estimation.joint.hierarchy import Spread
@@ -42,6 +43,10 @@ _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were see
 _SPREAD_ROUNDS = 5
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
+_USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
+_USUAL_STATURES_M = (1.4, 2.2)  # of boxes
+_DOUBT_RAD = float(np.radians(4.0))
+_DOUBT_SIGMAS = 4.0
 _FOLDS = 4
 _PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
 # Squared errors against predicted ones, before any is seen, and what that guess weighs.
@@ -108,13 +113,43 @@ def learn_reference(
     plausible = np.diag(_PLAUSIBLE_OFFSET**2)
     noise = whole.covariance * inflation
     kept = plausible @ np.linalg.inv(plausible + noise)
-    return replace(
+    site = replace(
         site,
         offset=kept @ offset,
         offset_covariance=kept @ noise,
         inflation=inflation,
         tracks=observations.walkers,
     )
+    return replace(site, doubt=_doubt(observations, prior, blank, site))
+
+
+def _doubt(
+    observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
+) -> str:
+    """What of a reference is too far off to be a bias, in words; empty where nothing is."""
+    slow, fast = _USUAL_SPEEDS_MPS
+    if not slow <= site.walking_speed_mps <= fast:
+        return (
+            f"people walk at {site.walking_speed_mps:.2f} m/s at the prior pose, {slow:g} to "
+            f"{fast:g} m/s is usual: the prior height or the frame rate is wrong"
+        )
+    short, tall = _USUAL_STATURES_M
+    stature_m = 1.7 if site.statures is None else float(np.exp(site.statures.usual))
+    if not short <= stature_m <= tall:
+        return (
+            f"boxes say that people are {stature_m:.2f} m tall at the prior pose, {short:g} to "
+            f"{tall:g} m is usual: the prior height is wrong"
+        )
+    free = joint_estimate(observations, prior, replace(blank, inflation=site.inflation))
+    apart = (free.raw - numbers_of(prior))[:2]
+    sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
+    if ((np.abs(apart) > _DOUBT_RAD) & (sigmas > _DOUBT_SIGMAS)).any():
+        tilt, roll = np.degrees(apart)
+        return (
+            f"the reference tracks put the camera {tilt:+.1f} deg in tilt and {roll:+.1f} deg in "
+            "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
+        )
+    return ""
 
 
 def _learned(

@@ -35,7 +35,7 @@ class SiteReference:
     @property
     def walking_speed_mps(self) -> float:
         """The site's usual speed over the ground where people were seen."""
-        return float(np.exp(self.speeds.mean[0]))
+        return float(np.exp(self.speeds.usual))
 
 
 def channels_of(

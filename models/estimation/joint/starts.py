@@ -41,14 +41,14 @@ def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Arra
     speeds = measures[0]
     if not speeds.valid.size or speeds.valid.mean() < _LEAST_VALID:
         return []
-    usual = channels[0].learned.mean[0]
+    usual = channels[0].learned.usual
     found = []
     for quantile in np.quantile(speeds.value[speeds.valid], _SPEED_QUANTILES):
         taller = usual - float(quantile)
         total = 0.0
         for channel, measured in zip(channels, measures, strict=True):
             value = measured.value + taller
-            residual = np.where(measured.valid, value - channel.learned.mean[0], 0.0)
+            residual = np.where(measured.valid, value - channel.learned.usual, 0.0)
             spread = channel.learned.spread
             each = goodness(residual, value, measured.valid, measured.rows, spread)
             total += float(each.sum())
