@@ -1,0 +1,59 @@
+"""Tilt, roll and log height with their covariance, and what a reference takes off them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.errors import ShapeError
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+# How far an estimator is usually off on a site for good: foot points, places of other speed.
+SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumbersEstimate:
+    """Tilt, roll (radians) and log height: values (3,), covariance (3, 3), from so many tracks.
+
+    Raises:
+        ShapeError: an array of another shape, or a number that is not finite.
+    """
+
+    values: Array
+    covariance: Array
+    tracks: int
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (3,) or self.covariance.shape != (3, 3):
+            raise ShapeError(
+                f"values, covariance: (3,) and (3, 3) are needed, got {self.values.shape} and "
+                f"{self.covariance.shape}"
+            )
+        if not (np.isfinite(self.values).all() and np.isfinite(self.covariance).all()):
+            raise ShapeError("values, covariance: must be finite")
+
+
+def numbers_of(pose: CameraPose) -> Array:
+    """Tilt, roll (radians) and log height (3,) of a pose."""
+    return np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+
+
+def without_offset(
+    estimate: NumbersEstimate, reference: NumbersEstimate, prior: CameraPose
+) -> NumbersEstimate:
+    """The estimate less what the estimator was off while the pose was known to be the prior.
+
+    The offset is `reference - prior`, shrunk by its own uncertainty: of a reference that knows
+    nothing nothing is taken off. What stays unknown of it is added to the covariance.
+    """
+    bias = np.diag(np.square(SITE_BIAS_SD))
+    gain = bias @ np.linalg.inv(bias + reference.covariance)
+    offset = gain @ (reference.values - numbers_of(prior))
+    left = bias - gain @ bias
+    return NumbersEstimate(
+        values=estimate.values - offset,
+        covariance=estimate.covariance + (left + left.T) / 2,
+        tracks=estimate.tracks,
+    )
