@@ -1,148 +1,228 @@
-"""`surefoot evaluate`: offline, the averaged estimate on recorded scenes, as a table and JSON."""
+"""`surefoot evaluate`: the protocol on recorded scenes, in parallel; table, JSON, plots."""
 
 import json
 import multiprocessing
 import platform
-from collections.abc import MutableMapping, Sequence
+import time
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
-from statistics import mean
+from typing import Any
 
-import torch
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from models.evaluation.averaged_run import AveragedRun, run_averaged
+from models.errors import ShapeError
+from models.evaluation.bar import BARS
+from models.evaluation.joint_runs import JOINT, joint, track_errors
+from models.evaluation.protocol import KNOCKED, RANGES, Outcome, draw_case, judge_answer
+from models.evaluation.report import ENOUGH_TRACKS, Overall, SceneFigures, by_scene, overall
 from models.evaluation.scenes import load_scene
-from models.regression.training import TrainingProgress
+
+_CURVE_TRACKS = [10, 20, 40, 80, 160, 320]
+_TABLE_WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Task:
-    """One training to evaluate."""
+    """Some cases of one scene: one seed of a range, or all of both for trained estimators."""
 
     folder: Path
-    recipe: str
-    seed: int
-    speed_mps: float
-    epochs: int | None
+    knocks: tuple[str, ...]
+    seeds: tuple[int, ...]
+    trained: bool
 
 
-def run_evaluation(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Result:
+    """An outcome and the range that its knock was drawn from."""
+
+    knock: str
+    outcome: Outcome
+
+
+def run_protocol(
     folders: Sequence[Path],
     *,
-    recipe: str,
-    seeds: Sequence[int],
-    speeds_mps: Sequence[float],
-    epochs: int | None,
+    seeds: int,
+    knocks: Sequence[str],
+    regressors: bool,
     processes: int,
     output: Path,
-    plot: Path | None,
+    plots: Path | None,
 ) -> None:
-    """Train and average for each scene, training speed and seed; print, and write JSON.
+    """Knock each scene's camera, ask every estimator, print tables, write JSON and plots.
 
-    The JSON grows as runs end, so an interrupted evaluation keeps what it has.
+    The JSON grows as cases end, so an interrupted evaluation keeps what it has.
+
+    Raises:
+        ShapeError: a knock has no such name, or a scene cannot be read.
     """
-    console = Console()
-    tasks = [
-        _Task(folder=folder, recipe=recipe, seed=seed, speed_mps=speed, epochs=epochs)
-        for folder, speed, seed in product(folders, speeds_mps, seeds)
-    ]
+    for knock in knocks:
+        if knock not in RANGES:
+            raise ShapeError(f"knocks: {', '.join(RANGES)} are known, got {knock!r}")
     for folder in folders:
-        load_scene(folder)  # a wrong path fails before the first hour of training, not after
-    runs: list[AveragedRun] = []
+        load_scene(folder)
+    console = Console(width=max(Console().width, _TABLE_WIDTH))
+    started = time.monotonic()
+    tasks = _tasks(folders, seeds, knocks, regressors)
+    results: list[_Result] = []
     # Spawned, not forked: torch's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
+    columns = TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with (
-        context.Manager() as manager,
         ProcessPoolExecutor(processes, mp_context=context) as pool,
-        Progress(console=console) as bar,
+        Progress(*columns, console=console) as bar,
     ):
-        steps: MutableMapping[int, tuple[int, int]] = manager.dict()
-        rows = {
-            pool.submit(_run, task, steps, number): bar.add_task(_name(task), total=None)
-            for number, task in enumerate(tasks)
-        }
-        waiting = set(rows)
-        while waiting:
-            try:
-                for done in as_completed(waiting, timeout=1.0):
-                    waiting.discard(done)
-                    runs.append(done.result())
-                    _write(output, runs)
-                    bar.update(rows[done], total=1, completed=1)
-            except TimeoutError:
-                for number, row in enumerate(rows.values()):
-                    if number in steps:
-                        bar.update(row, completed=steps[number][0], total=steps[number][1])
-    runs.sort(key=lambda run: (run.scene, run.training_speed_mps, run.seed))
-    _write(output, runs)
-    console.print(_table(runs))
-    console.print(f"{output} has the figures")
-    if plot is not None:
-        from models.evaluation.figures import plot_speed_sweep
-
-        plot_speed_sweep(runs, plot)
-        console.print(f"{plot} has the plot")
+        row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
+        waiting = {pool.submit(_run, task): task for task in tasks}
+        for done in as_completed(waiting):
+            results += done.result()
+            bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
+            _write(output, results)
+        order = {load_scene(folder).scene_id: place for place, folder in enumerate(folders)}
+        results.sort(key=lambda r: (order[r.outcome.scene_id], r.outcome.seed))
+        curves = _curves(pool, folders, seeds) if plots is not None else {}
+    _write(output, results)
+    for knock in knocks:
+        own = [result.outcome for result in results if result.knock == knock]
+        console.print(_scene_table(knock, seeds, by_scene(own)))
+        console.print(_overall_table(knock, overall(own)))
+    console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
+    if plots is not None:
+        _plot(plots, folders, results, curves)
+        console.print(f"{plots} has the plots")
 
 
-def _run(task: _Task, steps: MutableMapping[int, tuple[int, int]], number: int) -> AveragedRun:
-    torch.set_num_threads(1)
-
-    def report(progress: TrainingProgress) -> None:
-        if progress.step % 10 == 0:
-            steps[number] = (progress.step, progress.steps)
-
-    return run_averaged(
-        load_scene(task.folder),
-        recipe_name=task.recipe,
-        seed=task.seed,
-        training_speed_mps=task.speed_mps,
-        epochs=task.epochs,
-        on_progress=report,
-    )
+def _tasks(
+    folders: Sequence[Path], seeds: int, knocks: Sequence[str], regressors: bool
+) -> list[_Task]:
+    every = tuple(range(seeds))
+    trained = [
+        _Task(folder=folder, knocks=tuple(knocks), seeds=every, trained=True) for folder in folders
+    ]
+    single = [
+        _Task(folder=folder, knocks=(knock,), seeds=(seed,), trained=False)
+        for folder, knock, seed in product(folders, knocks, every)
+    ]
+    return [*(trained if regressors else []), *single]  # the longest first
 
 
-def _name(task: _Task) -> str:
-    return f"{task.folder.name} {task.recipe} {task.speed_mps:g} m/s seed {task.seed}"
+def _run(task: _Task) -> list[_Result]:
+    scene = load_scene(task.folder)
+    estimators = JOINT
+    if task.trained:
+        from models.evaluation.regressors import prepare_regressors
+
+        estimators = prepare_regressors(scene, seed=0)
+    results = []
+    for knock, seed in product(task.knocks, task.seeds):
+        case = draw_case(scene, seed, RANGES[knock])
+        for name, estimator in estimators.items():
+            started = time.monotonic()
+            answer = estimator(case)
+            outcome = judge_answer(case, name, answer, time.monotonic() - started)
+            results.append(_Result(knock=knock, outcome=outcome))
+    return results
 
 
-def _write(output: Path, runs: Sequence[AveragedRun]) -> None:
-    document = {
+def _curves(
+    pool: ProcessPoolExecutor, folders: Sequence[Path], seeds: int
+) -> dict[str, list[tuple[int, float, float]]]:
+    """Errors over the number of tracks, of scenes with enough of them."""
+    enough = [
+        folder
+        for folder in folders
+        if len(draw_case(load_scene(folder), 0, KNOCKED).seen) >= ENOUGH_TRACKS
+    ]
+    pairs = list(product(enough, range(seeds)))
+    found: dict[str, list[tuple[int, float, float]]] = {}
+    for (folder, _), points in zip(pairs, pool.map(_curve, pairs), strict=True):
+        found.setdefault(folder.name, []).extend(points)
+    return found
+
+
+def _curve(pair: tuple[Path, int]) -> list[tuple[int, float, float]]:
+    folder, seed = pair
+    return track_errors(load_scene(folder), seed, _CURVE_TRACKS)
+
+
+def _plot(
+    folder: Path,
+    scenes: Sequence[Path],
+    results: Sequence[_Result],
+    curves: dict[str, list[tuple[int, float, float]]],
+) -> None:
+    from models.evaluation.plots import plot_drift, plot_ground, plot_track_errors
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for knock in dict.fromkeys(result.knock for result in results):
+        own = [result.outcome for result in results if result.knock == knock]
+        if knock != "still":
+            plot_drift(own, folder / f"drift-{knock}.png")
+    for scene in scenes:
+        case = draw_case(load_scene(scene), 0, KNOCKED)
+        plot_ground(case, joint(case).values, folder / f"ground-{scene.name}.png")
+    if curves:
+        plot_track_errors(curves, folder / "tracks.png")
+
+
+def _write(output: Path, results: Sequence[_Result]) -> None:
+    document: dict[str, Any] = {
         "machine": {
             "processor": platform.processor() or platform.machine(),
             "cores": multiprocessing.cpu_count(),
-            "torch": torch.__version__,
         },
-        "runs": [asdict(run) for run in runs],
+        "outcomes": [{"knock": r.knock, **asdict(r.outcome)} for r in results],
     }
     output.write_text(json.dumps(document, indent=1))
 
 
-def _table(runs: Sequence[AveragedRun]) -> Table:
-    recipes = ", ".join(sorted({run.recipe for run in runs}))
-    table = Table(title=f"averaged estimate, {recipes} recipe, trained around the true pose")
-    table.add_column("scene", no_wrap=True)
-    for column in ("m/s", "seed", "tracks", "height m", "off m", "off deg", "training s"):
-        table.add_column(column, justify="right")
-    groups: dict[tuple[str, float], list[AveragedRun]] = {}
-    for run in runs:
-        groups.setdefault((run.scene, run.training_speed_mps), []).append(run)
-    for (scene, speed), group in groups.items():
-        for run in group:
-            table.add_row(scene, f"{speed:g}", str(run.seed), str(run.tracks), *_figures([run]))
-        if len(group) > 1:
-            table.add_row(scene, f"{speed:g}", "mean", "", *_figures(group), style="bold")
+def _scene_table(knock: str, seeds: int, figures: Sequence[SceneFigures]) -> Table:
+    table = Table(
+        title=f"{knock}, {seeds} seeds: medians (90th percentiles)", title_justify="left"
+    )  # fmt: skip
+    table.add_column("scene (tracks)")
+    table.add_column("estimator", no_wrap=True)
+    for name in ("angle, deg", "height, %", "covered", "declared", "drifting", "s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for scene in dict.fromkeys(f.scene_id for f in figures):
+        own = [f for f in figures if f.scene_id == scene]
+        table.add_section()
+        if knock == "knock" and scene in BARS:
+            bar = BARS[scene]
+            for name, words in (
+                ("floor: site speed", bar.site_speed),
+                ("floor: offset", bar.offset),
+                ("bar", bar.bar),
+            ):
+                angle, _, height = words.partition(", ")
+                table.add_row("", name, angle.removesuffix(" deg"), height, style="dim")
+        for f in own:
+            table.add_row(
+                f"{scene} ({f.tracks:.0f})" if f is own[0] else "",
+                f.estimator,
+                f"{f.angle_error_deg:.2f} ({f.angle_error_p90_deg:.1f})",
+                f"{100 * f.height_error:.1f} ({100 * f.height_error_p90:.0f})",
+                f"{f.coverage:.0%}",
+                f"{f.degenerate:.0%}",
+                f"{f.drifting:.0%}",
+                f"{f.seconds:.2f}",
+            )
     return table
 
 
-def _figures(runs: Sequence[AveragedRun]) -> list[str]:
-    return [
-        f"{mean(run.height_m for run in runs):.2f}",
-        f"{mean(run.height_error_m for run in runs):.2f}",
-        f"{mean(run.angle_error_deg for run in runs):.2f}",
-        f"{mean(run.training_s for run in runs):.0f}",
-    ]
+def _overall_table(knock: str, rows: Sequence[Overall]) -> Table:
+    table = Table(title=f"{knock}, all scenes")
+    table.add_column("estimator", no_wrap=True)
+    for column in ("slope: tilt", "roll", "log height", "90 % covers: tilt", "roll", "height"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        slopes = ["", "", ""]
+        if row.slope is not None and row.slope_se is not None:
+            slopes = [f"{s:.3f} ± {e:.3f}" for s, e in zip(row.slope, row.slope_se, strict=True)]
+        table.add_row(row.estimator, *slopes, *(f"{c:.0%}" for c in row.coverage))
+    return table

@@ -17,7 +17,7 @@ SERVICE_ROOMS = [
     {"schemas", "jobs"},
     {"routes"},
     {"app"},
-    {"serve", "replay", "evaluate"},
+    {"serve", "replay", "evaluate", "centred"},
     {"demo"},
     {"cli"},
 ]
@@ -26,10 +26,11 @@ MODEL_ROOMS = [
     {"geometry"},
     {"trajectory"},
     {"simulation"},
-    {"regression", "estimation"},
+    {"estimation"},
+    {"regression"},
     {"drift", "evaluation"},
 ]
-TORCH_ROOMS = {"models/regression", "service/jobs", "service/evaluate.py"}
+TORCH_ROOMS = {"models/regression", "service/jobs", "service/centred.py"}
 
 
 def sources(top: str) -> list[Path]:

@@ -44,9 +44,11 @@ def test_what_it_posts_is_taken(settings):
 
 def test_its_commands_exist():
     described = CliRunner().invoke(app, ["--help"]).output
-    for name in set(re.findall(r"surefoot (serve|worker|migrate|replay|demo|evaluate)", README)):
+    for name in set(
+        re.findall(r"surefoot (serve|worker|migrate|replay|demo|evaluate|centred)", README)
+    ):
         assert name in described
-    for name in ("serve", "worker", "migrate", "replay", "demo", "evaluate"):
+    for name in ("serve", "worker", "migrate", "replay", "demo", "evaluate", "centred"):
         assert f"surefoot {name}" in README
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from models.estimation.joint.fit import Fit, fit_pose, per_track, track_goodness
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.estimation.numbers import numbers_of
 from models.evaluation.scenes import Knock, Scene, knock_trajectory
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -64,12 +65,16 @@ Estimator = Callable[[ProtocolCase], Answer]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """One case of one estimator. Triples are tilt and roll in degrees and log height."""
+    """One case of one estimator. Triples are tilt and roll in degrees and log height.
+
+    `tracks` were seen after the knock, of which `used` gave the estimator something to go by.
+    """
 
     scene_id: str
     estimator: str
     seed: int
     tracks: int
+    used: int
     true_drift: tuple[float, float, float]
     drift: tuple[float, float, float]
     sd: tuple[float, float, float]
@@ -122,7 +127,8 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         scene_id=case.scene_id,
         estimator=estimator,
         seed=case.seed,
-        tracks=answer.tracks,
+        tracks=len(case.seen),
+        used=answer.tracks,
         true_drift=_printed(true - prior),
         drift=_printed(true + error - prior),
         sd=_printed(sd),
@@ -134,11 +140,6 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         degenerate=bool(answer.weak),
         seconds=seconds,
     )
-
-
-def numbers_of(pose: CameraPose) -> Array:
-    """Tilt, roll (radians) and log height of a pose, (3,)."""
-    return np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
 
 
 def pose_of_numbers(numbers: Array, prior: CameraPose) -> CameraPose:

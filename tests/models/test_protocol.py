@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from models.estimation.numbers import numbers_of
 from models.evaluation.protocol import (
     HARD,
     KNOCKED,
@@ -13,7 +14,6 @@ from models.evaluation.protocol import (
     Answer,
     draw_case,
     judge_answer,
-    numbers_of,
 )
 from models.evaluation.scenes import Scene, SceneTrack
 from models.geometry.ground import ground_from_pixel

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.errors import ShapeError
-from models.evaluation.averaged_run import run_averaged
+from models.evaluation.centred_run import run_averaged
 from models.evaluation.scenes import Knock, knock_trajectory, load_scene
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks

@@ -8,9 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from models.evaluation.averaged_run import run_averaged
+from models.evaluation.centred_run import run_averaged
 from models.evaluation.scenes import load_scene
+from service.cli import app
 from tests.conftest import wait_for
 
 SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
@@ -72,13 +74,36 @@ def test_every_recorded_camera_can_be_loaded():
             assert len(scene.tracks) > 20
 
 
-def test_evaluate_prints_a_table_and_writes_json_and_a_plot(tmp_path):
+def test_centred_prints_a_table_and_writes_json_and_a_plot(tmp_path):
     output, plot = tmp_path / "out.json", tmp_path / "out.png"
     text = surefoot(
-        "evaluate", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0,1",
+        "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0,1",
         "--speeds", "1.4", "--processes", "2", "--output", str(output), "--plot", str(plot),
     )  # fmt: skip
     assert "town-centre" in text
     runs = json.loads(output.read_text())["runs"]
     assert [run["seed"] for run in runs] == [0, 1]
     assert plot.stat().st_size > 5000
+
+
+def test_evaluate_knocks_scenes_and_says_how_each_estimator_did(tmp_path):
+    output, plots = tmp_path / "out.json", tmp_path / "plots"
+    scenes = [str(SCENES / name) for name in ("pets2009_s2l1_v001_sort", "meva_g336_school")]
+    text = surefoot(
+        "evaluate", *scenes, "--seeds", "2", "--knocks", "knock,still",
+        "--output", str(output), "--plots", str(plots),
+    )  # fmt: skip
+    outcomes = json.loads(output.read_text())["outcomes"]
+    assert len(outcomes) == 2 * 2 * 2 * 3  # scenes, ranges, seeds, estimators
+    assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
+    assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
+    assert "8 %, or declared" in text  # the bar stands beside the figures
+    for name in ("drift-knock.png", "ground-meva_g336_school.png"):
+        assert (plots / name).stat().st_size > 5000
+
+
+def test_evaluate_refuses_a_range_it_does_not_know(tmp_path):
+    asked = ["evaluate", str(SCENES / "town_centre"), "--knocks", "soft"]
+    answer = CliRunner().invoke(app, asked)
+    assert answer.exit_code == 1
+    assert "soft" in answer.output

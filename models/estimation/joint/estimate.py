@@ -8,8 +8,9 @@ import numpy as np
 from models.estimation.joint.fit import Fit, fit_pose
 from models.estimation.joint.groups import count_parties
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
+from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
@@ -28,12 +29,14 @@ class JointEstimate:
 
     `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
     tell; `reason` says it in words and is empty where they tell all. `walkers` is the number of
-    tracks that were used, `parties` that of people or groups who walked independently.
+    tracks that were used, `parties` that of people or groups who walked independently. `bound`
+    (3, 3) is the covariance by the curvature of the likelihood alone, its Cramer-Rao bound.
     """
 
     values: Array
     covariance: Array
     raw: Array
+    bound: Array
     walkers: int
     parties: int
     weak: tuple[str, ...]
@@ -45,11 +48,13 @@ def joint_estimate(
 ) -> JointEstimate:
     """The pose that explains all tracks best, whatever it was before."""
     channels = channels_of(observations, reference, prior)
-    few = of_tracks(observations, _some(observations))
-    begin = starts(channels_of(few, reference, prior), numbers_of(prior), _STARTS)
-    ends = [fit_pose(channels, start, pose_prior(prior)) for start in begin]
-    best = max(ends, key=lambda end: end.score)
-    covariance = best.covariance * reference.inflation + _elsewhere(ends, best, reference)
+    hold = pose_prior(prior)
+    few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
+    begin = starts(few, numbers_of(prior), _STARTS)
+    first = _distinct([fit_pose(few, start, hold) for start in begin])
+    ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    best = ends[0]
+    covariance = best.covariance * reference.inflation + _elsewhere(ends, reference)
     parties = count_parties(channels[0].measure(best.candidate))
     # One party is one draw of pace and pauses, however many tracks it has.
     covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
@@ -68,6 +73,7 @@ def joint_estimate(
         values=best.candidate - reference.offset,
         covariance=covariance,
         raw=best.candidate,
+        bound=best.covariance,
         walkers=observations.walkers,
         parties=parties,
         weak=weak,
@@ -82,15 +88,21 @@ def _some(observations: Observations) -> np.ndarray:
     return np.asarray(walkers[places])
 
 
-def _elsewhere(ends: list[Fit], best: Fit, reference: SiteReference) -> Array:
-    """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
+def _distinct(ends: list[Fit]) -> list[Fit]:
+    """Ends that are not about the same pose, the best first."""
     distinct: list[Fit] = []
     for end in sorted(ends, key=lambda end: -end.score):
         if all((np.abs(end.candidate - d.candidate) > _SAME_END).any() for d in distinct):
             distinct.append(end)
-    chances = np.exp([(end.score - best.score) / reference.inflation for end in distinct])
+    return distinct
+
+
+def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
+    """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
+    best = ends[0]
+    chances = np.exp([(end.score - best.score) / reference.inflation for end in ends])
     chances = chances / chances.sum()
-    apart = np.array([end.candidate - best.candidate for end in distinct])
+    apart = np.array([end.candidate - best.candidate for end in ends])
     return np.asarray((apart * chances[:, None]).T @ apart)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
-# Gaussian bumps one length apart sum to 2 pi / (length ** 2) of themselves, squared to pi.
-_BUMP_SHARE = np.pi / 2
+# The squares of Gaussian bumps one length apart sum to pi, wherever one looks.
+_BUMP_SHARE = np.pi
 _MOST_BUMPS = 150
 
 
@@ -49,11 +49,10 @@ class Field:
             columns.append(np.stack([x, y, x * x - y * y, 2 * x * y], axis=1))
         return np.concatenate([*columns, self._bumps(measured.place)], axis=1)
 
-    def slopes(self, measured: Measured, coefficients: Array) -> Array:
+    def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
         """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
-        bumps = self._bumps(measured.place)
         first = 5 if self.directional else 1
-        weighted = bumps * coefficients[first:]
+        weighted = features[:, first:] * coefficients[first:]
         by_place = (
             weighted @ self.centres - weighted.sum(axis=1, keepdims=True) * measured.place
         ) / self.length_m**2

@@ -23,7 +23,7 @@ from models.geometry.rotation import Array
 _MOST_ROUNDS = 40
 _LEARNING_ROUNDS = 40
 _LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round, in tilt, roll, log height
-_CONVERGED = 1e-6
+_CONVERGED = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,7 +175,7 @@ def _linear(
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ mean, 0.0)
     weights = reweigh(residual, measured.value, measured.valid, measured.rows, learned.spread)
-    by_pose = measured.d_value - learned.field.slopes(measured, mean)
+    by_pose = measured.d_value - learned.field.slopes(measured, features, mean)
     jacobian = np.concatenate([by_pose, -features], axis=1)
     return jacobian, residual, weights, measured.rows, learned.spread
 

@@ -18,6 +18,8 @@ from models.geometry.rotation import Array, Mask
 
 _FREEDOM = 4.0  # of both Student-t
 _OTHER_CLIP = 30.0
+_SHARE_WEIGHT = 2.0  # rows that the site's share counts for in a track's own
+_SHARE_ROUNDS = 4
 _INDEPENDENT_ROWS = 4  # a long track says no more than so many about which start is the best
 
 
@@ -76,15 +78,14 @@ class Curvature:
 
 
 def log_density(residual: Array, value: Array, spread: Spread) -> tuple[Array, Array]:
-    """Log densities (M,) of the usual kind and of the other one, shares included."""
+    """Log densities (M,) of the usual kind and of the other one."""
     scaled = residual / spread.total_sd
     half = (_FREEDOM + 1) / 2
     constant = math.lgamma(half) - math.lgamma(_FREEDOM / 2) - 0.5 * math.log(_FREEDOM * math.pi)
     usual = constant - half * np.log1p(scaled**2 / _FREEDOM) - np.log(spread.total_sd)
     other = -0.5 * ((value - spread.other_mean) / spread.other_sd) ** 2
     other = other - np.log(spread.other_sd) - 0.5 * np.log(2 * np.pi)
-    share = spread.other_share
-    return np.asarray(usual + np.log1p(-share)), np.asarray(other + np.log(share))
+    return np.asarray(usual), np.asarray(other)
 
 
 def reweigh(
@@ -92,8 +93,8 @@ def reweigh(
 ) -> Weights:
     """Weights at given residuals (M,); rows that are not valid count for nothing."""
     usual, other = log_density(residual, value, spread)
-    chance = 1 / (1 + np.exp(np.clip(other - usual, -_OTHER_CLIP, _OTHER_CLIP)))
-    chance = np.where(valid, chance, 0.0)
+    odds = np.exp(np.clip(other - usual, -_OTHER_CLIP, _OTHER_CLIP))
+    chance = _chances(odds, valid, rows, spread)
     # Correlated rows count as fewer.
     precision = (1 - spread.correlation) / (1 + spread.correlation) / spread.within_sd**2
     weights = Weights(
@@ -106,6 +107,22 @@ def reweigh(
     for _ in range(rounds):
         weights = _reweighed(residual, weights, rows, spread, precision)
     return weights
+
+
+def _chances(odds: Array, valid: Mask, rows: Rows, spread: Spread) -> Array:
+    """The chance (M,) of each row to be of the usual kind, each track with a share of its own.
+
+    Someone who stands through most of a track stands in the rest of it too, whatever the noise
+    makes of it.
+    """
+    number = np.bincount(rows.owner_idx, valid, rows.owners)
+    share = np.full(rows.owners, spread.other_share)
+    for _ in range(_SHARE_ROUNDS):
+        strange = share[rows.owner_idx] * odds
+        chance = np.where(valid, 1 - strange / (strange + 1 - share[rows.owner_idx]), 0.0)
+        others = number - np.bincount(rows.owner_idx, chance, rows.owners)
+        share = (_SHARE_WEIGHT * spread.other_share + others) / (_SHARE_WEIGHT + number)
+    return np.asarray(chance)
 
 
 def _reweighed(
@@ -202,7 +219,9 @@ def goodness(residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spr
     For comparing candidates far apart; a row above the horizon counts as all but impossible.
     """
     usual, other = log_density(residual, value, spread)
-    density = np.where(valid, np.logaddexp(usual, other), -8.0)
+    share = spread.other_share
+    both = np.logaddexp(usual + math.log1p(-share), other + math.log(share))
+    density = np.where(valid, both, -8.0)
     total = np.bincount(rows.owner_idx, density, rows.owners)
     number = np.bincount(rows.owner_idx, minlength=rows.owners)
     return np.asarray(total / np.maximum(number, 1) * np.minimum(number, _INDEPENDENT_ROWS))

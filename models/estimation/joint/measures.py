@@ -21,8 +21,9 @@ class Measured:
     """M logarithms at one candidate pose, where they were measured, and derivatives.
 
     `value` (M,) is a log speed (m/s) or log stature (m); `place` (M, 2); `direction` (M, 2) unit
-    vectors, none for statures; `valid` (M,): below the horizon. `d_value` (M, 3), `d_place` and
-    `d_direction` (M, 2, 3) are derivatives by tilt, roll, log height. What is not valid is 0.
+    vectors of the walk around a step, none for statures; `valid` (M,): below the horizon.
+    `d_value` (M, 3), `d_place` and `d_direction` (M, 2, 3) are derivatives by tilt, roll, log
+    height. What is not valid is 0.
     """
 
     value: Array
@@ -36,26 +37,43 @@ class Measured:
 
 
 def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measured:
-    """Log speeds of steps: the distance on the ground between both ends over the time."""
+    """Log speeds of steps: the distance on the ground between both ends over the time.
+
+    Directions are those of the longer chord around a step, and a log speed's derivative is that of
+    a short step there: uᵀ∇F u for the direction u and the flow F of the ground points under a turn.
+    Of the step's own ends the derivative would share their noise: a step that noise makes longer
+    would seem to depend more on the pose, and many tracks would agree on a wrong one.
+    """
     height_m = float(np.exp(candidate[2]))
-    start, d_start, ok_start = _ground(steps.start_rays, candidate, heading_rad)
-    end, d_end, ok_end = _ground(steps.end_rays, candidate, heading_rad)
-    valid = ok_start & ok_end
-    across = np.where(valid[:, None], end - start, (1.0, 0.0)) * height_m
-    length = np.sqrt((across**2).sum(axis=1) + _LEAST_STEP_M**2)
-    direction = across / length[:, None]
-    d_across = np.concatenate([(d_end - d_start) * height_m, across[:, :, None]], axis=-1)
-    along = np.einsum("mi,mik->mk", direction, d_across)
-    place = (start + end) / 2 * height_m
-    d_place = np.concatenate([(d_start + d_end) / 2 * height_m, place[:, :, None]], axis=-1)
+    rotation, turns = _rotation_and_turns(candidate, heading_rad)
+    nodes, below = _ground(steps.node_rays, rotation)
+    start, end = steps.ends.T
+    first, last = steps.chord.T
+    valid = below[start] & below[end] & below[first] & below[last]
+    length = np.hypot(height_m * _norm(nodes[end] - nodes[start]), _LEAST_STEP_M)
+    chord = nodes[last] - nodes[first]
+    direction = chord / np.maximum(_norm(chord), 1e-9)[:, None]
+    place = (nodes[start] + nodes[end]) / 2
+    toward = (direction * place).sum(axis=1)
+    d_value = np.ones((len(place), 3))
+    d_place = np.empty((len(place), 2, 3))
+    d_direction = np.zeros((len(place), 2, 3))
+    for number, turn in enumerate(turns):
+        d_place[:, :, number], fall = _flow(place, turn)
+        along = direction @ turn[:2, 2]
+        d_value[:, number] = fall + toward * along
+        bent = direction @ turn[:2, :2] + place * along[:, None]
+        across = (bent * direction).sum(axis=1)
+        d_direction[:, :, number] = bent - across[:, None] * direction
+    d_place[:, :, 2] = place
     return Measured(
         value=np.where(valid, np.log(length / steps.seconds), 0.0),
-        place=place,
+        place=place * height_m,
         direction=direction,
         valid=valid,
-        d_value=np.where(valid[:, None], along / length[:, None], 0.0),
-        d_place=d_place,
-        d_direction=(d_across - direction[:, :, None] * along[:, None, :]) / length[:, None, None],
+        d_value=np.where(valid[:, None], d_value, 0.0),
+        d_place=d_place * height_m,
+        d_direction=d_direction,
         rows=steps.rows,
     )
 
@@ -63,43 +81,63 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
 def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measured:
     """Log heights of people, from feet to the tops of their boxes."""
     height_m = float(np.exp(candidate[2]))
-    rotation, derivatives = rotation_and_derivatives(candidate[0], candidate[1], heading_rad)
-    place, d_place, valid = _ground(tops.foot_rays, candidate, heading_rad)
+    rotation, turns = _rotation_and_turns(candidate, heading_rad)
+    place, valid = _ground(tops.foot_rays, rotation)
     feet = np.where(valid[:, None], tops.foot_rays, (0.0, 1e6, 1.0))
     ratio, _ = stature_ratio(rotation, feet, tops.top_y)
     valid = valid & (ratio > 0.01)
     ratio = np.where(valid, ratio, 1.0)
     # ratio = n / m, m = down_z - y forward_z, n = (y forward - down) . (p, -1)
-    on_ground = np.concatenate([place, -np.ones((len(place), 1))], axis=1)
+    on_ground = _to_ground(place)
     lean = tops.top_y[:, None] * rotation[2] - rotation[1]  # (M, 3)
     lever = -lean[:, 2]
-    d_ratio = np.empty((len(ratio), 2))
-    for number, turned in enumerate(derivatives):
-        d_lean = tops.top_y[:, None] * turned[2] - turned[1]
+    d_value = np.ones((len(ratio), 3))
+    d_place = np.empty((len(ratio), 2, 3))
+    for number, turn in enumerate(turns):
+        d_place[:, :, number], _ = _flow(place, turn)
+        d_lean = lean @ turn
         d_top = (d_lean * on_ground).sum(1) + (lean[:, :2] * d_place[:, :, number]).sum(1)
-        d_ratio[:, number] = (d_top + ratio * d_lean[:, 2]) / lever
-    d_value = np.concatenate([d_ratio / ratio[:, None], np.ones((len(ratio), 1))], axis=1)
+        d_value[:, number] = (d_top + ratio * d_lean[:, 2]) / lever / ratio
+    d_place[:, :, 2] = place
     return Measured(
         value=np.where(valid, np.log(ratio * height_m), 0.0),
         place=place * height_m,
         direction=None,
         valid=valid,
         d_value=np.where(valid[:, None], d_value, 0.0),
-        d_place=np.concatenate([d_place * height_m, (place * height_m)[:, :, None]], axis=-1),
+        d_place=d_place * height_m,
         d_direction=None,
         rows=tops.rows,
     )
 
 
-def _ground(rays: Array, candidate: Array, heading_rad: float) -> tuple[Array, Array, Mask]:
-    """Ground points (M, 2) in camera heights, derivatives (M, 2, 2) by tilt and roll, valid."""
+def _rotation_and_turns(candidate: Array, heading_rad: float) -> tuple[Array, list[Array]]:
+    """The rotation (3, 3), and for tilt and roll a T (3, 3): a ray's direction w moves by w T."""
     rotation, derivatives = rotation_and_derivatives(candidate[0], candidate[1], heading_rad)
+    return rotation, [rotation.T @ turned for turned in derivatives]
+
+
+def _ground(rays: Array, rotation: Array) -> tuple[Array, Mask]:
+    """Ground points (M, 2) in camera heights of rays (M, 3), and which are below the horizon."""
     world = rays @ rotation
-    valid = -world[:, 2] > _LOWEST_SINE * np.linalg.norm(world, axis=1)
+    valid = -world[:, 2] > _LOWEST_SINE * _norm(world)
     down = np.where(valid, -world[:, 2], 1.0)[:, None]
-    ground = np.where(valid[:, None], world[:, :2] / down, 0.0)
-    slopes = []
-    for turned in derivatives:
-        moved = rays @ turned
-        slopes.append(moved[:, :2] / down + ground * moved[:, 2:] / down)
-    return ground, np.where(valid[:, None, None], np.stack(slopes, axis=-1), 0.0), valid
+    return np.where(valid[:, None], world[:, :2] / down, 0.0), valid
+
+
+def _flow(ground: Array, turn: Array) -> tuple[Array, Array]:
+    """How ground points (M, 2) move under a turn (M, 2), and the share (M,) that their ray falls.
+
+    A ray's ground point is g = w_xy / -w_z; w changes by w T.
+    """
+    moved = _to_ground(ground) @ turn
+    return moved[:, :2] + ground * moved[:, 2:], moved[:, 2]
+
+
+def _to_ground(ground: Array) -> Array:
+    """World directions (M, 3) to ground points (M, 2), one camera height down."""
+    return np.concatenate([ground, -np.ones((len(ground), 1))], axis=1)
+
+
+def _norm(vectors: Array) -> Array:
+    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))

@@ -40,10 +40,15 @@ class Rows:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
-    """Pieces of walks about 1.5 s long: rays of both ends (M, 3), z = 1, and seconds (M,)."""
+    """Pieces of walks about 1.5 s long, between nodes with rays (K, 3), z = 1.
 
-    start_rays: Array
-    end_rays: Array
+    `ends` (M, 2) are the nodes of a step, `chord` (M, 2) those up to one step farther on both
+    sides, for a direction that noise does not turn; `seconds` (M,) is how long a step took.
+    """
+
+    node_rays: Array
+    ends: npt.NDArray[np.int64]
+    chord: npt.NDArray[np.int64]
     seconds: Array
     rows: Rows
 
@@ -77,14 +82,14 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     Each run of points inside the image without a gap is smoothed by a local straight line at nodes
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
-    starts, ends, seconds, feet, tops = [], [], [], [], []
+    nodes, ends, chords, seconds, feet, tops = [], [], [], [], [], []
     step_owners: list[int] = []
     step_runs: list[int] = []
     step_times: list[Array] = []
     top_owners: list[int] = []
     top_runs: list[int] = []
     top_times: list[Array] = []
-    run = 0
+    run = count_nodes = 0
     for owner, trajectory in enumerate(trajectories):
         for indices in _runs(trajectory, intrinsics):
             time_s, uv, top_v = _nodes(trajectory, indices)
@@ -92,8 +97,12 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             if time_s.size < 2 or not valid.all():
                 continue
             run += 1
-            starts.append(rays[:-1])
-            ends.append(rays[1:])
+            first = np.arange(time_s.size - 1)
+            nodes.append(rays)
+            ends.append(count_nodes + np.stack([first, first + 1], axis=1))
+            before, after = np.maximum(first - 1, 0), np.minimum(first + 2, time_s.size - 1)
+            chords.append(count_nodes + np.stack([before, after], axis=1))
+            count_nodes += time_s.size
             seconds.append(np.diff(time_s))
             step_owners += [owner] * (time_s.size - 1)
             step_runs += [run] * (time_s.size - 1)
@@ -107,8 +116,9 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     count = len(trajectories)
     return Observations(
         steps=Steps(
-            start_rays=_joined(starts, (0, 3)),
-            end_rays=_joined(ends, (0, 3)),
+            node_rays=_joined(nodes, (0, 3)),
+            ends=np.concatenate(ends) if ends else np.empty((0, 2), dtype=np.int64),
+            chord=np.concatenate(chords) if chords else np.empty((0, 2), dtype=np.int64),
             seconds=_joined(seconds, (0,)),
             rows=_rows(step_owners, step_runs, step_times, count),
         ),
@@ -130,8 +140,9 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
     kept_tops = renumber[tops.rows.owner_idx] >= 0
     return Observations(
         steps=Steps(
-            start_rays=steps.start_rays[kept],
-            end_rays=steps.end_rays[kept],
+            node_rays=steps.node_rays,
+            ends=steps.ends[kept],
+            chord=steps.chord[kept],
             seconds=steps.seconds[kept],
             rows=_kept(steps.rows, kept, renumber, chosen.size),
         ),

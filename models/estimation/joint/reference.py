@@ -11,7 +11,8 @@ from models.estimation.joint.fit import assumed, fit_pose, learn
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, numbers_of, pose_prior
+from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig

@@ -7,6 +7,7 @@ import numpy as np
 from models.estimation.joint.fit import Channel, Learned, PosePrior
 from models.estimation.joint.measures import measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations
+from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
@@ -63,8 +64,3 @@ def channels_of(
 def pose_prior(prior: CameraPose) -> PosePrior:
     """The weak prior around a prior pose: it holds what the tracks leave free, no more."""
     return PosePrior(mean=numbers_of(prior), sd=_PRIOR_SD)
-
-
-def numbers_of(pose: CameraPose) -> Array:
-    """Tilt, roll (radians) and log height of a pose, (3,)."""
-    return np.array([pose.tilt_rad, pose.roll_rad, np.log(pose.height_m)])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.evaluation.averaged_run import AveragedRun
+from models.evaluation.centred_run import AveragedRun
 
 
 def plot_speed_sweep(runs: Sequence[AveragedRun], path: Path) -> None:
