@@ -18,7 +18,7 @@ SERVICE_ROOMS = [
     {"routes"},
     {"app"},
     {"serve", "replay", "evaluate"},
-    {"demo"},
+    {"demo", "replay_protocol"},
     {"cli"},
 ]
 MODEL_ROOMS = [

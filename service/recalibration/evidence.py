@@ -7,6 +7,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.drift.change_point import find_change
+from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -14,9 +15,10 @@ from models.estimation.averaged import (
     averaged_estimate,
 )
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
-from models.estimation.joint.observations import observe, of_tracks
+from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import assumed_reference
+from models.estimation.joint.site import SiteReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
@@ -116,33 +118,24 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
 
 def weigh(evidence: Evidence, seed: int) -> Finding | None:
     """The pose by both estimators, from the newest change on; None where too few people walk."""
-    tracks_ = evidence.tracks
-    observations = observe([track.trajectory for track in tracks_], evidence.intrinsics)
-    change = None
+    observations = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
+    if observations.walkers < FEWEST_WALKERS:
+        return None
+    seen, change = evidence.tracks, None
     if evidence.site is None:
-        if observations.walkers < FEWEST_WALKERS:
-            return None
         reference = assumed_reference(observations, evidence.prior, evidence.walk)
+        joint = joint_estimate(observations, evidence.prior, reference)
     else:
         reference = reference_from_bytes(evidence.site)
-        found = find_change(observations, evidence.prior, reference)
-        if found is not None:
-            change = tracks_[found.track_idx]
-            tracks_ = tuple(track for track in tracks_ if track.ended_s >= change.ended_s)
-            chosen = np.arange(len(evidence.tracks) - len(tracks_), len(evidence.tracks))
-            observations = of_tracks(observations, chosen)
-        if observations.walkers < FEWEST_WALKERS:
-            return None
-    used = {track.pk for track in tracks_}
+        change, joint = _since_change(evidence, observations, reference)
+        if change is not None:
+            seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
+    used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
-    return Finding(
-        joint=joint_estimate(observations, evidence.prior, reference),
-        averaged=(
-            averaged_estimate(predictions, seed) if len(predictions) >= FEWEST_TRACKS else None
-        ),
-        tracks=tracks_,
-        change=change,
-    )
+    averaged = None
+    if len(predictions) >= FEWEST_TRACKS:
+        averaged = averaged_estimate(predictions, seed)
+    return Finding(joint=joint, averaged=averaged, tracks=seen, change=change)
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:
@@ -160,6 +153,25 @@ def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
             [(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64
         ).reshape(-1, 4),
     )
+
+
+def _since_change(
+    evidence: Evidence, observations: Observations, reference: SiteReference
+) -> tuple[SeenTrack | None, JointEstimate]:
+    """The first track after a change that is beyond doubt, and the estimate from there on."""
+    prior = evidence.prior
+    found = find_change(observations, prior, reference)
+    if found is not None:
+        change = evidence.tracks[found.track_idx]
+        ends = np.array([track.ended_s for track in evidence.tracks])
+        old, new = np.flatnonzero(ends < change.ended_s), np.flatnonzero(ends >= change.ended_s)
+        after = of_tracks(observations, new)
+        before = of_tracks(observations, old)
+        if min(before.walkers, after.walkers) >= FEWEST_WALKERS:
+            joint = joint_estimate(after, prior, reference)
+            if moved_beyond_doubt(joint_estimate(before, prior, reference), joint):
+                return change, joint
+    return None, joint_estimate(observations, prior, reference)
 
 
 def _is_news(
