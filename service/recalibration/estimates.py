@@ -103,7 +103,7 @@ def _judge(
         training = train_around(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
-        words.append(f"{edge}; a training around the new estimate is {training}")
+        words.append(f"{edge}; a training around the new estimate {training}")
     words += [finding.joint.reason, reference.doubt]
     record.reason = "; ".join(word for word in words if word)
     _alert(session, record, drift, verdict, clock=clock, edge=edge)

@@ -14,6 +14,7 @@ from service.store import trainings
 _EDGE = 0.9  # of the training range: beyond, a regressor only knows "at least so much"
 _SAME_RAD = math.radians(5.0)
 _SAME_M = 1.0
+_ENDED = {"succeeded": "has ended", "failed": "has failed", "cancelled": "was cancelled"}
 
 
 def beyond_range(
@@ -41,14 +42,14 @@ def beyond_range(
 def train_around(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, pose: CameraPose
 ) -> str:
-    """Have a model trained around a pose, if none was; returns the state of the training."""
+    """Have a model trained around a pose, if none was; says in words what became of it."""
     unfinished = trainings.unfinished(session, camera_id)
     if unfinished:
-        return unfinished[-1].state
+        return f"is {unfinished[-1].state}"
     newest = trainings.of_camera(session, camera_id, 1)
     if newest:
         centre = centre_of(session, newest[0])
         apart = angle_between(centre.quaternion_wxyz, pose.quaternion_wxyz)
         if apart <= _SAME_RAD and abs(centre.height_m - pose.height_m) <= _SAME_M:
-            return newest[0].state
-    return queue_training(session, queue, settings, camera_id, around=pose).state
+            return _ENDED[newest[0].state]
+    return f"is {queue_training(session, queue, settings, camera_id, around=pose).state}"
