@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.estimation.joint.observations import observe
+from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
@@ -89,8 +90,6 @@ class Street:
 
 def people_boxes(pose: CameraPose, uv: np.ndarray, tall_m: float) -> np.ndarray:
     """Boxes (N, 4) of a person with feet (N, 2); those whose head is out of sight reach y = 0."""
-    from models.geometry.ground import ground_from_pixel
-
     ground, _ = ground_from_pixel(LENS, pose.rotation, pose.centre_m, uv)
     top = tops_seen(LENS, pose.rotation, pose.centre_m, ground, np.full(len(uv), tall_m))
     top = np.where(np.isfinite(top), top, 0.0)

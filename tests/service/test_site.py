@@ -1,6 +1,7 @@
 """The whole way from posted people to the served pose: reference, window, change, doubt."""
 
 import math
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
@@ -117,6 +118,7 @@ def test_after_a_reset_the_next_tracks_make_the_reference(known):
     known.http.post("/cameras/corner/reference/reset").raise_for_status()
     body = known.look()
     assert body["reason"] == "0 of 60 reference tracks"
+    known.clock_s += 60  # somebody climbs up and turns it back
     known.walk(PRIOR, WANTED)
     assert known.look()["reference"]["state"] == "ready"
     known.walk(PRIOR, 30)
@@ -169,14 +171,15 @@ def test_a_wrong_frame_rate_is_named(known):
 
 
 def test_a_reference_far_from_its_prior_pose_fires_one_alert(street):
-    street.walk(KNOCKED, 2 * WANTED)
+    elsewhere = replace(PRIOR, tilt_rad=math.radians(16), roll_rad=math.radians(-5))
+    street.walk(elsewhere, 2 * WANTED)
     body = street.look()
     assert "the prior pose is wrong" in body["reason"]
     (alert,) = street.alerts()
     assert (alert["kind"], alert["severity"], alert["drift"]) == ("drift", "warning", {})
     assert alert["reason"] in body["reason"]
     for _ in range(3):
-        street.walk(KNOCKED, 10)
+        street.walk(elsewhere, 10)
         body = street.look()
     (alert,) = street.alerts()
     assert alert["state"] == "firing"  # estimates against the reference do not end it
