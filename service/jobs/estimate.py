@@ -22,7 +22,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     with store.write() as session:
         newest_pk = begin_look(session, camera_id)
     predict_pending(context, camera_id)
-    _learn(context, camera_id)
+    learn_if_due(context, camera_id)
     with store.read() as session:
         evidence = gather(session, settings, camera_id)
     finding = None if evidence is None else weigh(evidence, settings.seed)
@@ -35,7 +35,8 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
         end_look(session, camera_id, newest_pk)
 
 
-def _learn(context: JobContext, camera_id: str) -> None:
+def learn_if_due(context: JobContext, camera_id: str) -> None:
+    """Learn a camera's reference, once its tracks are there."""
     with context.store.read() as session:
         period = take_period(session, context.settings, camera_id)
     if period is None:

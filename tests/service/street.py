@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.estimation.joint.observations import observe
-from models.geometry.ground import ground_from_pixel
+from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
@@ -37,7 +37,8 @@ class Street:
         self.context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
         self.clock_s = math.floor(time.time()) - 20_000.0
         self.seed = 0
-        self.posted: list[Trajectory] = []
+        self.seen: list[Trajectory] = []
+        self._bodies: list[dict[str, Any]] = []
 
     def walk(
         self,
@@ -49,26 +50,53 @@ class Street:
         walk: WalkConfig | None = None,
     ) -> None:
         """Post people seen from a pose; at another rate, their times are that much too short."""
-        self.seed += 1
-        rng = np.random.default_rng(self.seed)
+        rng = self._next_rng()
         config = walk or WalkConfig(speed_sd_mps=0.2, farthest_m=40.0)
         walks = simulate_walks(LENS, repeated_pose(pose, count), config, rng)
-        tracks = []
-        for number, (padded, length) in enumerate(zip(walks.uv, walks.lengths, strict=True)):
-            self.clock_s += 5.0
-            time_s = self.clock_s + (np.arange(length) - length + 1) * 0.4 / rate
+        for padded, length in zip(walks.uv, walks.lengths, strict=True):
             uv = padded[:length] + rng.normal(0, 1.0, (length, 2))
-            rows = np.column_stack([time_s, uv])
-            top_v = None
-            if form == "boxes":
-                boxes = people_boxes(pose, uv, rng.normal(1.7, 0.07))
-                uv = np.column_stack([(boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
-                top_v = tops_of_boxes(LENS, boxes)
-                rows = np.column_stack([time_s, boxes])
-            tracks.append({"id": f"{self.seed}-{number}", form: rows.tolist()})
-            self.posted.append(Trajectory(time_s=time_s, uv=uv, top_v=top_v))
-        answer = self.http.post("/cameras/corner/tracks", json={"tracks": tracks})
-        assert answer.json()["accepted"] == len(tracks), answer.text
+            time_s = np.arange(1 - length, 1) * 0.4 / rate
+            if form == "points":
+                self._see(time_s, uv)
+            else:
+                self._see(time_s, uv, people_boxes(pose, uv, rng.normal(1.7, 0.07)))
+        self._post()
+
+    def cross(self, pose: CameraPose, count: int) -> None:
+        """Post people who all cross the picture from left to right, 14 m ahead of the camera."""
+        rng = self._next_rng()
+        ahead = np.array([math.sin(pose.heading_rad), math.cos(pose.heading_rad)])
+        right = np.array([math.cos(pose.heading_rad), -math.sin(pose.heading_rad)])
+        along_m = 0.4 * np.arange(20)
+        for _ in range(count):
+            start = 14 * ahead - 5 * right + rng.normal(0, 0.4, 2)
+            ground = start + np.outer(along_m * rng.normal(1.4, 0.2), right)
+            uv, _ = pixel_from_ground(LENS, pose.rotation, pose.centre_m, ground)
+            uv += rng.normal(0, 1.0, uv.shape)
+            inside = LENS.contains(uv)
+            self._see(0.4 * np.arange(-19, 1)[inside], uv[inside])
+        self._post()
+
+    def _next_rng(self) -> np.random.Generator:
+        self.seed += 1
+        return np.random.default_rng(self.seed)
+
+    def _see(self, time_s: np.ndarray, uv: np.ndarray, boxes: np.ndarray | None = None) -> None:
+        """Take down one more person, whose walk ends 5 s after the last one's."""
+        self.clock_s += 5.0
+        time_s = self.clock_s + time_s
+        form, rows, top_v = "points", uv, None
+        if boxes is not None:
+            form, rows, top_v = "boxes", boxes, tops_of_boxes(LENS, boxes)
+            uv = np.column_stack([(boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
+        body = {"id": str(len(self.seen)), form: np.column_stack([time_s, rows]).tolist()}
+        self._bodies.append(body)
+        self.seen.append(Trajectory(time_s=time_s, uv=uv, top_v=top_v))
+
+    def _post(self) -> None:
+        answer = self.http.post("/cameras/corner/tracks", json={"tracks": self._bodies})
+        assert answer.json()["accepted"] == len(self._bodies), answer.text
+        self._bodies.clear()
 
     def look(self) -> dict[str, Any]:
         """Run the estimate job; returns the served pose."""
@@ -85,7 +113,7 @@ class Street:
 
     def observed(self, first: int, last: int) -> Any:
         """What the joint estimator reads of the posted tracks."""
-        return observe(self.posted[first:last], LENS)
+        return observe(self.seen[first:last], LENS)
 
 
 def people_boxes(pose: CameraPose, uv: np.ndarray, tall_m: float) -> np.ndarray:

@@ -11,6 +11,9 @@ from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import learn_reference
 from models.simulation.walkers import WalkConfig
+from service.jobs.estimate import learn_if_due
+from service.recalibration.estimates import store_estimate
+from service.recalibration.evidence import gather, weigh
 from service.store import references
 from tests.conftest import CAMERA, track
 from tests.service.street import KNOCKED, PRIOR, Street, tall
@@ -159,6 +162,16 @@ def test_one_group_walking_one_way_tells_nothing(known):
     assert known.alerts() == []
 
 
+def test_people_who_all_cross_the_picture_tell_its_roll_alone(known):
+    known.cross(KNOCKED, 30)
+    body = known.look()
+    assert body["estimated"] == ["roll_deg"]
+    assert served(body)[1] == pytest.approx(-3, abs=1.5)
+    assert [served(body)[0], served(body)[2]] == pytest.approx([22.0, 6.0])
+    assert (body["sd"]["tilt_deg"], body["drift"]["height_m"]) == (None, None)
+    assert "cannot tell tilt" in body["reason"]
+
+
 def test_a_wrong_frame_rate_is_named(known):
     for _ in range(2):
         known.walk(PRIOR, 60, rate=25 / 30)
@@ -202,7 +215,7 @@ def test_boxes_carry_how_tall_people_are(street):
     body = street.look()
     site = reference_from_bytes(reference_of(street).data)
     assert site.statures is not None
-    assert np.median([np.median(tall(PRIOR, seen)) for seen in street.posted]) == pytest.approx(
+    assert np.median([np.median(tall(PRIOR, seen)) for seen in street.seen]) == pytest.approx(
         site.stature_m, rel=0.02
     )
     offline = joint_estimate(street.observed(WANTED, WANTED + 40), PRIOR, site)
@@ -230,3 +243,28 @@ def test_another_walking_speed_learns_the_same_tracks_again(known):
     again = reference_of(known)
     assert again.id != first.id
     assert again.to_s == first.to_s
+
+
+def test_what_a_worker_had_learned_when_it_died_is_not_learned_again(street):
+    street.walk(PRIOR, WANTED + 40)
+    learn_if_due(street.context, "corner")  # and no estimate came of it
+    learned = reference_of(street)
+    again = Street(street.http, street.context.settings)
+    body = again.look()
+    assert (body["state"], body["tracks"]) == ("ok", 40)
+    assert reference_of(again).ready_at == learned.ready_at
+    assert again.look() == body  # nothing new: nothing is written
+    assert len(again.http.get("/cameras/corner/pose/history").json()["items"]) == 1
+
+
+def test_an_estimate_that_a_reset_overtakes_is_dropped(known):
+    known.walk(KNOCKED, 30)
+    context = known.context
+    with context.store.read() as session:
+        evidence = gather(session, context.settings, "corner")
+    finding = weigh(evidence, 0)
+    known.http.post("/cameras/corner/reference/reset").raise_for_status()
+    with context.store.write() as session:
+        stored = store_estimate(session, context.queue, context.settings, evidence, finding)
+    assert stored is None
+    assert known.pose()["reason"] == "0 of 60 reference tracks"
