@@ -75,7 +75,7 @@ class _Screen:
             return f"learning what is usual here: {pose['reason']}"
         usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
         if self.alert is None:
-            return f"{usual}; {pose['tracks']} tracks since say that the camera is where it was"
+            return f"{usual}\n{pose['reason']}"
         drift = {
             name: 0.0 if value is None else value for name, value in self.alert["drift"].items()
         }
