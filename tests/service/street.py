@@ -47,11 +47,10 @@ class Street:
         *,
         rate: float = 1.0,
         form: str = "points",
-        walk: WalkConfig | None = None,
     ) -> None:
         """Post people seen from a pose; at another rate, their times are that much too short."""
         rng = self._next_rng()
-        config = walk or WalkConfig(speed_sd_mps=0.2, farthest_m=40.0)
+        config = WalkConfig(speed_sd_mps=0.2, farthest_m=40.0)
         walks = simulate_walks(LENS, repeated_pose(pose, count), config, rng)
         for padded, length in zip(walks.uv, walks.lengths, strict=True):
             uv = padded[:length] + rng.normal(0, 1.0, (length, 2))

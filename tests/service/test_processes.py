@@ -108,7 +108,7 @@ def test_the_api_killed_after_202_has_the_tracks_and_ends_its_workers(service):
     again = service.http.post("/cameras/corner/tracks", json=batch).json()
     assert (again["accepted"], again["duplicates"]) == (0, 25)
     wait_for(lambda: service.http.get("/cameras/corner/pose").json()["tracks"] == 25)
-    assert states(service) == ["succeeded"]
+    wait_for(lambda: states(service) == ["succeeded"])
 
 
 def test_a_running_training_is_cancelled_and_a_queued_one_too(service):
