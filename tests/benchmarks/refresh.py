@@ -13,6 +13,8 @@ import time
 from datetime import datetime
 from pathlib import Path
 
+from rich.console import Console
+
 from service.migrate import migrate
 from service.settings import Settings
 from tests.conftest import CAMERA, RunningService, free_port, wait_for
@@ -36,7 +38,7 @@ def main() -> None:
             finally:
                 service.stop()
         median_s = statistics.median(took_s)
-        print(
+        Console().print(
             f"{form}: {median_s:.2f} s (median of {len(took_s)}; {min(took_s):.2f} to "
             f"{max(took_s):.2f}), {median_s / LIMIT_S:.2f} of the limit of {LIMIT_S:g} s"
         )
