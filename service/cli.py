@@ -128,7 +128,7 @@ def demo(
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Save the last screen as SVG.")] = None,
 ) -> None:
-    """Simulate a street, knock its camera, and watch the alert come: under 3 minutes on 2 cores."""
+    """Simulate a street, knock its camera, and watch the alert come: half a minute on 2 cores."""
     from service.demo import run_demo
 
     stays = sys.stdin.isatty() if stay is None else stay
