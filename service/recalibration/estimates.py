@@ -22,6 +22,7 @@ from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.ranges import beyond_range, train_around
+from service.recalibration.references import made_against
 from service.recalibration.words import describe_drift
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
@@ -78,16 +79,18 @@ def _judge(
     last = estimates.newest(session, camera_id)
     firing = fired_by_estimate(session, camera_id)
     streak, since = 0, None
+    if last is not None and not made_against(reference, last):
+        last = None
     # An alert of before this reference stands until updates below the limits end it.
     drifted: tuple[str, ...] = NUMBERS if firing & {"drift", "clock"} else ()
-    if last is not None and last.reference_id == reference.id:
+    if last is not None:
         streak, drifted, since = last.drift_streak, tuple(last.drifted), last.drift_since
     if drifted and not firing & {"drift", "clock"}:
         streak, drifted = 0, ()  # a person resolved the alert: it has to earn its updates anew
     limits = drift_limits(settings)
     verdict = judge(drift, limits, streak, drifted)
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
-    record.drift_since = _since(reference, verdict, since, finding)
+    record.drift_since = _since(reference, verdict, since, finding, first=last is None)
     camera = cameras.find(session, camera_id)
     assert camera is not None
     clock = clock_fault(drift, camera.frame_rate_hz)
@@ -146,12 +149,16 @@ def _since(
     verdict: DriftVerdict,
     since: datetime | None,
     finding: Finding,
+    *,
+    first: bool,
 ) -> datetime | None:
-    """When the camera moved, as far as the tracks tell."""
+    """When the camera moved, as far as the tracks tell: at the latest then."""
     if verdict.streak > 0:
         if reference.changed_s is not None:
             return datetime.fromtimestamp(reference.changed_s, UTC)
-        return since or datetime.fromtimestamp(finding.tracks[-1].ended_s, UTC)
+        # One pose since the reference, and never another one: it had moved before all of them.
+        ended_s = finding.tracks[0 if first else -1].ended_s
+        return since or datetime.fromtimestamp(ended_s, UTC)
     return since if verdict.drifting else None
 
 

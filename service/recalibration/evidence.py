@@ -23,7 +23,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
-from service.recalibration.references import FEWEST_WALKERS, window_of
+from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.settings import Settings
 from service.store import cameras, estimates, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
@@ -184,7 +184,7 @@ def _is_news(
     last = estimates.newest(session, reference.camera_id)
     if last is None or last.reference_id != reference.id:
         return True
-    if reference.ready_at is not None and last.created_at < reference.ready_at:
+    if reference.ready_at is not None and not made_against(reference, last):
         return True
     seen = (None if model is None else model.id, max(r.id for r in records), len(records))
     return (last.model_id, last.newest_track_pk, last.tracks) != seen

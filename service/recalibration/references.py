@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from service.settings import Settings
 from service.store import cameras, tracks
-from service.store.tables import SiteReferenceRecord
+from service.store.tables import EstimateRecord, SiteReferenceRecord
 from service.store.tracks import WindowBounds
 
 # Fewer people than that who walk for a few seconds make no estimate, and no reference.
@@ -54,6 +54,13 @@ def window_of(reference: SiteReferenceRecord, settings: Settings) -> WindowBound
         ended_after_s=reference.to_s,
         ended_from_s=reference.window_from_s,
     )
+
+
+def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
+    """Whether an estimate was made against a reference, not while that was being learned."""
+    if reference.ready_at is None or estimate.reference_id != reference.id:
+        return False
+    return estimate.created_at >= reference.ready_at
 
 
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:

@@ -19,7 +19,8 @@ def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> 
         return f"beyond {limit} when it was last told" if verdict.drifting else ""
     text = ", ".join(said[name] for name in drift.told) + " against the prior pose"
     if verdict.drifting and verdict.excess >= 1:
-        return f"{text}: beyond {limit} for {limits.updates} updates or more"
+        updates = "1 update" if limits.updates == 1 else f"{limits.updates} updates"
+        return f"{text}: beyond {limit} for {updates} or more"
     if verdict.drifting:
         below = max(-verdict.streak, 0)
         return f"{text}: was beyond {limit}, {below} of {limits.updates} updates below"

@@ -139,6 +139,30 @@ def test_the_alert_says_when_the_camera_moved(bench):
     assert datetime.fromisoformat(body["from"]).timestamp() >= first
 
 
+def test_an_alert_of_before_a_reference_ends_by_updates_after_it_alone(bench):
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    change = {"walking_speed": {"mean_mps": 1.3}}
+    bench.http.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
+    for _ in range(4):
+        bench.see(PRIOR)  # while the reference is learned again
+    bench.learn()
+    for left in (1, 1, 0):
+        bench.see(PRIOR)
+        assert len(bench.alerts(state="firing")) == left
+
+
+def test_a_camera_that_was_never_seen_at_its_prior_pose_had_moved_before(bench):
+    bench.http.post("/cameras/corner/reference/reset").raise_for_status()
+    bench.see(PRIOR, people=7)
+    bench.learn()
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    (alert,) = bench.alerts()
+    first_ended_s = bench.clock_s - 2 * 60 + 0.4 * 19
+    assert datetime.fromisoformat(alert["changed_at"]).timestamp() == pytest.approx(first_ended_s)
+
+
 def test_acknowledge_keeps_the_first_and_resolve_ends(bench):
     for _ in range(3):
         bench.see(moved(roll_deg=-4.0))
