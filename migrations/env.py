@@ -20,6 +20,10 @@ def _render(kind: str, obj: object, autogen: object) -> str | bool:
 url = context.config.attributes.get("url") or Settings().database_url
 engine = engine_for(url)
 with engine.connect() as connection:
+    # SQLite changes a table by making it anew: dropping the old one would delete, by cascade, all
+    # that refers to it.
+    connection.exec_driver_sql("PRAGMA foreign_keys=OFF")
+    connection.commit()
     context.configure(
         connection=connection,
         target_metadata=Record.metadata,
@@ -30,4 +34,6 @@ with engine.connect() as connection:
     )
     with context.begin_transaction():
         context.run_migrations()
+        broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+        assert broken is None, broken
 engine.dispose()

@@ -80,6 +80,12 @@ def replay(
     speed: Annotated[
         float, typer.Option(min=0, help="Times as fast as recorded; 0: as fast as it goes.")
     ] = 0.0,
+    protocol: Annotated[
+        int | None,
+        typer.Option(min=0, help="Seed: post a case of the protocol, and compare with the truth."),
+    ] = None,
+    hard: Annotated[bool, typer.Option("--hard", help="With --protocol: a far knock.")] = False,
+    still: Annotated[bool, typer.Option("--still", help="With --protocol: no knock.")] = False,
 ) -> None:
     """Register a recorded camera and post its tracks in time order."""
     import httpx
@@ -88,6 +94,11 @@ def replay(
     from models.errors import CalibrationError
     from service.replay import replay_scene
 
+    if protocol is not None:
+        _replay_protocol(
+            scene_dir, url, protocol, "hard" if hard else "still" if still else "knock"
+        )
+        return
     console = Console()
     try:
         with Progress(console=console) as bar:
@@ -117,7 +128,7 @@ def demo(
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Save the last screen as SVG.")] = None,
 ) -> None:
-    """Simulate a street, knock its camera, and watch the alert come: under 3 minutes on 2 cores."""
+    """Simulate a street, knock its camera, and watch the alert come: half a minute on 2 cores."""
     from service.demo import run_demo
 
     stays = sys.stdin.isatty() if stay is None else stay
@@ -179,6 +190,33 @@ def centred(
         output=output,
         plot=plot,
     )
+
+
+def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
+    """Put a case of the protocol to a service and print the served pose beside the truth."""
+    import httpx
+    from rich.progress import Progress
+
+    from models.errors import CalibrationError
+    from service.replay_protocol import print_outcome, replay_protocol
+
+    console = Console()
+    try:
+        with Progress(console=console) as bar:
+            task = bar.add_task(f"posting {scene_dir.name}", total=None)
+            outcome = replay_protocol(
+                scene_dir,
+                url,
+                seed=seed,
+                knock=knock,
+                on_progress=lambda what, done, total: bar.update(
+                    task, description=what, total=total, completed=done
+                ),
+            )
+    except (CalibrationError, httpx.HTTPError, TimeoutError) as error:
+        console.print(f"[red]replay failed:[/] {error}")
+        raise typer.Exit(1) from error
+    print_outcome(outcome, console)
 
 
 def _settings(**flags: Any) -> Settings:

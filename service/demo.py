@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ import httpx
 import numpy as np
 from rich.console import Console
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from models.evaluation.scenes import Knock, SceneTrack
@@ -37,9 +37,11 @@ LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1))
 KNOCK = Knock(tilt_rad=math.radians(6), roll_rad=math.radians(-5))
 _BATCH = 10
-_STILL_TRACKS, _KNOCKED_TRACKS = 120, 160
+_REFERENCE_TRACKS, _STILL_TRACKS, _KNOCKED_TRACKS = 100, 50, 100
+_BETWEEN_S = 6.0  # of the street's time; the recording ends now
+_PAUSE_S = 0.4  # for the eye
 _EPOCHS = 5
-_LONGEST_S = 170.0
+_LONGEST_S = 150.0
 
 
 @dataclass(slots=True)
@@ -47,7 +49,7 @@ class _Screen:
     """What the terminal shows below the progress bars."""
 
     tracks: int = 0
-    knocked: bool = False
+    knocked_at: datetime | None = None
     pose: dict[str, Any] | None = None
     alert: dict[str, Any] | None = None
 
@@ -58,23 +60,31 @@ class _Screen:
         for column in ("", "height m", "tilt deg", "roll deg"):
             rows.add_column(column, justify="left" if not column else "right")
         rows.add_row("prior pose", *_row(PRIOR))
-        truth = KNOCK.apply(PRIOR) if self.knocked else PRIOR
-        rows.add_row("true pose" + (" (knocked)" if self.knocked else ""), *_row(truth))
-        if self.pose is not None and self.pose["estimated"]:
-            pose, sd = self.pose["pose"], self.pose["sd"]
-            rows.add_row(
-                f"served pose: {self.pose['state']}",
-                *(f"{pose[k]:.2f} ± {sd[k]:.2f}" for k in ("height_m", "tilt_deg", "roll_deg")),
-            )
+        truth = KNOCK.apply(PRIOR) if self.knocked_at else PRIOR
+        rows.add_row("true pose" + (" (knocked)" if self.knocked_at else ""), *_row(truth))
+        if self.pose is not None:
+            rows.add_row(f"served pose: {self.pose['state']}", *_served(self.pose))
         page.add_row(rows)
-        if self.alert is not None:
-            drift = self.alert["drift"]
-            page.add_row(
-                f"[bold red]ALERT[/] {self.alert['severity']}: the camera has turned by "
-                f"{drift['angle_deg']:.1f} deg (tilt {drift['tilt_deg']:+.1f}, roll "
-                f"{drift['roll_deg']:+.1f}), height {drift['height_m']:+.2f} m"
-            )
+        if self.pose is not None:
+            page.add_row(self._words(self.pose))
         return page
+
+    def _words(self, pose: dict[str, Any]) -> str:
+        reference = pose["reference"]
+        if reference["state"] == "learning":
+            return f"learning what is usual here: {pose['reason']}"
+        usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
+        if self.alert is None:
+            return f"{usual}\n{pose['reason']}"
+        drift = {
+            name: 0.0 if value is None else value for name, value in self.alert["drift"].items()
+        }
+        return (
+            f"{usual}\n[bold red]ALERT[/] {self.alert['severity']}: since "
+            f"{_clock(self.alert['changed_at'])} the camera is turned by {drift['angle_deg']:.1f} "
+            f"deg\n(tilt {drift['tilt_deg']:+.1f}, roll {drift['roll_deg']:+.1f}), height "
+            f"{drift['height_m']:+.2f} m"
+        )
 
 
 def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
@@ -90,7 +100,6 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
             epochs=_EPOCHS,
             seed=seed,
             workers=1,
-            window_tracks=100,
         )
         url = f"http://{settings.host}:{settings.port}"
         with _service(settings), httpx.Client(base_url=url, timeout=30) as http:
@@ -110,22 +119,65 @@ def _play(
     screen = _Screen()
     progress = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"),
-        TimeRemainingColumn(), console=console,
+        console=console,
     )  # fmt: skip
+    parts = (
+        ("people walk; the reference is learned", PRIOR, _REFERENCE_TRACKS),
+        ("people walk on, the camera is still", PRIOR, _STILL_TRACKS),
+        ("knocked; people walk on", KNOCK.apply(PRIOR), _KNOCKED_TRACKS),
+    )
+    clock_s = time.time() - _BETWEEN_S * sum(count for _, _, count in parts)
     with Live(get_renderable=lambda: screen.table(progress), console=console) as live:
         _wait_ready(http, started)
-        training = progress.add_task("training this camera's regressor", total=None)
+        training = progress.add_task("beside it, a regressor is trained", total=None)
         http.post("/cameras", json=_camera()).raise_for_status()
-        _wait_trained(http, progress, training, started)
-        still = progress.add_task("people walk, the camera is still", total=_STILL_TRACKS)
-        _walk(http, screen, progress, still, PRIOR, _STILL_TRACKS, seed, started)
-        screen.knocked = True
-        moved = progress.add_task("knocked; people walk on", total=_KNOCKED_TRACKS)
-        knocked = KNOCK.apply(PRIOR)
-        newest_s = _walk(http, screen, progress, moved, knocked, _KNOCKED_TRACKS, seed + 1, started)
-        _settle(http, screen, newest_s, started)
+        for number, (words, pose, count) in enumerate(parts):
+            if pose != PRIOR:
+                screen.knocked_at = datetime.fromtimestamp(clock_s, UTC)
+            task = progress.add_task(words, total=count)
+            people = _people(pose, count, seed + number)
+            for at in range(0, count, _BATCH):
+                _show(http, screen, people[at : at + _BATCH], clock_s, started)
+                progress.update(task, advance=_BATCH)
+                _look_at_training(http, progress, training)
+                time.sleep(_PAUSE_S)
+            clock_s += _BETWEEN_S * count
         live.refresh()
     return screen, progress
+
+
+def _show(
+    http: httpx.Client,
+    screen: _Screen,
+    people: Sequence[SceneTrack],
+    clock_s: float,
+    started: float,
+) -> None:
+    """Post people as a tracker would, when their walks have ended, and wait for the answer."""
+    receipt = post_tracks(http, CAMERA_ID, people, clock_s)
+    assert not receipt["rejected"], receipt
+    screen.tracks += len(people)
+    newest_s = clock_s + float(people[-1].trajectory.time_s[-1])
+    while not _looked_at(http, screen, newest_s):
+        _check_time(started)
+        time.sleep(0.2)
+
+
+def _looked_at(http: httpx.Client, screen: _Screen, newest_s: float) -> bool:
+    """Whether the newest track is in the reference or the estimate that is shown."""
+    pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
+    alerts = http.get("/alerts", params={"camera_id": CAMERA_ID, "state": "firing"}).json()["items"]
+    screen.pose, screen.alert = pose, alerts[0] if alerts else None
+    if pose["reference"]["state"] == "learning":
+        return bool(pose["reference"]["tracks"] < _REFERENCE_TRACKS)
+    newest = pose["to"] and datetime.fromisoformat(pose["to"]).timestamp() >= newest_s - 1e-3
+    return bool(newest) or screen.tracks == _REFERENCE_TRACKS
+
+
+def _look_at_training(http: httpx.Client, progress: Progress, task: Any) -> None:
+    training = http.get(f"/cameras/{CAMERA_ID}/trainings").json()["items"][-1]
+    step, steps = training["progress"]["step"], training["progress"]["steps"]
+    progress.update(task, completed=step, total=steps or None)
 
 
 def _save_picture(page: Table, path: Path) -> None:
@@ -136,63 +188,18 @@ def _save_picture(page: Table, path: Path) -> None:
         recorder.save_svg(str(path), title="surefoot demo")
 
 
-def _walk(
-    http: httpx.Client,
-    screen: _Screen,
-    progress: Progress,
-    task: Any,
-    pose: CameraPose,
-    count: int,
-    seed: int,
-    started: float,
-) -> float:
-    """Post people in small groups, as a tracker would; returns when the last one ended."""
-    tracks = _people(pose, count, seed)
-    now_s = 0.0
-    for at in range(0, count, _BATCH):
-        group = tracks[at : at + _BATCH]
-        # Each group has just ended its walk.
-        now_s = time.time()
-        receipt = post_tracks(http, CAMERA_ID, group, now_s)
-        assert not receipt["rejected"], receipt
-        screen.tracks += len(group)
-        progress.update(task, advance=len(group))
-        _look(http, screen)
-        time.sleep(0.7)
-        _check_time(started)
-    return now_s
-
-
-def _settle(http: httpx.Client, screen: _Screen, newest_s: float, started: float) -> None:
-    """Wait until the last tracks are in the estimate and the alert is out."""
-    while True:
-        _look(http, screen)
-        seen = (screen.pose or {}).get("to")
-        whole = seen is not None and datetime.fromisoformat(seen).timestamp() >= newest_s - 1e-3
-        if screen.alert is not None and whole:
-            return
-        _check_time(started)
-        time.sleep(0.3)
-
-
-def _look(http: httpx.Client, screen: _Screen) -> None:
-    screen.pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
-    alerts = http.get("/alerts", params={"camera_id": CAMERA_ID, "state": "firing"}).json()["items"]
-    screen.alert = alerts[0] if alerts else None
-
-
 def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
     """Say how it ended."""
-    pose = (screen.pose or {}).get("pose")
-    if pose is None or screen.alert is None:
+    if screen.pose is None or screen.alert is None or screen.knocked_at is None:
         console.print("[red]no alert came[/]")
         return False
-    served, prior = pose["quaternion_wxyz"], PRIOR.quaternion_wxyz
-    knocked = KNOCK.apply(PRIOR).quaternion_wxyz
-    to_knocked = math.degrees(angle_between(served, knocked))
-    to_prior = math.degrees(angle_between(served, prior))
+    served = np.array(screen.pose["pose"]["quaternion_wxyz"])
+    to_knocked = math.degrees(angle_between(served, KNOCK.apply(PRIOR).quaternion_wxyz))
+    to_prior = math.degrees(angle_between(served, PRIOR.quaternion_wxyz))
     console.print(
-        f"\nThe served pose is {to_knocked:.1f} deg from the knocked camera and {to_prior:.1f} deg "
+        f"\nKnocked at {screen.knocked_at:%H:%M:%S}; the alert says "
+        f"{_clock(screen.alert['changed_at'])}.\n"
+        f"The served pose is {to_knocked:.1f} deg from the knocked camera and {to_prior:.1f} deg "
         f"from where it was; {took_s:.0f} s in all.\n"
         f"Look: {url}/docs, {url}/cameras/{CAMERA_ID}/pose, {url}/alerts"
     )
@@ -200,13 +207,13 @@ def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
 
 
 def _people(pose: CameraPose, count: int, seed: int) -> list[SceneTrack]:
-    """People seen by a camera; each walk ends at time 0."""
+    """People seen by a camera, whose walks end one after the other from time 0 on."""
     rng = np.random.default_rng(seed)
     walk = WalkConfig(speed_sd_mps=0.2, farthest_m=40.0)
     walks = simulate_walks(LENS, repeated_pose(pose, count), walk, rng)
     tracks = []
     for number, (uv, length) in enumerate(zip(walks.uv, walks.lengths, strict=True)):
-        time_s = (np.arange(length) - length + 1) * walk.step_s
+        time_s = _BETWEEN_S * (number + 1) + (np.arange(length) - length + 1) * walk.step_s
         noisy = uv[:length] + rng.normal(0, 1.5, (length, 2))
         tracks.append(
             SceneTrack(track_id=f"{seed}-{number}", trajectory=Trajectory(time_s=time_s, uv=noisy))
@@ -225,6 +232,7 @@ def _camera() -> dict[str, Any]:
             "tilt_deg": math.degrees(PRIOR.tilt_rad),
             "roll_deg": math.degrees(PRIOR.roll_rad),
         },
+        "reference_tracks": _REFERENCE_TRACKS,
     }  # fmt: skip
 
 
@@ -237,19 +245,6 @@ def _wait_ready(http: httpx.Client, started: float) -> None:
             pass  # not listening yet
         _check_time(started)
         time.sleep(0.2)
-
-
-def _wait_trained(http: httpx.Client, progress: Progress, task: Any, started: float) -> None:
-    while True:
-        training = http.get(f"/cameras/{CAMERA_ID}/trainings").json()["items"][-1]
-        step, steps = training["progress"]["step"], training["progress"]["steps"]
-        progress.update(task, completed=step, total=steps or None)
-        if training["state"] == "succeeded":
-            return
-        if training["state"] in ("failed", "cancelled"):
-            raise RuntimeError(f"training {training['state']}: {training['error']}")
-        _check_time(started)
-        time.sleep(0.3)
 
 
 @contextmanager
@@ -292,6 +287,19 @@ def _row(pose: CameraPose) -> Sequence[str]:
         f"{math.degrees(pose.tilt_rad):.2f}",
         f"{math.degrees(pose.roll_rad):.2f}",
     ]
+
+
+def _served(pose: dict[str, Any]) -> Sequence[str]:
+    """The served numbers, with their deviations where they are estimated."""
+    sd = pose["sd"] or {}
+    return [
+        f"{pose['pose'][name]:.2f}" + (f" ± {sd[name]:.2f}" if sd.get(name) is not None else "")
+        for name in ("height_m", "tilt_deg", "roll_deg")
+    ]
+
+
+def _clock(moment: str | None) -> str:
+    return "an unknown time" if moment is None else f"{datetime.fromisoformat(moment):%H:%M:%S}"
 
 
 def _free_port() -> int:

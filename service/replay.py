@@ -10,6 +10,8 @@ from typing import Any
 import httpx
 
 from models.evaluation.scenes import Knock, Scene, SceneTrack, knock_trajectory, load_scene
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
@@ -45,7 +47,10 @@ def replay_scene(
     """
     scene = load_scene(folder)
     with httpx.Client(base_url=url, timeout=60) as http:
-        _register(http, scene)
+        body = camera_body(scene.scene_id, scene.intrinsics, scene.true_pose)
+        answer = http.post("/cameras", json={**body, "frame_rate_hz": scene.frame_rate_hz})
+        if answer.status_code != 409:
+            answer.raise_for_status()
         tracks = list(_seen(scene, knock))
         ends = [float(track.trajectory.time_s[-1]) for track in tracks]
         shift_s = math.floor(time.time() - max(ends, default=0.0))
@@ -69,7 +74,7 @@ def replay_scene(
 def post_tracks(
     http: httpx.Client, camera_id: str, tracks: Sequence[SceneTrack], shift_s: float
 ) -> dict[str, Any]:
-    """Post some tracks with their times shifted; returns the receipt."""
+    """Post the foot points of some tracks with their times shifted; returns the receipt."""
     body = {
         "source": _SOURCE,
         "tracks": [
@@ -93,6 +98,30 @@ def post_tracks(
     return receipt
 
 
+def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str, Any]:
+    """What registers a camera."""
+    return {
+        "id": camera_id,
+        "intrinsics": {
+            "width": lens.width,
+            "height": lens.height,
+            "fx": lens.fx,
+            "fy": lens.fy,
+            "cx": lens.cx,
+            "cy": lens.cy,
+            "distortion": list(lens.distortion),
+        },
+        "prior_pose": {
+            "height_m": pose.height_m,
+            "tilt_deg": math.degrees(pose.tilt_rad),
+            "roll_deg": math.degrees(pose.roll_rad),
+            "heading_deg": math.degrees(pose.heading_rad),
+            "x_m": pose.x_m,
+            "y_m": pose.y_m,
+        },
+    }
+
+
 def _seen(scene: Scene, knock: Knock) -> Iterator[SceneTrack]:
     """Tracks as the knocked camera would have them, of those long enough to be taken."""
     if knock == Knock():
@@ -103,33 +132,3 @@ def _seen(scene: Scene, knock: Knock) -> Iterator[SceneTrack]:
         seen = knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
         if seen is not None and seen.long_enough:
             yield SceneTrack(track_id=track.track_id, trajectory=seen)
-
-
-def _register(http: httpx.Client, scene: Scene) -> None:
-    lens, pose = scene.intrinsics, scene.true_pose
-    answer = http.post(
-        "/cameras",
-        json={
-            "id": scene.scene_id,
-            "intrinsics": {
-                "width": lens.width,
-                "height": lens.height,
-                "fx": lens.fx,
-                "fy": lens.fy,
-                "cx": lens.cx,
-                "cy": lens.cy,
-                "distortion": list(lens.distortion),
-            },
-            "prior_pose": {
-                "height_m": pose.height_m,
-                "tilt_deg": math.degrees(pose.tilt_rad),
-                "roll_deg": math.degrees(pose.roll_rad),
-                "heading_deg": math.degrees(pose.heading_rad),
-                "x_m": pose.x_m,
-                "y_m": pose.y_m,
-            },
-            "frame_rate_hz": scene.frame_rate_hz,
-        },
-    )
-    if answer.status_code != 409:
-        answer.raise_for_status()

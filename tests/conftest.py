@@ -129,13 +129,18 @@ class RunningService:
 @pytest.fixture
 def service(settings: Settings) -> Iterator[RunningService]:
     """A running service with one worker and trainings of one epoch."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    running = RunningService(settings.model_copy(update={"port": port}))
+    running = RunningService(settings.model_copy(update={"port": free_port()}))
     running.start()
     yield running
     running.stop()
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 def pid_exists(pid: int) -> bool:

@@ -18,7 +18,7 @@ SERVICE_ROOMS = [
     {"routes"},
     {"app"},
     {"serve", "replay", "evaluate", "centred"},
-    {"demo"},
+    {"demo", "replay_protocol"},
     {"cli"},
 ]
 MODEL_ROOMS = [

@@ -6,6 +6,8 @@ from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from service.migrate import alembic_config, migrate
+from service.recalibration.alerts import list_alerts
+from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
 from service.store.database import Store
 from service.store.tables import Record
@@ -28,6 +30,51 @@ def test_down_to_nothing_and_up_again(tmp_path):
         left = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
     assert left <= {"alembic_version", "sqlite_sequence", "sqlite_autoindex_alembic_version_1"}
     alembic.command.upgrade(config, "head")
+
+
+def put(connection, table, **values):
+    """Insert a row with something in every column that needs it."""
+    some = {"JSON": "[]", "DATETIME": "2026-11-20 08:00:00", "BLOB": b""}
+    for _, name, kind, needed, default, key in connection.execute(f"PRAGMA table_info({table})"):
+        if needed and default is None and not (key and kind == "INTEGER"):
+            number = kind in ("INTEGER", "DOUBLE", "FLOAT", "BOOLEAN")
+            values.setdefault(name, some.get(kind, 1 if number else "some"))
+    names = ", ".join(values)
+    marks = ", ".join("?" * len(values))
+    connection.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", list(values.values()))
+
+
+@pytest.mark.parametrize(("origin", "learned_of"), [("registered", 7), ("accepted", 3)])
+def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, learned_of):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_21_first")
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        if origin == "accepted":
+            put(connection, "prior_poses", id=2, camera_id="old", origin=origin,
+                created_at="2026-11-20 09:00:00")  # fmt: skip
+        for n in range(7):
+            put(connection, "tracks", camera_id="old", track_id=str(n), started_s=10.0 * n,
+                ended_s=10.0 * n + 8,
+                received_at=f"2026-11-20 {'08' if n < 4 else '10'}:00:00")  # fmt: skip
+        put(connection, "alerts", id="a", camera_id="old", kind="drift", state="firing")
+        put(connection, "trainings", id="t", camera_id="old", prior_pose_id=1)
+        put(connection, "models", id="m", camera_id="old", training_id="t", prior_pose_id=1)
+        put(connection, "estimates", camera_id="old", model_id="m", prior_pose_id=1)
+    migrate(settings)
+    with Store(settings).read() as session:
+        view = view_pose(session, settings, "old")
+        assert (view.state, view.told) == ("learning", ())
+        assert (view.reference.tracks, view.reference.wanted) == (learned_of, 50)
+        (history,) = pose_history(session, "old", None, None, 10)
+        assert history.told == ["tilt", "roll", "height"]
+        assert list_alerts(session, "firing", "old", 10)[0].source == "estimate"
+    alembic.command.downgrade(config, "2026_11_21_first")
+    with sqlite3.connect(settings.database_path) as connection:
+        for table, rows in (("estimates", 1), ("models", 1), ("tracks", 7)):
+            assert connection.execute(f"SELECT count(*) FROM {table}").fetchone() == (rows,)
 
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):

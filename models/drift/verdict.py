@@ -1,21 +1,34 @@
 """A first drift test: estimate against prior pose, with a floor, a hold and hysteresis."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from models.estimation.averaged import PoseEstimate, pose_of
+import numpy as np
+
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import angle_between
+from models.geometry.rotation import Array, angle_between
+
+NUMBERS = ("tilt", "roll", "height")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """Estimate minus prior pose; `angle_rad` is the whole rotation between the two."""
+    """Estimate minus prior pose, each number with the standard deviation of the estimate.
 
-    height_m: float
+    `told` names those of tilt, roll, height that the tracks can tell; the others stand here but
+    count nowhere. `angle_rad` is the whole rotation between prior and `pose_after`.
+    """
+
     tilt_rad: float
     roll_rad: float
+    height_m: float
+    log_height: float
     angle_rad: float
+    tilt_sd_rad: float
+    roll_sd_rad: float
+    height_sd_m: float
+    log_height_sd: float
+    told: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,44 +46,94 @@ class DriftLimits:
 class DriftVerdict:
     """`streak` is how many updates in a row were beyond the limits, negative how many below them.
 
-    `excess` is the largest drift in units of its limit: 1 and more is beyond.
+    `excess` is the largest drift in units of its limit: 1 and more is beyond. `drifted` names the
+    numbers that have been beyond since the drift began; empty where there is none.
     """
 
     streak: int
     excess: float
-    drifting: bool
+    drifted: tuple[str, ...]
+
+    @property
+    def drifting(self) -> bool:
+        """Whether the camera has moved, by now."""
+        return bool(self.drifted)
 
 
-def drift_between(estimate: PoseEstimate, prior: CameraPose) -> Drift:
-    """How far the estimate is from the prior pose; x, y and heading count as unmoved."""
-    pose = pose_of(estimate, prior)
-    return Drift(
-        height_m=pose.height_m - prior.height_m,
-        tilt_rad=pose.tilt_rad - prior.tilt_rad,
-        roll_rad=math.remainder(pose.roll_rad - prior.roll_rad, 2 * math.pi),
-        angle_rad=float(angle_between(pose.quaternion_wxyz, prior.quaternion_wxyz)),
+def drift_between(
+    values: Array, covariance: Array, weak: tuple[str, ...], prior: CameraPose
+) -> Drift:
+    """How far an estimate is from the prior pose; x, y and heading count as unmoved.
+
+    Args:
+        values: tilt, roll (radians) and log height (3,).
+        covariance: of these (3, 3).
+        weak: those of tilt, roll, height that the tracks cannot tell.
+        prior: the prior pose.
+    """
+    tilt, roll, log_height = (float(value) for value in values)
+    tilt_sd, roll_sd, log_height_sd = (float(sd) for sd in np.sqrt(np.diag(covariance)))
+    height_m = math.exp(log_height)
+    drift = Drift(
+        tilt_rad=min(max(tilt, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
+        roll_rad=math.remainder(roll - prior.roll_rad, 2 * math.pi),
+        height_m=height_m - prior.height_m,
+        log_height=log_height - math.log(prior.height_m),
+        angle_rad=0.0,
+        tilt_sd_rad=tilt_sd,
+        roll_sd_rad=roll_sd,
+        height_sd_m=height_m * log_height_sd,
+        log_height_sd=log_height_sd,
+        told=tuple(name for name in NUMBERS if name not in weak),
+    )
+    turned = pose_after(drift, prior)
+    return replace(
+        drift, angle_rad=float(angle_between(turned.quaternion_wxyz, prior.quaternion_wxyz))
     )
 
 
-def judge(
-    drift: Drift, estimate: PoseEstimate, limits: DriftLimits, streak: int, drifting: bool
-) -> DriftVerdict:
-    """The verdict of one more update, given the streak so far and whether it was drifting.
+def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
+    """The prior pose moved by what is told of the drift; what is not told stays the prior's."""
+    told = drift.told
+    return replace(
+        prior,
+        height_m=prior.height_m + (drift.height_m if "height" in told else 0.0),
+        tilt_rad=prior.tilt_rad + (drift.tilt_rad if "tilt" in told else 0.0),
+        roll_rad=prior.roll_rad + (drift.roll_rad if "roll" in told else 0.0),
+    )
+
+
+def judge(drift: Drift, limits: DriftLimits, streak: int, drifted: tuple[str, ...]) -> DriftVerdict:
+    """The verdict of one more update, given the streak so far and what had drifted before.
 
     Drifting begins after `updates` in a row beyond the limits and ends after as many below
-    `clear_ratio` of them; what lies between ends either streak.
+    `clear_ratio` of them; what lies between ends either streak. A number that the tracks cannot
+    tell is never beyond, and its drift does not end until it is told again. Where nothing is
+    told, nothing changes.
     """
-    floors = (
-        (drift.height_m, estimate.height_sd_m, limits.floor_m),
-        (drift.tilt_rad, estimate.tilt_sd_rad, limits.floor_rad),
-        (drift.roll_rad, estimate.roll_sd_rad, limits.floor_rad),
-    )
-    excess = max(abs(value) / max(limits.sigmas * sd, floor, 1e-12) for value, sd, floor in floors)
-    if excess >= 1:
+    found = {
+        "tilt": (drift.tilt_rad, drift.tilt_sd_rad, limits.floor_rad),
+        "roll": (drift.roll_rad, drift.roll_sd_rad, limits.floor_rad),
+        "height": (drift.height_m, drift.height_sd_m, limits.floor_m),
+    }
+    ratios = {
+        name: abs(value) / max(limits.sigmas * sd, floor, 1e-12)
+        for name, (value, sd, floor) in found.items()
+        if name in drift.told
+    }
+    if not ratios:
+        return DriftVerdict(streak=streak, excess=0.0, drifted=drifted)
+    excess = max(ratios.values())
+    beyond = tuple(name for name, ratio in ratios.items() if ratio >= 1)
+    if beyond:
         streak = max(streak, 0) + 1
-    elif excess < limits.clear_ratio:
+    elif excess < limits.clear_ratio and set(drifted) <= set(drift.told):
         streak = min(streak, 0) - 1
     else:
         streak = 0
-    drifting = streak > -limits.updates if drifting else streak >= limits.updates
-    return DriftVerdict(streak=streak, excess=excess, drifting=drifting)
+    if drifted:
+        drifted = tuple(name for name in NUMBERS if name in drifted or name in beyond)
+        drifted = () if streak <= -limits.updates else drifted
+    elif streak >= limits.updates:
+        drifted = beyond
+    return DriftVerdict(streak=streak, excess=excess, drifted=drifted)

@@ -1,78 +1,50 @@
-"""The estimate job: predict the new tracks of a camera, then bring its estimate up to date."""
+"""The estimate job: new tracks to predictions, a reference, a stored estimate."""
 
 import logging
-from collections.abc import Sequence
-from functools import lru_cache
-from pathlib import Path
-from typing import Any
 
-from models.estimation.averaged import average_windows
-from models.regression.checkpoint import load_weights
-from models.regression.network import PoseRegressor
-from models.regression.prediction import predict_windows
-from models.regression.recipe import TrainingPlan, plan_from_config
-from models.trajectory import cut_windows
 from service.jobs.context import JobContext
-from service.recalibration.estimates import (
-    PendingTracks,
-    keep_predictions,
-    store_estimate,
-    take_pending,
-)
-from service.store.packing import trajectory_of
-from service.store.tables import TrackRecord
+from service.jobs.predictions import predict_pending
+from service.recalibration.estimates import store_estimate
+from service.recalibration.evidence import gather, weigh
+from service.recalibration.learning import keep_reference, learn_period, take_period
+from service.recalibration.looking import begin_look, end_look
 
 log = logging.getLogger("surefoot.jobs")
-_BATCH = 500
 
 
 def run_estimate(context: JobContext, camera_id: str) -> None:
-    """Look at all tracks of the window that the model in use has not seen, and store an estimate.
+    """Bring a camera's reference and estimate up to date with its tracks.
 
     The mark "due" is taken off first: tracks that arrive from then on queue a job of their own.
+    No transaction is open while anything is computed.
     """
-    while True:
-        with context.store.write() as session:
-            pending = take_pending(session, context.settings, camera_id, _BATCH)
-        if pending is None or not pending.tracks:
-            break
-        rows = _predict(context.settings.weights_dir, pending)
-        with context.store.write() as session:
-            keep_predictions(session, pending.model_id, rows)
+    store, settings = context.store, context.settings
+    with store.write() as session:
+        newest_pk = begin_look(session, camera_id)
+    predict_pending(context, camera_id)
+    learn_if_due(context, camera_id)
+    with store.read() as session:
+        evidence = gather(session, settings, camera_id)
+    finding = None if evidence is None else weigh(evidence, settings.seed)
+    with store.write() as session:
+        if evidence is not None and finding is not None:
+            record = store_estimate(session, context.queue, settings, evidence, finding)
+            if record is not None:
+                fields = {"tracks": record.tracks, "state": record.state}
+                log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
+        end_look(session, camera_id, newest_pk)
+
+
+def learn_if_due(context: JobContext, camera_id: str) -> None:
+    """Learn a camera's reference, once its tracks are there."""
+    with context.store.read() as session:
+        period = take_period(session, context.settings, camera_id)
+    if period is None:
+        return
+    learned = learn_period(period, context.settings.seed)
     with context.store.write() as session:
-        record = store_estimate(session, context.settings, camera_id)
-    if record is not None:
-        fields = {"camera_id": camera_id, "tracks": record.tracks, "state": record.state}
-        log.info("estimate_stored", extra=fields)
-
-
-def _predict(weights_dir: Path, pending: PendingTracks) -> list[dict[str, Any]]:
-    """Rows of predictions, one for each track; without numbers where a track gives no window."""
-    plan = plan_from_config(pending.config)
-    network = _load(weights_dir, pending.weights_sha256, plan)
-    windows = cut_windows(
-        [trajectory_of(track) for track in pending.tracks], plan.intrinsics, plan.walk.step_s
+        keep_reference(session, camera_id, period, learned)
+    log.info(
+        "reference_learned" if learned else "reference_without_walkers",
+        extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
     )
-    height_m, quaternions = predict_windows(network, windows, plan)
-    owners, means = average_windows(height_m, quaternions, windows.owner_idx)
-    rows = _empty_rows(pending.model_id, pending.tracks)
-    for place, owner in enumerate(owners):
-        q = [float(value) for value in means.quaternion_wxyz[place]]
-        rows[owner] |= {
-            "windows": int((windows.owner_idx == owner).sum()),
-            "height_m": float(means.height_m[place]),
-            **dict(zip(("qw", "qx", "qy", "qz"), q, strict=True)),
-        }
-    return rows
-
-
-def _empty_rows(model_id: str, tracks: Sequence[TrackRecord]) -> list[dict[str, Any]]:
-    nothing = dict.fromkeys(("height_m", "qw", "qx", "qy", "qz"))
-    return [
-        {"model_id": model_id, "track_pk": track.id, "windows": 0, **nothing} for track in tracks
-    ]
-
-
-@lru_cache(maxsize=64)
-def _load(weights_dir: Path, digest: str, plan: TrainingPlan) -> PoseRegressor:
-    return load_weights(weights_dir, digest, plan.recipe)

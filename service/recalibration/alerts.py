@@ -11,6 +11,8 @@ from service.errors import ConflictError, NotFoundError
 from service.store import alerts, events
 from service.store.tables import AlertRecord
 
+_POSE_KINDS = ("drift", "clock", "out_of_range")
+
 
 def open_alert(
     session: Session,
@@ -19,14 +21,24 @@ def open_alert(
     severity: str,
     drift: dict[str, Any],
     changed_at: datetime | None,
+    *,
+    reason: str,
+    source: str = "estimate",
 ) -> AlertRecord:
-    """Open an alert, or bring the open one up to date."""
+    """Open an alert, or bring the open one up to date.
+
+    What a reference doubts does not overwrite what estimates have found; they take over its alert.
+    """
     now = datetime.now(UTC)
     record = alerts.firing(session, camera_id, kind)
     if record is not None:
-        worse = record.severity != severity
+        if source == "reference":
+            return record
+        told_anew = record.severity != severity or record.source != source
         record.drift, record.severity, record.updated_at = drift, severity, now
-        if worse:
+        record.reason, record.source = reason, source
+        record.changed_at = changed_at or record.changed_at
+        if told_anew:
             _tell(session, record)
         return record
     record = AlertRecord(
@@ -34,7 +46,9 @@ def open_alert(
         camera_id=camera_id,
         kind=kind,
         state="firing",
+        source=source,
         severity=severity,
+        reason=reason,
         drift=drift,
         opened_at=now,
         changed_at=changed_at,
@@ -46,9 +60,24 @@ def open_alert(
     return record
 
 
+def fired_by_estimate(session: Session, camera_id: str) -> set[str]:
+    """The kinds of a camera's open alerts that its estimates stand behind."""
+    found = (alerts.firing(session, camera_id, kind) for kind in _POSE_KINDS)
+    return {record.kind for record in found if record and record.source == "estimate"}
+
+
+def end_alert(
+    session: Session, camera_id: str, kind: str, outcome: str, note: str | None = None
+) -> None:
+    """End the open alert of a camera and kind, if there is one."""
+    record = alerts.firing(session, camera_id, kind)
+    if record is not None:
+        _end(session, record, outcome, note, None)
+
+
 def close_pose_alerts(session: Session, camera_id: str, outcome: str, by: str | None) -> None:
     """End the open alerts that measure a camera against its prior pose, if there are any."""
-    for kind in ("drift", "out_of_range"):
+    for kind in _POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
             _end(session, record, outcome, None, by)
@@ -125,6 +154,7 @@ def _tell(session: Session, record: AlertRecord) -> None:
         "kind": record.kind,
         "state": record.state,
         "severity": record.severity,
+        "reason": record.reason,
         "drift": record.drift,
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,

@@ -11,9 +11,10 @@ from models.geometry.pose import CameraPose
 from service.errors import ConflictError, NotFoundError, PreconditionFailedError
 from service.job_queue import JobQueue
 from service.recalibration.alerts import close_pose_alerts
-from service.recalibration.trainings import queue_training, stop_trainings
+from service.recalibration.references import begin_reference
+from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
 from service.settings import Settings
-from service.store import cameras, tracks, trainings
+from service.store import cameras, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import CameraRecord, PriorPoseRecord
 
@@ -82,6 +83,7 @@ def register_camera(
         reference_tracks=spec.reference_tracks,
         version=1,
         estimate_due_at=None,
+        looked_at_pk=None,
         created_at=now,
         updated_at=now,
     )
@@ -89,6 +91,7 @@ def register_camera(
     session.add(record)
     session.flush()
     add_prior_pose(session, camera_id, spec.prior_pose, "registered", None)
+    begin_reference(session, camera_id, "registered", from_s=None)
     queue_training(session, queue, settings, camera_id)
     return view_camera(session, camera_id)
 
@@ -137,13 +140,21 @@ def change_camera(
             setattr(record, name, getattr(change, name))
     record.version += 1
     record.updated_at = datetime.now(UTC)
-    speed_changed = change.walking_speed_mean_mps is not None
-    if change.intrinsics is not None or change.prior_pose is not None or speed_changed:
+    if change.reference_tracks is not None:
+        _change_wanted(session, queue, camera_id, change.reference_tracks)
+    geometry_changed = change.intrinsics is not None or change.prior_pose is not None
+    if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, "accepted", None)
+        # Tracks seen so far may be of another pose or lens, but not of other people.
+        from_s = references.newest(session, camera_id).from_s
+        if geometry_changed:
+            from_s = tracks.newest_end_s(session, camera_id)
         pose = change.prior_pose or view.prior_pose
-        renew_prior_pose(session, queue, settings, camera_id, pose, "changed", None)
+        renew_prior_pose(
+            session, queue, settings, camera_id, pose, "changed", from_s=from_s, by=None
+        )
     session.flush()
     return view_camera(session, camera_id)
 
@@ -179,10 +190,17 @@ def renew_prior_pose(
     camera_id: str,
     pose: CameraPose,
     origin: str,
+    *,
+    from_s: float | None,
     by: str | None,
 ) -> None:
-    """Make a pose the prior pose, and train at it instead of whatever training is under way."""
+    """Make a pose the prior pose, with a reference of the tracks that start at or after a time.
+
+    It is trained at, instead of whatever training is under way.
+    """
     add_prior_pose(session, camera_id, pose, origin, by)
+    begin_reference(session, camera_id, origin, from_s=from_s, by=by)
+    request_estimate(session, queue, camera_id)
     stop_trainings(session, camera_id)
     queue_training(session, queue, settings, camera_id)
 
@@ -206,6 +224,14 @@ def add_prior_pose(
         )
     )
     session.flush()
+
+
+def _change_wanted(session: Session, queue: JobQueue, camera_id: str, wanted: int) -> None:
+    """Let a reference that is being learned wait for another number of tracks."""
+    reference = references.newest(session, camera_id)
+    if reference.ready_at is None:
+        reference.wanted = wanted
+        request_estimate(session, queue, camera_id)
 
 
 def _view(session: Session, record: CameraRecord) -> CameraView:

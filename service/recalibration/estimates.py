@@ -1,217 +1,242 @@
-"""From tracks that a model has yet to look at to a stored estimate and its alert."""
+"""From what the tracks of a window come to, to a stored estimate, its alerts and its training."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
 from datetime import UTC, datetime
 from typing import Any
 
-import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift.verdict import Drift, DriftLimits, drift_between, judge
-from models.estimation.averaged import (
-    FEWEST_TRACKS,
-    PoseEstimate,
-    TrackPredictions,
-    averaged_estimate,
-    pose_of,
+from models.drift.clock import clock_fault
+from models.drift.verdict import (
+    NUMBERS,
+    Drift,
+    DriftLimits,
+    DriftVerdict,
+    drift_between,
+    judge,
+    pose_after,
 )
-from models.geometry.pose import CameraPose
-from service.recalibration.alerts import close_pose_alerts, open_alert
+from models.estimation.averaged import PoseEstimate
+from models.estimation.joint.estimate import JointEstimate
+from service.job_queue import JobQueue
+from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
+from service.recalibration.evidence import Evidence, Finding
+from service.recalibration.ranges import beyond_range, train_around
+from service.recalibration.references import made_against
+from service.recalibration.words import describe_drift
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, events, tracks, trainings
-from service.store.packing import pose_of_prior
-from service.store.tables import EstimateRecord, ModelRecord, PredictionRecord, TrackRecord
-
-_EDGE = 0.9  # of the training range: beyond, a regressor only knows "at least so much"
+from service.store import cameras, estimates, events, references
+from service.store.tables import EstimateRecord, SiteReferenceRecord
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PendingTracks:
-    """Tracks without a prediction, and the model that is to look at them."""
+def store_estimate(
+    session: Session, queue: JobQueue, settings: Settings, evidence: Evidence, finding: Finding
+) -> EstimateRecord | None:
+    """Judge the drift of a finding and store it; None if its reference no longer counts.
 
-    model_id: str
-    weights_sha256: str
-    config: dict[str, Any]
-    tracks: Sequence[TrackRecord]
-
-
-def take_pending(
-    session: Session, settings: Settings, camera_id: str, limit: int
-) -> PendingTracks | None:
-    """Take the mark "due" off a camera and name its pending tracks; None without any or model."""
-    camera = cameras.find(session, camera_id)
-    if camera is None:
-        return None
-    camera.estimate_due_at = None
-    model = trainings.newest_model(session, camera_id)
-    window = tracks.window(session, camera_id, settings.window_tracks, settings.window_days)
-    if model is None or window is None:
-        return None
-    return PendingTracks(
-        model_id=model.id,
-        weights_sha256=model.weights_sha256,
-        config=model.config,
-        tracks=tracks.without_prediction(session, camera_id, model.id, window, limit),
-    )
-
-
-def keep_predictions(session: Session, model_id: str, rows: Sequence[dict[str, Any]]) -> None:
-    """Store predictions, of those tracks and that model that still exist."""
-    existing = tracks.existing(session, [row["track_pk"] for row in rows])
-    if trainings.model_exists(session, model_id):
-        tracks.add_predictions(session, [row for row in rows if row["track_pk"] in existing])
-
-
-def store_estimate(session: Session, settings: Settings, camera_id: str) -> EstimateRecord | None:
-    """Average the predictions of the window, judge the drift, store both; None if it is too early.
-
-    Harmless when run twice: without a new track, model or prior pose nothing is written.
+    A reference that has become ready, or another one that has begun, has a job of its own.
     """
-    model = trainings.newest_model(session, camera_id)
-    window = tracks.window(session, camera_id, settings.window_tracks, settings.window_days)
-    if model is None or window is None:
+    reference = references.newest_if_any(session, evidence.camera_id)
+    if reference is None or reference.id != evidence.reference_id:
         return None
-    predictions = tracks.predictions(session, camera_id, model.id, window)
-    if len(predictions) < FEWEST_TRACKS:
+    if (reference.ready_at is None) != (evidence.site is None):
         return None
-    prior_record = cameras.prior_pose(session, camera_id)
+    drift = drift_between(
+        finding.joint.values, finding.joint.covariance, finding.joint.weak, evidence.prior
+    )
+    if evidence.site is None:
+        record = _record(reference, evidence, finding, drift, learning=True)
+        record.state, record.reason = "learning", "the reference is being learned"
+    else:
+        record = _record(reference, evidence, finding, drift, learning=False)
+        _judge(session, queue, settings, reference, evidence, finding, drift, record)
+    session.add(record)
+    payload = {
+        "camera_id": record.camera_id,
+        "state": record.state,
+        "tracks": record.tracks,
+        "drift": drift_body(drift) if record.told else None,
+    }
+    events.add(session, "pose", payload, record.created_at)
+    return record
+
+
+def _judge(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    evidence: Evidence,
+    finding: Finding,
+    drift: Drift,
+    record: EstimateRecord,
+) -> None:
+    """Set state, reason, streak and alerts of an estimate after the reference."""
+    if finding.change is not None:
+        reference.window_from_s = finding.change.ended_s
+        reference.changed_s = finding.change.started_s
+    camera_id = record.camera_id
     last = estimates.newest(session, camera_id)
-    if last is not None and (last.model_id, last.prior_pose_id) != (model.id, prior_record.id):
-        last = None  # a streak belongs to one model and one prior pose
-    if last is not None and (last.newest_track_pk, last.tracks) == (
-        window.newest_pk,
-        len(predictions),
-    ):
-        return None
-    estimate = averaged_estimate(_as_predictions(predictions), settings.seed)
-    prior = pose_of_prior(prior_record)
-    drift = drift_between(estimate, prior)
-    limits = _limits(settings)
-    was_drifting = alerts.firing(session, camera_id, "drift") is not None
-    streak = 0 if last is None else last.drift_streak
-    if last is not None and last.state == "drifting" and not was_drifting:
-        streak = 0  # a person resolved the alert: it has to earn its updates anew
-    verdict = judge(drift, estimate, limits, streak, was_drifting)
-    since = None
-    if verdict.streak > 0 or verdict.drifting:
-        known = None if last is None else last.drift_since
-        since = known or datetime.fromtimestamp(window.to_s, UTC)
-    edge = _beyond_range(estimate, model)
-    state = "out_of_range" if edge else "drifting" if verdict.drifting else "ok"
-    reason = edge or _describe(drift, estimate, verdict.drifting, verdict.streak, limits)
-    now = datetime.now(UTC)
-    record = EstimateRecord(
-        camera_id=camera_id,
-        model_id=model.id,
-        prior_pose_id=prior_record.id,
-        state=state,
-        reason=reason,
-        **_served_columns(estimate, prior),
+    firing = fired_by_estimate(session, camera_id)
+    streak, since = 0, None
+    if last is not None and not made_against(reference, last):
+        last = None
+    # An alert of before this reference stands until updates below the limits end it.
+    drifted: tuple[str, ...] = NUMBERS if firing & {"drift", "clock"} else ()
+    if last is not None:
+        streak, drifted, since = last.drift_streak, tuple(last.drifted), last.drift_since
+    if drifted and not firing & {"drift", "clock"}:
+        streak, drifted = 0, ()  # a person resolved the alert: it has to earn its updates anew
+    limits = drift_limits(settings)
+    verdict = judge(drift, limits, streak, drifted)
+    record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
+    record.drift_since = _since(reference, verdict, since, finding, first=last is None)
+    camera = cameras.find(session, camera_id)
+    assert camera is not None
+    clock = clock_fault(drift, camera.frame_rate_hz)
+    edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
+    record.state = "ok" if drift.told else "learning"
+    if verdict.drifting:
+        record.state = "drifting"
+    words = [describe_drift(drift, verdict, limits)]
+    if clock is not None:
+        words.append(clock)
+    if edge is not None:
+        record.state = "out_of_range"
+        training = train_around(
+            session, queue, settings, camera_id, pose_after(drift, evidence.prior)
+        )
+        words.append(f"{edge}; a training around the new estimate {training}")
+    words += [finding.joint.reason, reference.doubt]
+    record.reason = "; ".join(word for word in words if word)
+    _alert(session, record, drift, verdict, clock=clock, edge=edge)
+
+
+def _alert(
+    session: Session,
+    record: EstimateRecord,
+    drift: Drift,
+    verdict: DriftVerdict,
+    *,
+    clock: str | None,
+    edge: str | None,
+) -> None:
+    """Open, update or end the alerts that an estimate stands behind."""
+    camera_id = record.camera_id
+    firing = fired_by_estimate(session, camera_id)
+    body = drift_body(drift)
+    severity = "critical" if verdict.excess >= 2 else "warning"
+    since = record.drift_since
+    if edge is not None:
+        open_alert(session, camera_id, "out_of_range", severity, body, since, reason=edge)
+    elif "out_of_range" in firing:
+        end_alert(session, camera_id, "out_of_range", "cleared")
+    if not verdict.drifting:
+        for kind in firing & {"drift", "clock"}:
+            end_alert(session, camera_id, kind, "cleared")
+        return
+    # What was named a clock fault stays one until an angle has drifted too.
+    is_clock = clock is not None or ("clock" in firing and verdict.drifted == ("height",))
+    kind, other = ("clock", "drift") if is_clock else ("drift", "clock")
+    if other in firing:
+        end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
+    if drift.told:
+        open_alert(session, camera_id, kind, severity, body, since, reason=clock or record.reason)
+
+
+def _since(
+    reference: SiteReferenceRecord,
+    verdict: DriftVerdict,
+    since: datetime | None,
+    finding: Finding,
+    *,
+    first: bool,
+) -> datetime | None:
+    """When the camera moved, as far as the tracks tell: at the latest then."""
+    if verdict.streak > 0:
+        if reference.changed_s is not None:
+            return datetime.fromtimestamp(reference.changed_s, UTC)
+        # One pose since the reference, and never another one: it had moved before all of them.
+        ended_s = finding.tracks[0 if first else -1].ended_s
+        return since or datetime.fromtimestamp(ended_s, UTC)
+    return since if verdict.drifting else None
+
+
+def _record(
+    reference: SiteReferenceRecord,
+    evidence: Evidence,
+    finding: Finding,
+    drift: Drift,
+    *,
+    learning: bool,
+) -> EstimateRecord:
+    pose = evidence.prior if learning else pose_after(drift, evidence.prior)
+    return EstimateRecord(
+        camera_id=evidence.camera_id,
+        model_id=evidence.model_id,
+        prior_pose_id=reference.prior_pose_id,
+        reference_id=reference.id,
+        told=[] if learning else list(drift.told),
+        height_m=pose.height_m,
+        tilt_rad=pose.tilt_rad,
+        roll_rad=pose.roll_rad,
+        height_sd_m=drift.height_sd_m,
+        tilt_sd_rad=drift.tilt_sd_rad,
+        roll_sd_rad=drift.roll_sd_rad,
         drift_height_m=drift.height_m,
         drift_tilt_rad=drift.tilt_rad,
         drift_roll_rad=drift.roll_rad,
         drift_angle_rad=drift.angle_rad,
-        drift_streak=verdict.streak,
-        drift_since=since,
-        raw={"averaged": _raw(estimate)},
-        tracks=len(predictions),
-        from_s=window.from_s,
-        to_s=window.to_s,
-        newest_track_pk=window.newest_pk,
-        created_at=now,
-    )
-    session.add(record)
-    events.add(
-        session,
-        "pose",
-        {"camera_id": camera_id, "state": state, "tracks": record.tracks, "drift": _drift(drift)},
-        now,
-    )
-    if verdict.drifting or edge:
-        kind = "out_of_range" if edge else "drift"
-        severity = "critical" if edge or verdict.excess >= 2 else "warning"
-        open_alert(session, camera_id, kind, severity, _drift(drift), since)
-    else:
-        close_pose_alerts(session, camera_id, "cleared", None)
-    return record
-
-
-def _describe(
-    drift: Drift, estimate: PoseEstimate, drifting: bool, streak: int, limits: DriftLimits
-) -> str:
-    text = (
-        f"tilt {_deg(drift.tilt_rad)} deg (sd {np.degrees(estimate.tilt_sd_rad):.2f}), roll "
-        f"{_deg(drift.roll_rad)} deg (sd {np.degrees(estimate.roll_sd_rad):.2f}), height "
-        f"{drift.height_m:+.2f} m (sd {estimate.height_sd_m:.2f}) against the prior pose"
-    )
-    limit = f"{limits.sigmas:g} sd and {np.degrees(limits.floor_rad):g} deg or {limits.floor_m:g} m"
-    if drifting:
-        return f"{text}: beyond {limit} for {limits.updates} updates"
-    if streak > 0:
-        return f"{text}: beyond {limit}, {streak} of {limits.updates} updates"
-    return f"{text}: not beyond {limit}"
-
-
-def _beyond_range(estimate: PoseEstimate, model: ModelRecord) -> str | None:
-    """In words, where the estimate is at the edge of what the model was trained for."""
-    prior, spread = model.config["prior_pose"], model.config["recipe"]["spread"]
-    for name, value, reach in (
-        ("height", estimate.height_m - prior["height_m"], spread["height_m"]),
-        ("tilt", estimate.tilt_rad - prior["tilt_rad"], spread["angle_rad"]),
-        ("roll", estimate.roll_rad - prior["roll_rad"], spread["angle_rad"]),
-    ):
-        if abs(value) > _EDGE * reach:
-            return f"{name} is at the edge of the training range; the move is at least so large"
-    return None
-
-
-def _as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
-    return TrackPredictions(
-        height_m=np.array([record.height_m for record in records], dtype=np.float64),
-        quaternion_wxyz=np.array([(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64),
+        drift_streak=0,
+        drifted=[],
+        drift_since=None,
+        raw=_raw(finding.joint, finding.averaged),
+        tracks=len(finding.tracks),
+        from_s=min(track.started_s for track in finding.tracks),
+        to_s=finding.tracks[-1].ended_s,
+        newest_track_pk=finding.newest_pk,
+        created_at=datetime.now(UTC),
     )
 
 
-def _served_columns(estimate: PoseEstimate, prior: CameraPose) -> dict[str, float]:
-    pose = pose_of(estimate, prior)
+def _raw(joint: JointEstimate, averaged: PoseEstimate | None) -> dict[str, Any]:
+    tilt, roll, log_height = (float(number) for number in joint.raw)
+    raw = {
+        "joint": {
+            "height_m": math.exp(log_height),
+            "tilt_deg": math.degrees(tilt),
+            "roll_deg": math.degrees(roll),
+            "tracks": joint.walkers,
+        }
+    }
+    if averaged is not None:
+        raw["averaged"] = {
+            "height_m": averaged.height_m,
+            "tilt_deg": math.degrees(averaged.tilt_rad),
+            "roll_deg": math.degrees(averaged.roll_rad),
+            "tracks": averaged.tracks,
+        }
+    return raw
+
+
+def drift_body(drift: Drift) -> dict[str, float | None]:
+    """The told drift as JSON, as in the pose and its alerts."""
+    told = drift.told
+    turned = {"tilt", "roll"} & set(told)
     return {
-        "height_m": pose.height_m,
-        "tilt_rad": pose.tilt_rad,
-        "roll_rad": pose.roll_rad,
-        "height_sd_m": estimate.height_sd_m,
-        "tilt_sd_rad": estimate.tilt_sd_rad,
-        "roll_sd_rad": estimate.roll_sd_rad,
+        "height_m": drift.height_m if "height" in told else None,
+        "tilt_deg": math.degrees(drift.tilt_rad) if "tilt" in told else None,
+        "roll_deg": math.degrees(drift.roll_rad) if "roll" in told else None,
+        "angle_deg": math.degrees(drift.angle_rad) if turned else None,
     }
 
 
-def _raw(estimate: PoseEstimate) -> dict[str, Any]:
-    return {
-        "height_m": estimate.height_m,
-        "tilt_deg": float(np.degrees(estimate.tilt_rad)),
-        "roll_deg": float(np.degrees(estimate.roll_rad)),
-        "tracks": estimate.tracks,
-    }
-
-
-def _drift(drift: Drift) -> dict[str, float]:
-    return {
-        "height_m": drift.height_m,
-        "tilt_deg": float(np.degrees(drift.tilt_rad)),
-        "roll_deg": float(np.degrees(drift.roll_rad)),
-        "angle_deg": float(np.degrees(drift.angle_rad)),
-    }
-
-
-def _limits(settings: Settings) -> DriftLimits:
+def drift_limits(settings: Settings) -> DriftLimits:
+    """The limits of the settings."""
     return DriftLimits(
         sigmas=settings.drift_sigmas,
-        floor_rad=float(np.radians(settings.drift_floor_deg)),
+        floor_rad=math.radians(settings.drift_floor_deg),
         floor_m=settings.drift_floor_m,
         updates=settings.drift_updates,
         clear_ratio=settings.drift_clear_ratio,
     )
-
-
-def _deg(angle_rad: float) -> str:
-    return f"{np.degrees(angle_rad):+.2f}"

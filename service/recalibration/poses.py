@@ -1,4 +1,4 @@
-"""The served pose, from the store alone; its history; accepting it."""
+"""The served pose, from the store alone; its history; accepting it; going back to the prior."""
 
 import time
 import zlib
@@ -9,33 +9,54 @@ from typing import Literal
 
 from sqlalchemy.orm import Session
 
-from models.estimation.averaged import FEWEST_TRACKS
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
 from service.recalibration.alerts import close_pose_alerts
 from service.recalibration.cameras import renew_prior_pose, require_camera
+from service.recalibration.references import (
+    FEWEST_WALKERS,
+    begin_reference,
+    tracks_so_far,
+    wanted_tracks,
+    window_of,
+)
+from service.recalibration.trainings import request_estimate
 from service.settings import Settings
-from service.store import cameras, estimates, tracks, trainings
+from service.store import cameras, estimates, references, tracks, trainings
 from service.store.packing import pose_of_prior
-from service.store.tables import EstimateRecord, ModelRecord
+from service.store.tables import EstimateRecord, SiteReferenceRecord
 
 PoseState = Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceView:
+    """What is served of a camera's reference."""
+
+    ready: bool
+    tracks: int
+    wanted: int
+    walking_speed_mps: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PoseView:
-    """What is served of a camera's pose."""
+    """What is served of a camera's pose. `estimate` may be one that tells nothing yet."""
 
     camera_id: str
     state: PoseState
     reason: str
     pose: CameraPose
     estimate: EstimateRecord | None
+    reference: ReferenceView
     model_id: str | None
-    stored_tracks: int
-    reference_wanted: int
     etag: str
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Those of tilt, roll, height that are estimated."""
+        return () if self.estimate is None else tuple(self.estimate.told)
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -46,34 +67,40 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     """
     camera = require_camera(session, camera_id)
     prior_record = cameras.prior_pose(session, camera_id)
-    prior = pose_of_prior(prior_record)
+    reference = references.newest(session, camera_id)
     model = trainings.newest_model(session, camera_id)
-    stored = tracks.count(session, camera_id)
     estimate = estimates.newest(session, camera_id)
-    if estimate is not None and estimate.prior_pose_id != prior_record.id:
-        estimate = None  # it was measured against a prior pose that is no longer trusted
-    state, reason = _state(session, settings, camera_id, estimate, model, stored)
-    pose = prior
+    if estimate is not None and estimate.reference_id != reference.id:
+        estimate = None  # it was measured against a pose or a reference that no longer counts
+    so_far = tracks_so_far(session, settings, reference)
+    state, reason = _state(session, settings, reference, estimate, so_far)
+    pose = pose_of_prior(prior_record)
     if estimate is not None:
         pose = replace(
-            prior,
+            pose,
             height_m=estimate.height_m,
             tilt_rad=estimate.tilt_rad,
             roll_rad=estimate.roll_rad,
         )
     version = 0 if estimate is None else estimate.id
     model_id = None if model is None else model.id
+    ready = reference.ready_at is not None
     return PoseView(
         camera_id=camera_id,
         state=state,
         reason=reason,
         pose=pose,
         estimate=estimate,
+        reference=ReferenceView(
+            ready=ready,
+            tracks=so_far,
+            wanted=reference.wanted,
+            walking_speed_mps=reference.walking_speed_mps,
+        ),
         model_id=model_id,
-        stored_tracks=stored,
-        reference_wanted=camera.reference_tracks,
-        etag=f'"{prior_record.id}-{version}-{state}-{stored}-{(model_id or "none")[:8]}'
-        f'-{camera.version}-{zlib.crc32(reason.encode()):08x}"',
+        etag=f'"{prior_record.id}-{reference.id}-{version}-{state}-{so_far}-{ready:d}'
+        f"-{reference.wanted}-{(model_id or 'none')[:8]}-{camera.version}"
+        f'-{zlib.crc32(reason.encode()):08x}"',
     )
 
 
@@ -92,43 +119,63 @@ def pose_history(
 def accept_pose(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, by: str | None
 ) -> PoseView:
-    """Make the served pose the new prior pose, and close the drift alert.
+    """Make the served pose the new prior pose, close its alerts and begin a new reference.
 
     Raises:
         NotFoundError: there is no such camera.
         ConflictError: no pose has been estimated yet.
     """
     view = view_pose(session, settings, camera_id)
-    if view.estimate is None:
+    if not view.told:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     close_pose_alerts(session, camera_id, "accepted", by)
-    renew_prior_pose(session, queue, settings, camera_id, view.pose, "accepted", by)
+    from_s = tracks.newest_end_s(session, camera_id)
+    renew_prior_pose(
+        session, queue, settings, camera_id, view.pose, "accepted", from_s=from_s, by=by
+    )
+    return view_pose(session, settings, camera_id)
+
+
+def reset_reference(
+    session: Session, queue: JobQueue, settings: Settings, camera_id: str, by: str | None
+) -> PoseView:
+    """Take a person's word that the camera is back at its prior pose, and learn it anew there.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    close_pose_alerts(session, camera_id, "put_back", by)
+    from_s = tracks.newest_end_s(session, camera_id)
+    begin_reference(session, camera_id, "reset", from_s=from_s, by=by)
+    request_estimate(session, queue, camera_id)
     return view_pose(session, settings, camera_id)
 
 
 def _state(
     session: Session,
     settings: Settings,
-    camera_id: str,
+    reference: SiteReferenceRecord,
     estimate: EstimateRecord | None,
-    model: ModelRecord | None,
-    stored: int,
+    so_far: int,
 ) -> tuple[PoseState, str]:
-    newest_s = tracks.newest_end_s(session, camera_id)
-    if estimate is None:
-        if model is None:
-            running = trainings.unfinished(session, camera_id)
-            what = f"its training is {running[0].state}" if running else "no training is under way"
-            return "learning", f"no model yet, {what}; {stored} tracks are stored"
-        return "learning", (
-            f"{stored} tracks are stored; at least {FEWEST_TRACKS} that the model can read "
-            f"(11 points, {model.step_s:g} s apart, inside the image) are needed"
-        )
-    silent_h = (time.time() - (newest_s or 0.0)) / 3600
+    if reference.ready_at is None:
+        wanted = wanted_tracks(reference, settings)
+        return "learning", f"{so_far} of {wanted} reference tracks"
+    if estimate is None or estimate.created_at < reference.ready_at:
+        since = tracks.count_window(session, window_of(reference, settings))
+        text = f"{since} tracks since the reference; at least {FEWEST_WALKERS} of people who walk "
+        text += "for a few seconds inside the image are needed"
+        return "learning", "; ".join(part for part in (text, reference.doubt) if part)
+    silent_h = (time.time() - (tracks.newest_end_s(session, reference.camera_id) or 0.0)) / 3600
     if silent_h > settings.no_data_after_h:
         return "no_data", (
             f"the newest track ended {silent_h:.1f} h ago; "
             f"up to {settings.no_data_after_h:g} h are waited for"
         )
-    states: dict[str, PoseState] = {"drifting": "drifting", "out_of_range": "out_of_range"}
+    states: dict[str, PoseState] = {
+        "learning": "learning",
+        "drifting": "drifting",
+        "out_of_range": "out_of_range",
+    }
     return states.get(estimate.state, "ok"), estimate.reason

@@ -2,12 +2,13 @@
 
 import secrets
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from models.geometry.pose import CameraPose
 from models.regression.recipe import TrainingPlan, plan_to_config, plan_training
 from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
@@ -21,6 +22,7 @@ from service.store.tables import ModelRecord, PriorPoseRecord, TrainingRecord
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
+_CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,14 +42,16 @@ def queue_training(
     camera_id: str,
     recipe: str | None = None,
     seed: int | None = None,
+    around: CameraPose | None = None,
 ) -> TrainingRecord:
-    """Queue a training of a camera at its prior pose, in the caller's transaction."""
+    """Queue a training of a camera, in the caller's transaction: around a pose, or its prior."""
     now = datetime.now(UTC)
     record = TrainingRecord(
         id=secrets.token_hex(16),
         camera_id=camera_id,
         prior_pose_id=cameras.prior_pose(session, camera_id).id,
         recipe=recipe or settings.recipe,
+        around=None if around is None else {name: getattr(around, name) for name in _CENTRE},
         seed=settings.seed if seed is None else seed,
         state="queued",
         attempt=0,
@@ -117,9 +121,7 @@ def begin_training(
         _finish(session, record, "cancelled")
         return None
     camera = cameras.find(session, record.camera_id)
-    prior = session.get(PriorPoseRecord, record.prior_pose_id)
     assert camera is not None
-    assert prior is not None
     record.state = "running"
     record.attempt += 1
     record.started_at = datetime.now(UTC)
@@ -131,7 +133,7 @@ def begin_training(
         attempt=record.attempt,
         plan=plan_training(
             intrinsics=intrinsics_of(camera),
-            prior_pose=pose_of_prior(prior),
+            prior_pose=centre_of(session, record),
             recipe_name=record.recipe,
             walk=WalkConfig(
                 speed_mean_mps=camera.walking_speed_mean_mps,
@@ -142,6 +144,13 @@ def begin_training(
             epochs=settings.epochs,
         ),
     )
+
+
+def centre_of(session: Session, record: TrainingRecord) -> CameraPose:
+    """The pose in the middle of a training's range."""
+    prior = session.get(PriorPoseRecord, record.prior_pose_id)
+    assert prior is not None
+    return replace(pose_of_prior(prior), **(record.around or {}))
 
 
 def camera_step_s(session: Session, camera_id: str) -> float:

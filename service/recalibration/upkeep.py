@@ -8,9 +8,10 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
+from service.recalibration.references import window_of
 from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
 from service.settings import Settings
-from service.store import cameras, estimates, events, tracks, trainings, workers
+from service.store import cameras, estimates, events, references, tracks, trainings, workers
 from service.store.tables import CameraRecord
 
 # A model reads tracks at another step than its own, but less well the farther they are apart.
@@ -31,16 +32,12 @@ def reconcile_camera(
     if reason is not None:
         queue_training(session, queue, settings, camera_id)
         found.append(reason)
-    model = trainings.newest_model(session, camera_id)
-    window = tracks.window(session, camera_id, settings.window_tracks, settings.window_days)
-    if model is not None and window is not None:
-        pending = tracks.without_prediction(session, camera_id, model.id, window, 1)
-        due = camera.estimate_due_at
-        lost = due is not None and datetime.now(UTC) - due > timedelta(seconds=_DUE_LOST_S)
-        if (pending and due is None) or lost:
-            camera.estimate_due_at = None
-            request_estimate(session, queue, camera_id)
-            found.append("tracks without a prediction")
+    due = camera.estimate_due_at
+    lost = due is not None and datetime.now(UTC) - due > timedelta(seconds=_DUE_LOST_S)
+    if lost or (due is None and _is_behind(session, settings, camera)):
+        camera.estimate_due_at = None
+        request_estimate(session, queue, camera_id)
+        found.append("tracks that nothing has looked at")
     return found
 
 
@@ -88,6 +85,20 @@ def take_lost_workers(session: Session, settings: Settings) -> list[str]:
     for worker in lost:
         session.delete(worker)
     return names
+
+
+def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:
+    """Whether there are tracks that no estimate job, or not the model in use, has looked at."""
+    newest_pk = tracks.newest_pk(session, camera.id)
+    if newest_pk is None:
+        return False
+    if camera.looked_at_pk is None or camera.looked_at_pk < newest_pk:
+        return True
+    model = trainings.newest_model(session, camera.id)
+    if model is None:
+        return False
+    bounds = window_of(references.newest(session, camera.id), settings)
+    return bool(tracks.without_prediction(session, bounds, model.id, 1))
 
 
 def _why_train(session: Session, camera: CameraRecord) -> str | None:

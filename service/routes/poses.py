@@ -1,4 +1,4 @@
-"""`/cameras/{id}/pose`: the served pose, its history, and accepting it."""
+"""`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
 from datetime import datetime
 from typing import Annotated
@@ -8,12 +8,12 @@ from fastapi import APIRouter, Header, Query, Response
 from service.errors import FieldError, MalformedError
 from service.recalibration import poses
 from service.routes.state import ReadDep, StateDep, WriteDep
-from service.schemas.poses import AcceptBody, History, HistoryPoint, ServedPoseOut
+from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
 
-router = APIRouter(prefix="/cameras/{camera_id}/pose", tags=["pose"])
+router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
 
-@router.get("", response_model=ServedPoseOut)
+@router.get("/pose", response_model=ServedPoseOut)
 def show(
     camera_id: str,
     state: StateDep,
@@ -29,7 +29,7 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
-@router.get("/history")
+@router.get("/pose/history")
 def history(
     camera_id: str,
     session: ReadDep,
@@ -48,12 +48,23 @@ def history(
     return History(items=[HistoryPoint.from_record(record) for record in records])
 
 
-@router.post("/accept")
+@router.post("/pose/accept")
 def accept(
     camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
 ) -> ServedPoseOut:
-    """Make the served pose the new prior pose and close the drift alert."""
+    """Make the served pose the new prior pose and close its alerts; a new reference begins."""
     by = None if body is None else body.by
     return ServedPoseOut.from_value(
         poses.accept_pose(session, state.queue, state.settings, camera_id, by)
+    )
+
+
+@router.post("/reference/reset")
+def reset(
+    camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
+) -> ServedPoseOut:
+    """Say that the camera is back at its prior pose: closes its alerts, learns it anew there."""
+    by = None if body is None else body.by
+    return ServedPoseOut.from_value(
+        poses.reset_reference(session, state.queue, state.settings, camera_id, by)
     )

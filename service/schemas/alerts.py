@@ -31,6 +31,7 @@ class AlertOut(BaseModel):
     kind: str
     state: str
     severity: str
+    reason: str
     drift: dict[str, Any]
     opened_at: datetime
     changed_at: datetime | None

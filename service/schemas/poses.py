@@ -11,6 +11,8 @@ from service.schemas.base import Body, Who
 from service.schemas.geometry import PoseOut
 from service.store.tables import EstimateRecord
 
+_FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg"}
+
 
 class AcceptBody(Body):
     """Who accepts the served pose as the new prior pose."""
@@ -18,21 +20,30 @@ class AcceptBody(Body):
     by: Who | None = None
 
 
-class SdOut(BaseModel):
-    """Standard deviations of what was estimated."""
+class ResetBody(Body):
+    """Who says that the camera is back at its prior pose."""
 
-    height_m: float
-    tilt_deg: float
-    roll_deg: float
+    by: Who | None = None
+
+
+class SdOut(BaseModel):
+    """Standard deviations of what was estimated; null where the tracks cannot tell."""
+
+    height_m: float | None
+    tilt_deg: float | None
+    roll_deg: float | None
 
 
 class DriftOut(BaseModel):
-    """Estimate against prior pose."""
+    """Estimate against prior pose; null where the tracks cannot tell.
 
-    height_m: float
-    tilt_deg: float
-    roll_deg: float
-    angle_deg: float
+    `angle_deg` is the whole rotation that the told angles make.
+    """
+
+    height_m: float | None
+    tilt_deg: float | None
+    roll_deg: float | None
+    angle_deg: float | None
 
 
 class ReferenceOut(BaseModel):
@@ -72,15 +83,15 @@ class ServedPoseOut(BaseModel):
             camera_id=view.camera_id,
             state=view.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[] if estimate is None else ["height_m", "tilt_deg", "roll_deg"],
+            estimated=[field for name, field in _FIELDS.items() if name in view.told],
             sd=None if estimate is None else sd_out(estimate),
             drift=None if estimate is None else drift_out(estimate),
             estimates={} if estimate is None else estimate.raw,
             reference=ReferenceOut(
-                state="learning",
-                tracks=min(view.stored_tracks, view.reference_wanted),
-                wanted=view.reference_wanted,
-                walking_speed_mps=None,
+                state="ready" if view.reference.ready else "learning",
+                tracks=view.reference.tracks,
+                wanted=view.reference.wanted,
+                walking_speed_mps=view.reference.walking_speed_mps,
             ),
             tracks=0 if estimate is None else estimate.tracks,
             from_=None if estimate is None else moment(estimate.from_s),
@@ -99,8 +110,8 @@ class HistoryPoint(BaseModel):
     height_m: float
     tilt_deg: float
     roll_deg: float
-    sd: SdOut
-    drift: DriftOut
+    sd: SdOut | None
+    drift: DriftOut | None
     tracks: int
     to: datetime
 
@@ -126,25 +137,34 @@ class History(BaseModel):
     items: list[HistoryPoint]
 
 
-def sd_out(record: EstimateRecord) -> SdOut:
-    """Standard deviations of a stored estimate."""
+def sd_out(record: EstimateRecord) -> SdOut | None:
+    """Standard deviations of what a stored estimate tells; None where it tells nothing."""
+    if not record.told:
+        return None
     return SdOut(
-        height_m=record.height_sd_m,
-        tilt_deg=math.degrees(record.tilt_sd_rad),
-        roll_deg=math.degrees(record.roll_sd_rad),
+        height_m=_if_told(record, "height", record.height_sd_m),
+        tilt_deg=_if_told(record, "tilt", math.degrees(record.tilt_sd_rad)),
+        roll_deg=_if_told(record, "roll", math.degrees(record.roll_sd_rad)),
     )
 
 
-def drift_out(record: EstimateRecord) -> DriftOut:
-    """Drift of a stored estimate."""
+def drift_out(record: EstimateRecord) -> DriftOut | None:
+    """Drift of what a stored estimate tells; None where it tells nothing."""
+    if not record.told:
+        return None
+    turned = {"tilt", "roll"} & set(record.told)
     return DriftOut(
-        height_m=record.drift_height_m,
-        tilt_deg=math.degrees(record.drift_tilt_rad),
-        roll_deg=math.degrees(record.drift_roll_rad),
-        angle_deg=math.degrees(record.drift_angle_rad),
+        height_m=_if_told(record, "height", record.drift_height_m),
+        tilt_deg=_if_told(record, "tilt", math.degrees(record.drift_tilt_rad)),
+        roll_deg=_if_told(record, "roll", math.degrees(record.drift_roll_rad)),
+        angle_deg=math.degrees(record.drift_angle_rad) if turned else None,
     )
 
 
 def moment(seconds: float) -> datetime:
     """The aware UTC time of seconds since the epoch."""
     return datetime.fromtimestamp(seconds, UTC)
+
+
+def _if_told(record: EstimateRecord, name: str, value: float) -> float | None:
+    return value if name in record.told else None

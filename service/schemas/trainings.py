@@ -1,5 +1,6 @@
 """Bodies of trainings."""
 
+import math
 from datetime import datetime
 from typing import Any, Literal, Self
 
@@ -25,6 +26,14 @@ class ProgressOut(BaseModel):
     eta_s: float | None
 
 
+class CentreOut(BaseModel):
+    """The pose that a training is centred on, where it is not the prior pose."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+
+
 class TrainingOut(BaseModel):
     """A training."""
 
@@ -33,6 +42,7 @@ class TrainingOut(BaseModel):
     state: str
     recipe: str
     seed: int
+    around: CentreOut | None
     progress: ProgressOut
     queued_at: datetime
     started_at: datetime | None
@@ -49,6 +59,13 @@ class TrainingOut(BaseModel):
             state=record.state,
             recipe=record.recipe,
             seed=record.seed,
+            around=None
+            if record.around is None
+            else CentreOut(
+                height_m=record.around["height_m"],
+                tilt_deg=math.degrees(record.around["tilt_rad"]),
+                roll_deg=math.degrees(record.around["roll_rad"]),
+            ),
             progress=ProgressOut(
                 step=record.step, steps=record.steps, loss=record.loss, eta_s=record.eta_s
             ),

@@ -1,10 +1,13 @@
 """Arrays as bytes, and records as the values of `models/`."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
 from service.store.tables import CameraRecord, PriorPoseRecord, TrackRecord
 
@@ -23,6 +26,14 @@ def trajectory_of(record: TrackRecord) -> Trajectory:
     """The foot points of a stored track."""
     points = unpack(record.points, 3)
     return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+
+
+def seen_of(record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
+    """The foot points of a stored track, and the upper edges of its boxes where it has them."""
+    feet = trajectory_of(record)
+    if record.boxes is None:
+        return feet
+    return replace(feet, top_v=tops_of_boxes(intrinsics, unpack(record.boxes, 4)))
 
 
 def intrinsics_of(record: CameraRecord) -> Intrinsics:

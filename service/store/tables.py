@@ -50,7 +50,12 @@ class Record(DeclarativeBase):
     """Base of all records."""
 
     metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = {datetime: UtcDateTime, dict[str, Any]: JSON, list[float]: JSON}
+    type_annotation_map = {
+        datetime: UtcDateTime,
+        dict[str, Any]: JSON,
+        list[float]: JSON,
+        list[str]: JSON,
+    }
 
 
 def _camera_key() -> Any:
@@ -58,7 +63,10 @@ def _camera_key() -> Any:
 
 
 class CameraRecord(Record):
-    """A registered camera. `estimate_due_at` is set while tracks wait to be looked at."""
+    """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
+
+    `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
+    """
 
     __tablename__ = "cameras"
 
@@ -77,6 +85,7 @@ class CameraRecord(Record):
     reference_tracks: Mapped[int]
     version: Mapped[int]
     estimate_due_at: Mapped[datetime | None]
+    looked_at_pk: Mapped[int | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
@@ -97,6 +106,38 @@ class PriorPoseRecord(Record):
     origin: Mapped[str]  # registered, changed, accepted
     trusted_by: Mapped[str | None]
     created_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "id"),)
+
+
+class SiteReferenceRecord(Record):
+    """What estimators say while a camera is known to be at its prior pose; the newest counts.
+
+    It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
+    is unset. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
+    Later, `window_from_s` is when the first track after the newest change of the camera ended, and
+    `changed_s` when it started.
+    """
+
+    __tablename__ = "site_references"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = _camera_key()
+    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    origin: Mapped[str]  # registered, changed, accepted, reset
+    requested_by: Mapped[str | None]
+    from_s: Mapped[float | None]
+    to_s: Mapped[float | None]
+    wanted: Mapped[int]
+    tracks: Mapped[int]
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    walking_speed_mps: Mapped[float | None]
+    offsets: Mapped[dict[str, Any] | None]
+    doubt: Mapped[str]
+    window_from_s: Mapped[float | None]
+    changed_s: Mapped[float | None]
+    created_at: Mapped[datetime]
+    ready_at: Mapped[datetime | None]
 
     __table_args__ = (Index(None, "camera_id", "id"),)
 
@@ -123,7 +164,10 @@ class TrackRecord(Record):
 
 
 class TrainingRecord(Record):
-    """One training run; `attempt` grows each time a worker takes it up."""
+    """One training run; `attempt` grows each time a worker takes it up.
+
+    `around` has the height, tilt and roll that it is centred on, where these are not the prior's.
+    """
 
     __tablename__ = "trainings"
 
@@ -131,6 +175,7 @@ class TrainingRecord(Record):
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
     recipe: Mapped[str]
+    around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
     state: Mapped[str]  # queued, running, succeeded, failed, cancelled
     attempt: Mapped[int]
@@ -189,16 +234,25 @@ class PredictionRecord(Record):
 
 
 class EstimateRecord(Record):
-    """The served estimate at one time; `raw` has each estimator's own answer."""
+    """The served pose at one time, and what is behind it.
+
+    Height, tilt and roll are the served ones: the prior's where the tracks cannot tell. Drifts and
+    standard deviations are the estimator's for all three; `told` names those that count. `raw` has
+    each estimator's own answer. `model_id` is of the averaged estimate beside the served one.
+    """
 
     __tablename__ = "estimates"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    model_id: Mapped[str] = mapped_column(ForeignKey("models.id", ondelete="CASCADE"))
+    model_id: Mapped[str | None] = mapped_column(ForeignKey("models.id", ondelete="SET NULL"))
     prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    state: Mapped[str]  # ok, drifting, out_of_range
+    reference_id: Mapped[int | None] = mapped_column(
+        ForeignKey("site_references.id", ondelete="CASCADE")
+    )
+    state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]
+    told: Mapped[list[str]]  # of tilt, roll, height
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
     roll_rad: Mapped[float]
@@ -210,6 +264,7 @@ class EstimateRecord(Record):
     drift_roll_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
     drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
+    drifted: Mapped[list[str]]  # of tilt, roll, height: what has been beyond since it began
     drift_since: Mapped[datetime | None]
     raw: Mapped[dict[str, Any]]
     tracks: Mapped[int]
@@ -222,7 +277,10 @@ class EstimateRecord(Record):
 
 
 class AlertRecord(Record):
-    """An alert; at most one of a camera and kind is firing."""
+    """An alert; at most one of a camera and kind is firing.
+
+    `source` tells whether an estimate fired it, which then ends it too, or the reference.
+    """
 
     __tablename__ = "alerts"
 
@@ -230,7 +288,9 @@ class AlertRecord(Record):
     camera_id: Mapped[str] = _camera_key()
     kind: Mapped[str]  # drift, no_data, out_of_range, clock
     state: Mapped[str]  # firing, resolved
+    source: Mapped[str]  # estimate, reference
     severity: Mapped[str]  # warning, critical
+    reason: Mapped[str]
     drift: Mapped[dict[str, Any]]
     opened_at: Mapped[datetime]
     changed_at: Mapped[datetime | None]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import ColumnElement, Select, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -12,15 +12,19 @@ from service.store.tables import PredictionRecord, TrackRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrackWindow:
-    """The newest tracks of a camera by their own times."""
+class WindowBounds:
+    """The newest so many tracks of a camera within so many days of its newest, by their own times.
 
+    Only those count that started at or after `started_from_s`, ended after `ended_after_s` and at
+    or after `ended_from_s`; None is no bound.
+    """
+
+    camera_id: str
     tracks: int
-    from_s: float
-    to_s: float
-    newest_pk: int
-    # The camera's own clock, not ours: what is older than this is outside the window.
-    oldest_end_s: float
+    days: float
+    started_from_s: float | None = None
+    ended_after_s: float | None = None
+    ended_from_s: float | None = None
 
 
 def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
@@ -45,29 +49,44 @@ def newest_end_s(session: Session, camera_id: str) -> float | None:
     )
 
 
-def window(session: Session, camera_id: str, tracks: int, days: float) -> TrackWindow | None:
-    """The newest so many tracks that ended within so many days of the newest; None without any."""
-    newest = newest_end_s(session, camera_id)
-    if newest is None:
-        return None
-    inner = (
-        select(TrackRecord.id, TrackRecord.started_s, TrackRecord.ended_s)
-        .where(TrackRecord.camera_id == camera_id, TrackRecord.ended_s >= newest - days * 86_400)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(tracks)
-        .subquery()
+def newest_pk(session: Session, camera_id: str) -> int | None:
+    """The track that was stored last."""
+    return session.scalar(
+        select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == camera_id)
     )
-    row = session.execute(
-        select(
-            func.count(),
-            func.min(inner.c.started_s),
-            func.max(inner.c.id),
-            func.min(inner.c.ended_s),
-        ).select_from(inner)
-    ).one()
-    return TrackWindow(
-        tracks=row[0], from_s=row[1], to_s=newest, newest_pk=row[2], oldest_end_s=row[3]
-    )
+
+
+def window(session: Session, bounds: WindowBounds) -> Sequence[TrackRecord]:
+    """The tracks of a window in the order of their ends."""
+    return session.scalars(
+        select(TrackRecord)
+        .where(TrackRecord.id.in_(_window_ids(session, bounds)))
+        .order_by(TrackRecord.ended_s, TrackRecord.id)
+    ).all()
+
+
+def count_from(session: Session, camera_id: str, started_from_s: float | None) -> int:
+    """How many tracks started at or after a time."""
+    query = select(func.count()).select_from(TrackRecord)
+    return session.scalar(query.where(*_started_from(camera_id, started_from_s))) or 0
+
+
+def count_window(session: Session, bounds: WindowBounds) -> int:
+    """How many tracks are in a window."""
+    query = select(func.count()).select_from(_window_ids(session, bounds).subquery())
+    return session.scalar(query) or 0
+
+
+def first(
+    session: Session, camera_id: str, started_from_s: float | None, limit: int
+) -> Sequence[TrackRecord]:
+    """The first tracks by their ends, of those that started at or after a time."""
+    return session.scalars(
+        select(TrackRecord)
+        .where(*_started_from(camera_id, started_from_s))
+        .order_by(TrackRecord.ended_s, TrackRecord.id)
+        .limit(limit)
+    ).all()
 
 
 def newest(session: Session, camera_id: str, limit: int) -> Sequence[TrackRecord]:
@@ -81,9 +100,9 @@ def newest(session: Session, camera_id: str, limit: int) -> Sequence[TrackRecord
 
 
 def without_prediction(
-    session: Session, camera_id: str, model_id: str, window: TrackWindow, limit: int
+    session: Session, bounds: WindowBounds, model_id: str, limit: int
 ) -> Sequence[TrackRecord]:
-    """Tracks of the window that the model has not looked at."""
+    """Tracks of the window that the model has not looked at, newest first."""
     return session.scalars(
         select(TrackRecord)
         .outerjoin(
@@ -91,8 +110,7 @@ def without_prediction(
             (PredictionRecord.track_pk == TrackRecord.id) & (PredictionRecord.model_id == model_id),
         )
         .where(
-            TrackRecord.camera_id == camera_id,
-            TrackRecord.ended_s >= window.oldest_end_s,
+            TrackRecord.id.in_(_window_ids(session, bounds)),
             PredictionRecord.track_pk.is_(None),
         )
         .order_by(TrackRecord.ended_s.desc())
@@ -107,20 +125,18 @@ def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def predictions(
-    session: Session, camera_id: str, model_id: str, window: TrackWindow
+    session: Session, model_id: str, track_pks: Sequence[int]
 ) -> Sequence[PredictionRecord]:
-    """What the model says of the window's tracks, of those that gave it something to say."""
+    """What the model says of some tracks, newest first, of those that gave it something to say."""
     return session.scalars(
         select(PredictionRecord)
         .join(TrackRecord, PredictionRecord.track_pk == TrackRecord.id)
         .where(
             PredictionRecord.model_id == model_id,
             PredictionRecord.windows > 0,
-            TrackRecord.camera_id == camera_id,
-            TrackRecord.ended_s >= window.oldest_end_s,
+            PredictionRecord.track_pk.in_(track_pks),
         )
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(window.tracks)
     ).all()
 
 
@@ -144,3 +160,26 @@ def forget(session: Session, camera_id: str, before_s: float, keep: int) -> int:
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     """Those of the given tracks that are still stored."""
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
+
+
+def _started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
+    conditions: list[ColumnElement[bool]] = [TrackRecord.camera_id == camera_id]
+    if started_from_s is not None:
+        conditions.append(TrackRecord.started_s >= started_from_s)
+    return conditions
+
+
+def _window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
+    inside = _started_from(bounds.camera_id, bounds.started_from_s)
+    if bounds.ended_after_s is not None:
+        inside.append(TrackRecord.ended_s > bounds.ended_after_s)
+    if bounds.ended_from_s is not None:
+        inside.append(TrackRecord.ended_s >= bounds.ended_from_s)
+    # The camera's own clock, not ours.
+    newest = session.scalar(select(func.max(TrackRecord.ended_s)).where(*inside)) or 0.0
+    return (
+        select(TrackRecord.id)
+        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * 86_400)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(bounds.tracks)
+    )

@@ -1,69 +1,96 @@
 import math
-from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from models.drift.verdict import DriftLimits, drift_between, judge
-from models.estimation.averaged import PoseEstimate
+from models.drift.clock import clock_fault
+from models.drift.verdict import DriftLimits, drift_between, judge, pose_after
 from models.geometry.pose import CameraPose
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
 LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, updates=3, clear_ratio=0.7)
-STILL = PoseEstimate(
-    height_m=6.0,
-    tilt_rad=0.4,
-    roll_rad=math.radians(179),
-    heading_rad=2.0,
-    height_sd_m=0.01,
-    tilt_sd_rad=0.001,
-    roll_sd_rad=0.001,
-    tracks=100,
-)
 
 
-def verdicts(estimates, drifting=False):
+def drift(tilt_deg=0.0, roll_deg=0.0, height_m=6.0, *, sd_deg=0.05, sd_log=0.002, weak=()):
+    """An estimate that is so far from the prior pose."""
+    moved = [math.radians(tilt_deg), math.radians(roll_deg)]
+    values = np.array([PRIOR.tilt_rad + moved[0], PRIOR.roll_rad + moved[1], math.log(height_m)])
+    sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
+    return drift_between(values, np.diag(sd**2), weak, PRIOR)
+
+
+def verdicts(drifts, drifted=()):
     streak, out = 0, []
-    for estimate in estimates:
-        verdict = judge(drift_between(estimate, PRIOR), estimate, LIMITS, streak, drifting)
-        streak, drifting = verdict.streak, verdict.drifting
-        out.append(drifting)
+    for one in drifts:
+        verdict = judge(one, LIMITS, streak, drifted)
+        streak, drifted = verdict.streak, verdict.drifted
+        out.append(verdict.drifting)
     return out
 
 
-def tilted(degrees, sd_deg=0.05):
-    return replace(STILL, tilt_rad=0.4 + math.radians(degrees), tilt_sd_rad=math.radians(sd_deg))
-
-
 def test_drift_is_signed_and_roll_goes_round():
-    moved = replace(STILL, tilt_rad=0.3, roll_rad=math.radians(-178), height_m=5.0)
-    drift = drift_between(moved, PRIOR)
-    assert drift.height_m == -1.0
-    assert drift.tilt_rad == pytest.approx(-0.1)
-    assert drift.roll_rad == pytest.approx(math.radians(3))
-    assert drift.angle_rad == pytest.approx(math.hypot(0.1, math.radians(3)), rel=0.01)
+    values = np.array([0.3, math.radians(-178), math.log(5.0)])
+    found = drift_between(values, np.eye(3) * 1e-6, (), PRIOR)
+    assert found.height_m == pytest.approx(-1.0)
+    assert found.log_height == pytest.approx(math.log(5 / 6))
+    assert found.tilt_rad == pytest.approx(-0.1)
+    assert found.roll_rad == pytest.approx(math.radians(3))
+    assert found.angle_rad == pytest.approx(math.hypot(0.1, math.radians(3)), rel=0.01)
+    assert found.height_sd_m == pytest.approx(5e-3)
 
 
-def test_the_heading_of_an_estimate_is_no_drift():
-    assert drift_between(replace(STILL, heading_rad=1.0), PRIOR).angle_rad == pytest.approx(0)
+def test_what_is_not_told_stays_the_priors():
+    found = drift(5.0, 3.0, 7.0, weak=("tilt", "height"))
+    assert found.told == ("roll",)
+    served = pose_after(found, PRIOR)
+    assert (served.tilt_rad, served.height_m) == (PRIOR.tilt_rad, PRIOR.height_m)
+    assert found.angle_rad == pytest.approx(math.radians(3))
+    assert served.heading_rad == PRIOR.heading_rad
 
 
 def test_a_single_update_beyond_the_limits_is_no_drift():
-    assert verdicts([tilted(5), STILL, tilted(5), tilted(5), STILL]) == [False] * 5
+    assert verdicts([drift(5), drift(), drift(5), drift(5), drift()]) == [False] * 5
 
 
 def test_three_in_a_row_are():
-    assert verdicts([tilted(5)] * 4) == [False, False, True, True]
-    assert verdicts([tilted(-5)] * 3)[-1]
-    assert verdicts([replace(STILL, height_m=5.4)] * 3)[-1]
+    assert verdicts([drift(5)] * 4) == [False, False, True, True]
+    assert verdicts([drift(-5)] * 3)[-1]
+    assert verdicts([drift(height_m=5.4)] * 3)[-1]
 
 
 def test_the_larger_of_floor_and_sd_counts():
-    assert not any(verdicts([tilted(1.9)] * 5))
-    assert not any(verdicts([tilted(5, sd_deg=1.5)] * 5))
-    assert verdicts([tilted(6.1, sd_deg=1.5)] * 3)[-1]
+    assert not any(verdicts([drift(1.9)] * 5))
+    assert not any(verdicts([drift(5, sd_deg=1.5)] * 5))
+    assert verdicts([drift(6.1, sd_deg=1.5)] * 3)[-1]
 
 
 def test_it_clears_below_a_share_of_the_limits_only():
-    assert verdicts([tilted(1.7)] * 6, drifting=True) == [True] * 6
-    assert verdicts([tilted(1.3)] * 3, drifting=True) == [True, True, False]
-    assert verdicts([tilted(1.3), tilted(1.7), tilted(1.3), tilted(1.3)], drifting=True)[-1]
+    assert verdicts([drift(1.7)] * 6, ("tilt",)) == [True] * 6
+    assert verdicts([drift(1.3)] * 3, ("tilt",)) == [True, True, False]
+    assert verdicts([drift(1.3), drift(1.7), drift(1.3), drift(1.3)], ("tilt",))[-1]
+
+
+def test_an_update_that_tells_nothing_changes_nothing():
+    nothing = drift(5, weak=("tilt", "roll", "height"))
+    assert verdicts([drift(5), nothing, drift(5), nothing, drift(5)]) == [False] * 4 + [True]
+    assert verdicts([nothing] * 5, ("tilt",)) == [True] * 5
+
+
+def test_what_drifted_has_to_be_told_to_end():
+    assert verdicts([drift(weak=("tilt",))] * 5, ("tilt",)) == [True] * 5
+    assert verdicts([drift(weak=("roll",))] * 3, ("tilt",)) == [True, True, False]
+
+
+def test_a_clock_fault_is_a_jump_in_scale_alone():
+    words = clock_fault(drift(height_m=7.2), 25.0)
+    assert "+20 %" in words
+    assert "30 frames a second were taken for 25" in words
+    assert "lowered" in clock_fault(drift(height_m=5.0), None)
+    for found in (
+        drift(height_m=6.4),  # 7 %: under the least
+        drift(height_m=7.2, sd_log=0.05),  # within its deviation
+        drift(0.2, height_m=7.2),  # turned, by four deviations
+        drift(1.1, height_m=7.2, sd_deg=2),  # turned, by more than a degree
+        drift(height_m=7.2, weak=("roll",)),  # may have turned
+    ):
+        assert clock_fault(found, 25.0) is None

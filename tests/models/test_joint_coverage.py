@@ -37,4 +37,5 @@ def test_intervals_cover_and_errors_fall_as_their_bound_does():
     assert 0.84 < np.mean(np.abs(errors) < 1.645 * sds) < 0.99
     few_rms, many_rms = np.sqrt((errors**2).mean(axis=0))
     assert (many_rms / few_rms < 0.8).all()  # a half, were the site known exactly
-    assert (many_rms / np.sqrt((bounds[:, 1] ** 2).mean(axis=0)) < 1.6).all()
+    # Normal speeds under a Student-t scatter a fifth more than its curvature says.
+    assert (many_rms / np.sqrt((bounds[:, 1] ** 2).mean(axis=0)) < 1.8).all()

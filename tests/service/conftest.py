@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.settings import Settings
 from tests.conftest import CAMERA
+from tests.service.bench import Bench
 
 
 @pytest.fixture
@@ -22,6 +23,12 @@ def corner(http: TestClient) -> TestClient:
     """The same, with the camera `corner` registered."""
     assert http.post("/cameras", json=CAMERA).status_code == 201
     return http
+
+
+@pytest.fixture
+def bench(corner: TestClient, settings: Settings) -> Bench:
+    """The camera `corner` with a reference, and estimates that a test makes up."""
+    return Bench(corner, settings.model_copy(update={"window_tracks": 20}))
 
 
 def problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:

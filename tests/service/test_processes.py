@@ -41,10 +41,13 @@ def test_tracks_in_pose_out_and_a_clean_stop(service):
     assert receipt["accepted"] == 30
     wait_for(lambda: states(service) == ["succeeded"])
     body = wait_for(
-        lambda: (b := service.http.get("/cameras/corner/pose").json())["estimated"] and b
+        lambda: (
+            "averaged" in (b := service.http.get("/cameras/corner/pose").json())["estimates"] and b
+        )
     )
     assert body["tracks"] == 30
-    assert body["estimates"]["averaged"]["tracks"] == 30
+    assert {body["estimates"][name]["tracks"] for name in ("averaged", "joint")} == {30}
+    assert body["reason"] == "30 of 200 reference tracks"
     training = service.http.get("/cameras/corner/trainings").json()["items"][0]
     assert training["progress"]["step"] == training["progress"]["steps"] > 0
     assert training["metrics"]["walks"] > 1000
@@ -104,8 +107,8 @@ def test_the_api_killed_after_202_has_the_tracks_and_ends_its_workers(service):
     assert service.http.get("/cameras/corner").json()["tracks"] == 25
     again = service.http.post("/cameras/corner/tracks", json=batch).json()
     assert (again["accepted"], again["duplicates"]) == (0, 25)
-    wait_for(lambda: service.http.get("/cameras/corner/pose").json()["estimated"])
-    assert states(service) == ["succeeded"]
+    wait_for(lambda: service.http.get("/cameras/corner/pose").json()["tracks"] == 25)
+    wait_for(lambda: states(service) == ["succeeded"])
 
 
 def test_a_running_training_is_cancelled_and_a_queued_one_too(service):

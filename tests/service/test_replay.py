@@ -35,9 +35,9 @@ def surefoot(*arguments: str) -> str:
     return done.stdout
 
 
-def pose_of(service):
-    body = service.http.get("/cameras/town-centre/pose").json()
-    return body if body["estimated"] else None
+def averaged_of(service):
+    """What the averaged estimator says, while the reference is being learned."""
+    return service.http.get("/cameras/town-centre/pose").json()["estimates"].get("averaged")
 
 
 def test_a_replay_through_http_is_the_offline_evaluation(service):
@@ -45,24 +45,12 @@ def test_a_replay_through_http_is_the_offline_evaluation(service):
     service.start_again(epochs=3)
     output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
     assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
-    body = wait_for(lambda: pose_of(service), timeout_s=180)
+    served = wait_for(lambda: averaged_of(service), timeout_s=180)
     offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=3)
-    served = body["estimates"]["averaged"]
     assert served["tracks"] == offline.tracks
     assert served["height_m"] == pytest.approx(offline.height_m, abs=1e-4)
     assert served["tilt_deg"] == pytest.approx(offline.tilt_deg, abs=1e-3)
     assert served["roll_deg"] == pytest.approx(offline.roll_deg, abs=1e-3)
-
-
-def test_a_knocked_replay_moves_the_pose_and_fires(service):
-    """The default recipe, trained for a third of its epochs, on real people."""
-    service.start_again(epochs=3, drift_updates=1)
-    surefoot("replay", str(SCENES / "town_centre"), "--url", service.url, "--knock", "6,0,0")
-    body = wait_for(lambda: pose_of(service), timeout_s=180)
-    assert body["state"] == "drifting"
-    assert 3 < body["drift"]["tilt_deg"] < 9
-    (alert,) = service.http.get("/alerts", params={"state": "firing"}).json()["items"]
-    assert alert["kind"] == "drift"
 
 
 def test_every_recorded_camera_can_be_loaded():

@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -10,6 +11,7 @@ from models.geometry.pose import CameraPose
 from service.formats.track import Batch, Clock, read_track
 from service.recalibration import upkeep
 from service.recalibration.cameras import add_prior_pose
+from service.recalibration.looking import begin_look, end_look
 from service.recalibration.tracks import receive_tracks
 from service.recalibration.trainings import (
     begin_training,
@@ -22,6 +24,7 @@ from service.recalibration.trainings import (
 from service.store import events, tracks, trainings, workers
 from service.store.database import Store
 from service.store.tables import CameraRecord, TrackRecord
+from service.store.tracks import WindowBounds
 from tests.conftest import track
 
 
@@ -97,16 +100,26 @@ def test_a_model_older_than_the_prior_pose_is_replaced_and_used_meanwhile(sessio
     assert trainings.newest_model(session, "corner").id == model.id
 
 
-def test_tracks_without_a_prediction_are_looked_at(session, queue, settings):
-    publish(session, queue, settings)
+def test_tracks_that_nothing_has_looked_at_are_looked_at(session, queue, settings):
     put_tracks(session, 5)
     camera = session.get_one(CameraRecord, "corner")
     camera.estimate_due_at = None  # the nudge of the post was lost
-    queue.estimates.clear()
     found = upkeep.reconcile_camera(session, queue, settings, "corner")
-    assert found == ["tracks without a prediction"]
+    assert found == ["tracks that nothing has looked at"]
     assert queue.estimates == ["corner"]
     assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+    end_look(session, "corner", begin_look(session, "corner"))
+    assert upkeep.reconcile_camera(session, queue, settings, "corner") == []
+
+
+def test_tracks_that_the_model_in_use_has_not_looked_at_are_looked_at(session, queue, settings):
+    put_tracks(session, 5)
+    publish(session, queue, settings)
+    end_look(session, "corner", begin_look(session, "corner"))  # by an older model, or none
+    queue.estimates.clear()
+    found = upkeep.reconcile_camera(session, queue, settings, "corner")
+    assert found == ["tracks that nothing has looked at"]
+    assert queue.estimates == ["corner"]
 
 
 def test_many_posts_ask_for_one_estimate(session, queue, settings):
@@ -194,7 +207,20 @@ def test_the_window_is_the_newest_tracks_by_their_own_times(session):
     now = time.time()
     put_tracks(session, 5, start_s=now - 20 * 86_400)
     put_tracks(session, 6, start_s=now - 3600, first=50)
-    window = tracks.window(session, "corner", 400, 7.0)
-    assert window.tracks == 6
-    assert window.to_s - window.from_s == pytest.approx(5 + 0.4 * 19)
-    assert tracks.window(session, "corner", 4, 7.0).tracks == 4
+    window = tracks.window(session, WindowBounds(camera_id="corner", tracks=400, days=7.0))
+    assert len(window) == 6
+    assert window[-1].ended_s - window[0].started_s == pytest.approx(5 + 0.4 * 19)
+    newest = tracks.window(session, WindowBounds(camera_id="corner", tracks=4, days=7.0))
+    assert [record.track_id for record in newest] == ["52", "53", "54", "55"]
+
+
+def test_the_window_leaves_out_what_is_before_its_bounds(session):
+    start_s = 1_700_000_000.0
+    put_tracks(session, 10, start_s=start_s)  # one second apart, each 7.6 s long
+    bounds = WindowBounds(camera_id="corner", tracks=400, days=7.0)
+    for change, first in (
+        ({"started_from_s": start_s + 3}, "3"),
+        ({"ended_after_s": start_s + 3 + 7.6}, "4"),
+        ({"ended_from_s": start_s + 3 + 7.6}, "3"),
+    ):
+        assert tracks.window(session, replace(bounds, **change))[0].track_id == first

@@ -30,7 +30,7 @@ class JointEstimate:
     `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
     tell; `reason` says it in words and is empty where they tell all. `walkers` is the number of
     tracks that were used, `parties` that of people or groups who walked independently. `bound`
-    (3, 3) is the covariance by the curvature of the likelihood alone, its Cramer-Rao bound.
+    (3, 3) is the Cramer-Rao bound of the likelihood.
     """
 
     values: Array
@@ -73,7 +73,7 @@ def joint_estimate(
         values=best.candidate - reference.offset,
         covariance=covariance,
         raw=best.candidate,
-        bound=best.covariance,
+        bound=best.bound,
         walkers=observations.walkers,
         parties=parties,
         weak=weak,

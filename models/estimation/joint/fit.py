@@ -7,6 +7,7 @@ import numpy as np
 
 from models.estimation.joint.field import Field
 from models.estimation.joint.hierarchy import (
+    FISHER,
     Curvature,
     Spread,
     Weights,
@@ -17,7 +18,7 @@ from models.estimation.joint.hierarchy import (
     track_curvatures,
 )
 from models.estimation.joint.measures import Measured
-from models.estimation.joint.observations import Rows
+from models.estimation.joint.sway import faked, honest_covariance
 from models.geometry.rotation import Array
 
 _MOST_ROUNDS = 40
@@ -58,13 +59,15 @@ class PosePrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature.
+    """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
-    `score` compares ends of different starts: goodness, less the prior's penalty.
+    `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao). `score`
+    compares ends of different starts: goodness, less the prior's penalty.
     """
 
     candidate: Array
     covariance: Array
+    bound: Array
     score: float
 
 
@@ -123,15 +126,19 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
         # Given the pose, the fields are independent: each is eliminated by itself.
         matrix = pose_precision.copy()
         gradient = pose_precision @ (candidate - prior.mean)
+        noise = np.zeros((3, 3))
         solved = []
         for channel, mean, precision in zip(channels, means, precisions, strict=True):
-            sums = curvature(*_linear(channel, candidate, mean))
+            measured, jacobian, residual, weights = _linear(channel, candidate, mean)
+            spread = channel.learned.spread
+            sums = curvature(jacobian, residual, weights, measured.rows, spread)
             own = sums.matrix[3:, 3:] + precision
             own_gradient = sums.gradient[3:] + precision @ (mean - channel.learned.mean)
             cross = sums.matrix[:3, 3:]
             both = np.linalg.solve(own, np.column_stack([cross.T, own_gradient]))
             matrix += sums.matrix[:3, :3] - cross @ both[:, :3]
             gradient += sums.gradient[:3] - cross @ both[:, 3]
+            noise += faked(measured, weights, spread)
             solved.append(both)
         move = -np.linalg.solve(matrix, gradient)
         share = min(1.0, 1 / max(float((np.abs(move) / _LONGEST_MOVE).max()), 1e-12))
@@ -145,15 +152,22 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
     score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):
         score += float(_goodness(channel, candidate, mean).sum())
-    return Fit(candidate=candidate, covariance=np.asarray(np.linalg.inv(matrix)), score=score)
+    return Fit(
+        candidate=candidate,
+        covariance=honest_covariance(matrix, noise),
+        bound=FISHER * np.asarray(np.linalg.inv(matrix)),
+        score=score,
+    )
 
 
 def per_track(channels: Sequence[Channel], candidate: Array) -> Curvature:
     """Each track's own sums (N, 3, 3) and (N, 3) for tilt, roll, log height at a candidate."""
     each = []
     for channel in channels:
-        linear = _linear(channel, candidate, channel.learned.mean)
-        each.append(track_curvatures(linear[0][:, :3], *linear[1:]))
+        learned = channel.learned
+        measured, jacobian, residual, weights = _linear(channel, candidate, learned.mean)
+        by_pose = jacobian[:, :3]
+        each.append(track_curvatures(by_pose, residual, weights, measured.rows, learned.spread))
     return Curvature(
         matrix=np.sum([sums.matrix for sums in each], axis=0),
         gradient=np.sum([sums.gradient for sums in each], axis=0),
@@ -168,8 +182,8 @@ def track_goodness(channels: Sequence[Channel], candidate: Array) -> Array:
 
 def _linear(
     channel: Channel, candidate: Array, mean: Array
-) -> tuple[Array, Array, Weights, Rows, Spread]:
-    """Derivatives (M, 3 + P), residuals (M,) and what weighs them, at a candidate."""
+) -> tuple[Measured, Array, Array, Weights]:
+    """What is measured at a candidate, derivatives (M, 3 + P), residuals (M,) and weights."""
     measured = channel.measure(candidate)
     learned = channel.learned
     features = learned.field.features(measured)
@@ -177,7 +191,7 @@ def _linear(
     weights = reweigh(residual, measured.value, measured.valid, measured.rows, learned.spread)
     by_pose = measured.d_value - learned.field.slopes(measured, features, mean)
     jacobian = np.concatenate([by_pose, -features], axis=1)
-    return jacobian, residual, weights, measured.rows, learned.spread
+    return measured, jacobian, residual, weights
 
 
 def _goodness(channel: Channel, candidate: Array, mean: Array) -> Array:

@@ -17,6 +17,9 @@ from models.estimation.joint.observations import Rows
 from models.geometry.rotation import Array, Mask
 
 _FREEDOM = 4.0  # of both Student-t
+# The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
+# average, say 1.
+FISHER = (_FREEDOM + 3) / (_FREEDOM + 1)
 _OTHER_CLIP = 30.0
 _SHARE_WEIGHT = 2.0  # rows that the site's share counts for in a track's own
 _SHARE_ROUNDS = 4

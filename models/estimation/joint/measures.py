@@ -21,9 +21,10 @@ class Measured:
     """M logarithms at one candidate pose, where they were measured, and derivatives.
 
     `value` (M,) is a log speed (m/s) or log stature (m); `place` (M, 2); `direction` (M, 2) unit
-    vectors of the walk around a step, none for statures; `valid` (M,): below the horizon.
+    vectors of the walk, none for statures; `valid` (M,): below the horizon.
     `d_value` (M, 3), `d_place` and `d_direction` (M, 2, 3) are derivatives by tilt, roll, log
-    height. What is not valid is 0.
+    height. What is not valid is 0. `d_sway` (M, 3) is how much `d_value` changes when the
+    direction is off by one standard deviation of its noise.
     """
 
     value: Array
@@ -33,28 +34,32 @@ class Measured:
     d_value: Array
     d_place: Array
     d_direction: Array | None
+    d_sway: Array
     rows: Rows
 
 
 def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measured:
     """Log speeds of steps: the distance on the ground between both ends over the time.
 
-    Directions are those of the longer chord around a step, and a log speed's derivative is that of
-    a short step there: uᵀ∇F u for the direction u and the flow F of the ground points under a turn.
-    Of the step's own ends the derivative would share their noise: a step that noise makes longer
-    would seem to depend more on the pose, and many tracks would agree on a wrong one.
+    The derivative is that of a short step in the middle: uᵀ∇F u for its direction u and the flow F
+    of ground points under a turn. Of the very ends it would share their noise: a step that noise
+    makes longer would seem to depend more on the pose, and many tracks would agree on a wrong one.
     """
     height_m = float(np.exp(candidate[2]))
     rotation, turns = _rotation_and_turns(candidate, heading_rad)
-    nodes, below = _ground(steps.node_rays, rotation)
-    start, end = steps.ends.T
-    first, last = steps.chord.T
-    valid = below[start] & below[end] & below[first] & below[last]
-    length = np.hypot(height_m * _norm(nodes[end] - nodes[start]), _LEAST_STEP_M)
-    chord = nodes[last] - nodes[first]
-    direction = chord / np.maximum(_norm(chord), 1e-9)[:, None]
-    place = (nodes[start] + nodes[end]) / 2
-    toward = (direction * place).sum(axis=1)
+    start, start_valid = _ground(steps.start_rays, rotation)
+    end, end_valid = _ground(steps.end_rays, rotation)
+    valid = start_valid & end_valid
+    across = end - start
+    length = _norm(across)
+    direction = across / np.maximum(length, 1e-12)[:, None]
+    place = (start + end) / 2
+    aside = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+    swayed, swayed_valid = _ground(steps.swayed_rays, rotation)
+    off = np.where(swayed_valid, ((swayed - end) * aside).sum(axis=1), 0.0)
+    turned = off / np.maximum(length / 2, 1e-12)
+    toward, beside = (direction * place).sum(axis=1), (aside * place).sum(axis=1)
+    d_sway = np.zeros((len(place), 3))
     d_value = np.ones((len(place), 3))
     d_place = np.empty((len(place), 2, 3))
     d_direction = np.zeros((len(place), 2, 3))
@@ -62,18 +67,22 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
         d_place[:, :, number], fall = _flow(place, turn)
         along = direction @ turn[:2, 2]
         d_value[:, number] = fall + toward * along
+        d_sway[:, number] = turned * (beside * along + toward * (aside @ turn[:2, 2]))
         bent = direction @ turn[:2, :2] + place * along[:, None]
         across = (bent * direction).sum(axis=1)
         d_direction[:, :, number] = bent - across[:, None] * direction
     d_place[:, :, 2] = place
     return Measured(
-        value=np.where(valid, np.log(length / steps.seconds), 0.0),
+        value=np.where(
+            valid, np.log(np.hypot(length * height_m, _LEAST_STEP_M) / steps.seconds), 0.0
+        ),
         place=place * height_m,
         direction=direction,
         valid=valid,
         d_value=np.where(valid[:, None], d_value, 0.0),
         d_place=d_place * height_m,
         d_direction=d_direction,
+        d_sway=np.where(valid[:, None], d_sway, 0.0),
         rows=steps.rows,
     )
 
@@ -107,6 +116,7 @@ def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measur
         d_value=np.where(valid[:, None], d_value, 0.0),
         d_place=d_place * height_m,
         d_direction=None,
+        d_sway=np.zeros((len(place), 3)),
         rows=tops.rows,
     )
 

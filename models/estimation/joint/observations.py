@@ -17,6 +17,9 @@ STEP_S = 1.5  # longer than a stride, shorter than a change of mind
 _KERNEL_S = 0.7  # half the width of the smoothing around a node
 _LONGEST_GAP_S = 1.1
 _FEWEST_POINTS = 3
+_WAY_NODES = 2  # on both sides of a step: 4.5 s
+_LARGEST_SWAY = 0.5
+_LEAST_CHORD = 1e-7  # of a ray: far less than a pixel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,15 +43,17 @@ class Rows:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
-    """Pieces of walks about 1.5 s long, between nodes with rays (K, 3), z = 1.
+    """Pieces of walks about 1.5 s long: rays to both ends (M, 3), z = 1, and seconds (M,).
 
-    `ends` (M, 2) are the nodes of a step, `chord` (M, 2) those up to one step farther on both
-    sides, for a direction that noise does not turn; `seconds` (M,) is how long a step took.
+    The ends lie along the longer chord around a step, in the image, as far apart as the step
+    went along it: what noise adds sideways is not walked. Left in, its share in a speed would
+    depend on the pose, and poses that hide noise would be taken for likely ones. `swayed_rays`
+    (M, 3) are the far ends if the chord is turned by one standard deviation of its own noise.
     """
 
-    node_rays: Array
-    ends: npt.NDArray[np.int64]
-    chord: npt.NDArray[np.int64]
+    start_rays: Array
+    end_rays: Array
+    swayed_rays: Array
     seconds: Array
     rows: Rows
 
@@ -82,14 +87,14 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     Each run of points inside the image without a gap is smoothed by a local straight line at nodes
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
-    nodes, ends, chords, seconds, feet, tops = [], [], [], [], [], []
+    starts, ends, swayed, seconds, feet, tops = [], [], [], [], [], []
     step_owners: list[int] = []
     step_runs: list[int] = []
     step_times: list[Array] = []
     top_owners: list[int] = []
     top_runs: list[int] = []
     top_times: list[Array] = []
-    run = count_nodes = 0
+    run = 0
     for owner, trajectory in enumerate(trajectories):
         for indices in _runs(trajectory, intrinsics):
             time_s, uv, top_v = _nodes(trajectory, indices)
@@ -97,12 +102,10 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             if time_s.size < 2 or not valid.all():
                 continue
             run += 1
-            first = np.arange(time_s.size - 1)
-            nodes.append(rays)
-            ends.append(count_nodes + np.stack([first, first + 1], axis=1))
-            before, after = np.maximum(first - 1, 0), np.minimum(first + 2, time_s.size - 1)
-            chords.append(count_nodes + np.stack([before, after], axis=1))
-            count_nodes += time_s.size
+            start, end, sway = _steps(rays)
+            starts.append(start)
+            ends.append(end)
+            swayed.append(sway)
             seconds.append(np.diff(time_s))
             step_owners += [owner] * (time_s.size - 1)
             step_runs += [run] * (time_s.size - 1)
@@ -116,9 +119,9 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     count = len(trajectories)
     return Observations(
         steps=Steps(
-            node_rays=_joined(nodes, (0, 3)),
-            ends=np.concatenate(ends) if ends else np.empty((0, 2), dtype=np.int64),
-            chord=np.concatenate(chords) if chords else np.empty((0, 2), dtype=np.int64),
+            start_rays=_joined(starts, (0, 3)),
+            end_rays=_joined(ends, (0, 3)),
+            swayed_rays=_joined(swayed, (0, 3)),
             seconds=_joined(seconds, (0,)),
             rows=_rows(step_owners, step_runs, step_times, count),
         ),
@@ -140,9 +143,9 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
     kept_tops = renumber[tops.rows.owner_idx] >= 0
     return Observations(
         steps=Steps(
-            node_rays=steps.node_rays,
-            ends=steps.ends[kept],
-            chord=steps.chord[kept],
+            start_rays=steps.start_rays[kept],
+            end_rays=steps.end_rays[kept],
+            swayed_rays=steps.swayed_rays[kept],
             seconds=steps.seconds[kept],
             rows=_kept(steps.rows, kept, renumber, chosen.size),
         ),
@@ -190,6 +193,40 @@ def _nodes(trajectory: Trajectory, indices: npt.NDArray[np.int64]) -> tuple[Arra
             enough, smooth_tall = _local_lines(ahead[:, known], weight_known, tall[:, None])
             tops[enough] = feet[enough, 1] - smooth_tall[enough, 0]
     return nodes_s, feet, tops
+
+
+def _steps(rays: Array) -> tuple[Array, Array, Array]:
+    """Rays (K - 1, 3) to both ends of the steps between nodes (K, 3), and to swayed far ends."""
+    way, lever = _ways(rays)
+    along = np.abs(((rays[1:] - rays[:-1]) * way).sum(axis=1))
+    middle = (rays[1:] + rays[:-1]) / 2
+    half = np.maximum(along, _LEAST_CHORD)[:, None] / 2
+    aside = np.stack([-way[:, 1], way[:, 0], np.zeros(len(way))], axis=1)
+    sway = np.minimum(_noise(rays, aside) / lever, _LARGEST_SWAY)[:, None]
+    return middle - half * way, middle + half * way, middle + half * (way + sway * aside)
+
+
+def _ways(rays: Array) -> tuple[Array, Array]:
+    """Directions (K - 1, 3) of the steps: of straight lines through the nodes around each.
+
+    A node's noise over the lever (K - 1,) is the direction's, in radians.
+    """
+    count = len(rays)
+    ahead = np.arange(count) - np.arange(count - 1)[:, None] - 0.5  # (K - 1, K)
+    weight = (np.abs(ahead) < _WAY_NODES).astype(np.float64)
+    ahead = ahead - (weight * ahead).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
+    moment = (weight * ahead**2).sum(axis=1)
+    slope = (weight * ahead) @ rays / moment[:, None]
+    length = np.maximum(np.linalg.norm(slope, axis=1), _LEAST_CHORD)
+    return slope / length[:, None], length * np.sqrt(moment)
+
+
+def _noise(rays: Array, aside: Array) -> float:
+    """Standard deviation of a node of one run, sideways, by second differences."""
+    if len(rays) < 3:
+        return 0.0  # two nodes make one step, and one step has no track to differ from
+    bend = ((rays[2:] - 2 * rays[1:-1] + rays[:-2]) * aside[1:]).sum(axis=1)
+    return float(1.4826 * np.median(np.abs(bend)) / np.sqrt(6))
 
 
 def _local_lines(ahead: Array, weight: Array, values: Array) -> tuple[Mask, Array]:

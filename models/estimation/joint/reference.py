@@ -11,7 +11,13 @@ from models.estimation.joint.fit import assumed, fit_pose, learn
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.joint.site import (
+    USUAL_SPEEDS_MPS,
+    USUAL_STATURES_M,
+    SiteReference,
+    channels_of,
+    pose_prior,
+)
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -44,8 +50,6 @@ _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were see
 _SPREAD_ROUNDS = 5
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
-_USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
-_USUAL_STATURES_M = (1.4, 2.2)  # of boxes
 _DOUBT_RAD = float(np.radians(4.0))
 _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
@@ -128,18 +132,17 @@ def _doubt(
     observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
 ) -> str:
     """What of a reference is too far off to be a bias, in words; empty where nothing is."""
-    slow, fast = _USUAL_SPEEDS_MPS
+    slow, fast = USUAL_SPEEDS_MPS
     if not slow <= site.walking_speed_mps <= fast:
         return (
             f"people walk at {site.walking_speed_mps:.2f} m/s at the prior pose, {slow:g} to "
             f"{fast:g} m/s is usual: the prior height or the frame rate is wrong"
         )
-    short, tall = _USUAL_STATURES_M
-    stature_m = 1.7 if site.statures is None else float(np.exp(site.statures.usual))
-    if not short <= stature_m <= tall:
+    short, tall = USUAL_STATURES_M
+    if site.stature_m is not None and not short <= site.stature_m <= tall:
         return (
-            f"boxes say that people are {stature_m:.2f} m tall at the prior pose, {short:g} to "
-            f"{tall:g} m is usual: the prior height is wrong"
+            f"boxes say that people are {site.stature_m:.2f} m tall at the prior pose, "
+            f"{short:g} to {tall:g} m is usual: the prior height is wrong"
         )
     free = joint_estimate(observations, prior, replace(blank, inflation=site.inflation))
     apart = (free.raw - numbers_of(prior))[:2]

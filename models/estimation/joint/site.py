@@ -1,6 +1,7 @@
 """The reference as a value: what is usual at a site, and how the joint estimator errs there."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
+USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
+USUAL_STATURES_M = (1.4, 2.2)  # of boxes
 _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log height
 
 
@@ -37,6 +40,24 @@ class SiteReference:
     def walking_speed_mps(self) -> float:
         """The site's usual speed over the ground where people were seen."""
         return float(np.exp(self.speeds.usual))
+
+    @property
+    def stature_m(self) -> float | None:
+        """How tall the boxes say that people are; None where boxes are not used."""
+        return None if self.statures is None else float(np.exp(self.statures.usual))
+
+    @property
+    def doubt_about(self) -> Literal["", "scale", "pose"]:
+        """What `doubt` is about: speeds or statures out of all proportion, or the prior pose."""
+        if not self.doubt:
+            return ""
+        slow, fast = USUAL_SPEEDS_MPS
+        short, tall = USUAL_STATURES_M
+        stature_m = self.stature_m
+        usual = slow <= self.walking_speed_mps <= fast and (
+            stature_m is None or short <= stature_m <= tall
+        )
+        return "pose" if usual else "scale"
 
 
 def channels_of(

@@ -1,0 +1,41 @@
+"""A jump in scale alone: the camera's clock or frame rate, rather than the camera."""
+
+import math
+
+from models.drift.verdict import NUMBERS, Drift
+
+_SIGMAS = 4.0
+_LEAST_LOG = math.log(1.08)
+_STILL_SIGMAS = 2.0
+_STILL_RAD = math.radians(1.0)
+_USUAL_RATE_HZ = 25.0
+
+
+def clock_fault(drift: Drift, frame_rate_hz: float | None) -> str | None:
+    """What a change of scale with unchanged angles looks like, in words; None where it is none.
+
+    Times that are too long by a factor make people slow, and only a higher camera makes them walk
+    as before: the height grows by that factor and nothing else does. A camera that was raised
+    without turning looks the same.
+
+    Args:
+        drift: the estimate against the prior pose.
+        frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
+    """
+    if set(drift.told) != set(NUMBERS):
+        return None
+    if abs(drift.log_height) <= max(_SIGMAS * drift.log_height_sd, _LEAST_LOG):
+        return None
+    for angle, sd in (
+        (drift.tilt_rad, drift.tilt_sd_rad),
+        (drift.roll_rad, drift.roll_sd_rad),
+    ):
+        if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
+            return None
+    factor = math.exp(drift.log_height)
+    rate_hz = frame_rate_hz or _USUAL_RATE_HZ
+    return (
+        f"the scale has changed by {100 * (factor - 1):+.0f} % and the angles have not: as if "
+        f"{rate_hz * factor:.3g} frames a second were taken for {rate_hz:.3g}, or the camera was "
+        f"{'raised' if factor > 1 else 'lowered'}"
+    )

@@ -1,0 +1,190 @@
+"""What an estimate is made of, read in one transaction, and what it comes to without one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from models.drift.change_point import find_change
+from models.drift.confirmation import moved_beyond_doubt
+from models.estimation.averaged import (
+    FEWEST_TRACKS,
+    PoseEstimate,
+    TrackPredictions,
+    averaged_estimate,
+)
+from models.estimation.joint.estimate import JointEstimate, joint_estimate
+from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.estimation.joint.packing import reference_from_bytes
+from models.estimation.joint.reference import assumed_reference
+from models.estimation.joint.site import SiteReference
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Trajectory
+from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
+from service.settings import Settings
+from service.store import cameras, estimates, references, tracks, trainings
+from service.store.packing import intrinsics_of, pose_of_prior, seen_of
+from service.store.tables import (
+    CameraRecord,
+    ModelRecord,
+    PredictionRecord,
+    SiteReferenceRecord,
+    TrackRecord,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenTrack:
+    """A track of the window."""
+
+    pk: int
+    started_s: float
+    ended_s: float
+    trajectory: Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """The tracks of a window in the order of their ends, and what they are judged by.
+
+    `site` is the learned reference as bytes; None while it is being learned. `predictions` has
+    what the model in use says of the tracks.
+    """
+
+    camera_id: str
+    reference_id: int
+    site: bytes | None
+    intrinsics: Intrinsics
+    prior: CameraPose
+    walk: WalkConfig
+    tracks: tuple[SeenTrack, ...]
+    model_id: str | None
+    predictions: tuple[PredictionRecord, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What the evidence comes to. `tracks` are those after the `change`, where one was found."""
+
+    joint: JointEstimate
+    averaged: PoseEstimate | None
+    tracks: tuple[SeenTrack, ...]
+    change: SeenTrack | None
+
+    @property
+    def newest_pk(self) -> int:
+        """The one of the tracks that was stored last."""
+        return max(track.pk for track in self.tracks)
+
+
+def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | None:
+    """What there is to judge a camera by; None where there is nothing, or nothing new."""
+    camera = cameras.find(session, camera_id)
+    reference = references.newest_if_any(session, camera_id)
+    if camera is None or reference is None:
+        return None
+    records = tracks.window(session, window_of(reference, settings))
+    model = trainings.newest_model(session, camera_id)
+    if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
+        return None
+    intrinsics = intrinsics_of(camera)
+    predictions: Sequence[PredictionRecord] = []
+    if model is not None:
+        pks = [record.id for record in records]
+        predictions = tracks.predictions(session, model.id, pks)
+    return Evidence(
+        camera_id=camera_id,
+        reference_id=reference.id,
+        site=reference.data,
+        intrinsics=intrinsics,
+        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        walk=walk_of(camera),
+        tracks=tuple(
+            SeenTrack(
+                pk=record.id,
+                started_s=record.started_s,
+                ended_s=record.ended_s,
+                trajectory=seen_of(record, intrinsics),
+            )
+            for record in records
+        ),
+        model_id=None if model is None else model.id,
+        predictions=tuple(predictions),
+    )
+
+
+def weigh(evidence: Evidence, seed: int) -> Finding | None:
+    """The pose by both estimators, from the newest change on; None where too few people walk."""
+    observations = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
+    if observations.walkers < FEWEST_WALKERS:
+        return None
+    seen, change = evidence.tracks, None
+    if evidence.site is None:
+        reference = assumed_reference(observations, evidence.prior, evidence.walk)
+        joint = joint_estimate(observations, evidence.prior, reference)
+    else:
+        reference = reference_from_bytes(evidence.site)
+        change, joint = _since_change(evidence, observations, reference)
+        if change is not None:
+            seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
+    used = {track.pk for track in seen}
+    predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
+    averaged = None
+    if len(predictions) >= FEWEST_TRACKS:
+        averaged = averaged_estimate(predictions, seed)
+    return Finding(joint=joint, averaged=averaged, tracks=seen, change=change)
+
+
+def walk_of(camera: CameraRecord) -> WalkConfig:
+    """How fast people are assumed to walk where a camera looks."""
+    return WalkConfig(
+        speed_mean_mps=camera.walking_speed_mean_mps, speed_sd_mps=camera.walking_speed_sd_mps
+    )
+
+
+def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
+    """What a model says of tracks, as a value."""
+    return TrackPredictions(
+        height_m=np.array([record.height_m for record in records], dtype=np.float64),
+        quaternion_wxyz=np.array(
+            [(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64
+        ).reshape(-1, 4),
+    )
+
+
+def _since_change(
+    evidence: Evidence, observations: Observations, reference: SiteReference
+) -> tuple[SeenTrack | None, JointEstimate]:
+    """The first track after a change that is beyond doubt, and the estimate from there on."""
+    prior = evidence.prior
+    found = find_change(observations, prior, reference)
+    if found is not None:
+        change = evidence.tracks[found.track_idx]
+        ends = np.array([track.ended_s for track in evidence.tracks])
+        old, new = np.flatnonzero(ends < change.ended_s), np.flatnonzero(ends >= change.ended_s)
+        after = of_tracks(observations, new)
+        before = of_tracks(observations, old)
+        if min(before.walkers, after.walkers) >= FEWEST_WALKERS:
+            joint = joint_estimate(after, prior, reference)
+            if moved_beyond_doubt(joint_estimate(before, prior, reference), joint):
+                return change, joint
+    return None, joint_estimate(observations, prior, reference)
+
+
+def _is_news(
+    session: Session,
+    reference: SiteReferenceRecord,
+    model: ModelRecord | None,
+    records: Sequence[TrackRecord],
+) -> bool:
+    """Whether the last estimate was of other tracks, another model or another reference."""
+    last = estimates.newest(session, reference.camera_id)
+    if last is None or last.reference_id != reference.id:
+        return True
+    if reference.ready_at is not None and not made_against(reference, last):
+        return True
+    seen = (None if model is None else model.id, max(r.id for r in records), len(records))
+    return (last.model_id, last.newest_track_pk, last.tracks) != seen

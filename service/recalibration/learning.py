@@ -1,0 +1,157 @@
+"""Learn a camera's reference once its tracks are there: a job's work, seconds of a core."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from models.errors import TooFewTrajectoriesError
+from models.estimation.averaged import (
+    FEWEST_TRACKS,
+    PoseEstimate,
+    TrackPredictions,
+    averaged_estimate,
+)
+from models.estimation.joint.observations import observe
+from models.estimation.joint.packing import reference_to_bytes
+from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.site import SiteReference
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Trajectory
+from service.recalibration.alerts import open_alert
+from service.recalibration.evidence import as_predictions, walk_of
+from service.recalibration.references import wanted_tracks
+from service.settings import Settings
+from service.store import cameras, references, tracks, trainings
+from service.store.packing import intrinsics_of, pose_of_prior, seen_of
+from service.store.tables import PredictionRecord
+
+_DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferencePeriod:
+    """The tracks of a reference, in the order of their ends, and what else it is learned of."""
+
+    reference_id: int
+    intrinsics: Intrinsics
+    prior: CameraPose
+    walk: WalkConfig
+    trajectories: tuple[Trajectory, ...]
+    to_s: float
+    predictions: TrackPredictions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedReference:
+    """What a reference has come to."""
+
+    site: SiteReference
+    offsets: dict[str, Any]
+
+
+def take_period(session: Session, settings: Settings, camera_id: str) -> ReferencePeriod | None:
+    """The tracks to learn a camera's reference of; None as long as there are not enough."""
+    camera = cameras.find(session, camera_id)
+    reference = references.newest_if_any(session, camera_id)
+    if camera is None or reference is None or reference.ready_at is not None:
+        return None
+    wanted = wanted_tracks(reference, settings)
+    records = tracks.first(session, camera_id, reference.from_s, wanted)
+    if len(records) < wanted:
+        return None
+    intrinsics = intrinsics_of(camera)
+    model = trainings.newest_model(session, camera_id)
+    found: Sequence[PredictionRecord] = []
+    if model is not None:
+        found = tracks.predictions(session, model.id, [record.id for record in records])
+    return ReferencePeriod(
+        reference_id=reference.id,
+        intrinsics=intrinsics,
+        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        walk=walk_of(camera),
+        trajectories=tuple(seen_of(record, intrinsics) for record in records),
+        to_s=records[-1].ended_s,
+        predictions=as_predictions(found),
+    )
+
+
+def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
+    """What is usual at the site; None where too few of the tracks walk."""
+    observations = observe(period.trajectories, period.intrinsics)
+    try:
+        site = learn_reference(observations, period.prior, period.walk, seed)
+    except TooFewTrajectoriesError:
+        return None
+    offsets = {"joint": _joint_offset(site)}
+    if len(period.predictions) >= FEWEST_TRACKS:
+        estimate = averaged_estimate(period.predictions, seed)
+        offsets["averaged"] = _averaged_offset(estimate, period.prior)
+    return LearnedReference(site=site, offsets=offsets)
+
+
+def keep_reference(
+    session: Session, camera_id: str, period: ReferencePeriod, learned: LearnedReference | None
+) -> None:
+    """Make a learned reference the one that counts, unless another has begun meanwhile.
+
+    Where too few of the tracks walk, as many again are waited for.
+    """
+    record = references.newest_if_any(session, camera_id)
+    if record is None or record.id != period.reference_id or record.ready_at is not None:
+        return
+    if learned is None:
+        record.wanted += max(record.wanted, 1)
+        return
+    site = learned.site
+    record.to_s = period.to_s
+    record.tracks = len(period.trajectories)
+    record.data = reference_to_bytes(site)
+    record.walking_speed_mps = site.walking_speed_mps
+    record.offsets = learned.offsets
+    record.doubt = site.doubt
+    record.ready_at = datetime.now(UTC)
+    if site.doubt:
+        open_alert(
+            session,
+            camera_id,
+            _DOUBT_KINDS[site.doubt_about],
+            "warning",
+            drift={},
+            changed_at=None,
+            reason=site.doubt,
+            source="reference",
+        )
+
+
+def _joint_offset(site: SiteReference) -> dict[str, Any]:
+    tilt, roll, log_height = (float(number) for number in site.offset)
+    variances = [float(site.offset_covariance[k, k]) for k in range(3)]
+    return {
+        "tilt_deg": math.degrees(tilt),
+        "roll_deg": math.degrees(roll),
+        "log_height": log_height,
+        "sd": {
+            "tilt_deg": math.degrees(math.sqrt(variances[0])),
+            "roll_deg": math.degrees(math.sqrt(variances[1])),
+            "log_height": math.sqrt(variances[2]),
+        },
+    }
+
+
+def _averaged_offset(estimate: PoseEstimate, prior: CameraPose) -> dict[str, Any]:
+    return {
+        "tilt_deg": math.degrees(estimate.tilt_rad - prior.tilt_rad),
+        "roll_deg": math.degrees(math.remainder(estimate.roll_rad - prior.roll_rad, 2 * math.pi)),
+        "log_height": math.log(max(estimate.height_m, 1e-3) / prior.height_m),
+        "sd": {
+            "tilt_deg": math.degrees(estimate.tilt_sd_rad),
+            "roll_deg": math.degrees(estimate.roll_sd_rad),
+            "log_height": estimate.height_sd_m / max(estimate.height_m, 1e-3),
+        },
+    }

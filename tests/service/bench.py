@@ -1,0 +1,109 @@
+"""A camera with a reference, about whose tracks a test makes up what they come to."""
+
+import math
+from datetime import UTC, datetime
+
+import numpy as np
+
+from models.estimation.joint.estimate import JointEstimate
+from models.geometry.pose import CameraPose
+from models.regression.recipe import plan_to_config
+from service.job_queue import JobQueue
+from service.recalibration.estimates import store_estimate
+from service.recalibration.evidence import Finding, gather
+from service.recalibration.trainings import begin_training, publish_model
+from service.store import events, references, trainings
+from service.store.database import Store
+from tests.conftest import track
+
+PRIOR = CameraPose(
+    height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1), heading_rad=math.radians(40)
+)
+
+
+class Bench:
+    """The camera `corner`, its store and its clock."""
+
+    def __init__(self, http, settings):
+        self.http, self.settings = http, settings
+        self.store = Store(settings)
+        self.queue = JobQueue(self.store.engine)
+        self.clock_s = datetime.now(UTC).timestamp() - 3600
+        self.count = 0
+        self.publish()
+        self.learn()
+
+    def publish(self):
+        with self.store.write() as session:
+            training = trainings.unfinished(session, "corner")[0]
+            attempt = begin_training(session, self.settings, training.id)
+            publish_model(session, self.queue, attempt, weights_sha256="0" * 64, metrics={})
+            self.model_id = trainings.newest_model(session, "corner").id
+        assert plan_to_config(attempt.plan)["recipe"]["name"] == "default"
+        return attempt.plan
+
+    def learn(self):
+        with self.store.write() as session:
+            reference = references.newest(session, "corner")
+            reference.to_s, reference.tracks, reference.data = self.clock_s, 200, b"made up"
+            reference.walking_speed_mps = 1.27
+            reference.ready_at = datetime.now(UTC)
+
+    def see(
+        self, pose: CameraPose, people: int = 20, sd_deg=0.2, sd_log=0.01, weak=(), change=None
+    ):
+        """Post people, who come to a pose, and bring the estimate up to date."""
+        first = self.count
+        self.count += people
+        self.clock_s += 60
+        batch = [track(str(first + n), start_s=self.clock_s + n) for n in range(people)]
+        self.http.post("/cameras/corner/tracks", json={"tracks": batch}).raise_for_status()
+        with self.store.write() as session:
+            evidence = gather(session, self.settings, "corner")
+            if evidence is None:
+                return None
+            values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+            sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
+            joint = JointEstimate(
+                values=values,
+                covariance=np.diag(sd**2),
+                bound=np.diag(sd**2),
+                raw=values + 0.01,
+                walkers=len(evidence.tracks),
+                parties=len(evidence.tracks),
+                weak=tuple(weak),
+                reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
+            )
+            finding = Finding(
+                joint=joint,
+                averaged=None,
+                tracks=evidence.tracks,
+                change=None if change is None else evidence.tracks[change],
+            )
+            return store_estimate(session, self.queue, self.settings, evidence, finding)
+
+    def refresh(self):
+        with self.store.read() as session:
+            return gather(session, self.settings, "corner")
+
+    def pose(self):
+        return self.http.get("/cameras/corner/pose").json()
+
+    def alerts(self, **query):
+        return self.http.get("/alerts", params=query).json()["items"]
+
+    def trainings(self):
+        return self.http.get("/cameras/corner/trainings").json()["items"]
+
+    def events(self, type_):
+        with self.store.read() as session:
+            return [e.payload for e in events.after(session, 0, 1000) if e.type == type_]
+
+
+def moved(tilt_deg=0.0, roll_deg=0.0, height_m=0.0):
+    return CameraPose(
+        height_m=PRIOR.height_m + height_m,
+        tilt_rad=PRIOR.tilt_rad + math.radians(tilt_deg),
+        roll_rad=PRIOR.roll_rad + math.radians(roll_deg),
+        heading_rad=PRIOR.heading_rad,
+    )
