@@ -28,6 +28,7 @@ MODEL_ROOMS = [
     {"simulation"},
     {"estimation"},
     {"regression"},
+    {"flow"},
     {"drift", "evaluation"},
 ]
 TORCH_ROOMS = {"models/regression", "service/jobs", "service/centred.py"}

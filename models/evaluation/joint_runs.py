@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.reference import assumed_reference, learn_reference
@@ -15,6 +16,7 @@ from models.evaluation.protocol import (
     KnockRange,
     ProtocolCase,
     draw_case,
+    nothing_told,
 )
 from models.evaluation.scenes import Scene
 from models.simulation.walkers import WalkConfig
@@ -36,7 +38,10 @@ def joint_feet(case: ProtocolCase) -> Answer:
 def joint_assumed(case: ProtocolCase) -> Answer:
     """Without a reference: people are assumed to walk at 1.4 m/s, everywhere alike."""
     seen = observe(case.seen, case.intrinsics)
-    reference = assumed_reference(seen, case.prior_pose, WalkConfig())
+    try:
+        reference = assumed_reference(seen, case.prior_pose, WalkConfig())
+    except TooFewTrajectoriesError:
+        return nothing_told(case)
     return _answer(joint_estimate(seen, case.prior_pose, reference))
 
 

@@ -14,6 +14,7 @@ from models.geometry.rotation import Array, angle_between
 from models.trajectory import Trajectory
 
 NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
+_UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
 _Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
 
 
@@ -139,6 +140,16 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
         degenerate=bool(answer.weak),
         seconds=seconds,
+    )
+
+
+def nothing_told(case: ProtocolCase) -> Answer:
+    """The answer to too few tracks: the prior pose, and that nothing is known of it."""
+    return Answer(
+        values=numbers_of(case.prior_pose),
+        covariance=np.diag(np.square(_UNKNOWN_SD)),
+        tracks=0,
+        weak=NUMBERS,
     )
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import average_windows, averaged_estimate
 from models.estimation.calibrated import calibrated_estimate, mean_numbers, sampling_covariance
-from models.estimation.numbers import NumbersEstimate, numbers_of, without_offset
-from models.evaluation.protocol import NUMBERS, Answer, Estimator, ProtocolCase
+from models.estimation.numbers import NumbersEstimate, without_offset
+from models.evaluation.protocol import NUMBERS, Answer, Estimator, ProtocolCase, nothing_told
 from models.evaluation.scenes import Scene
 from models.geometry.pose import CameraPose
 from models.regression.calibration import learn_calibration
@@ -24,7 +24,6 @@ from models.trajectory import Trajectory, choose_step_s, cut_windows
 
 # An answer less sure than this of a number declares it weak.
 _WEAK_SD = (math.radians(3), math.radians(3), 0.2)
-_PRIOR_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
 _TRAINING_SHARE = 0.5  # of the time: the other half is the set network's
 
 Tracks = Sequence[Trajectory]
@@ -110,12 +109,7 @@ def _declaring(estimator: Estimator) -> Estimator:
         try:
             return estimator(case)
         except TooFewTrajectoriesError:
-            return Answer(
-                values=numbers_of(case.prior_pose),
-                covariance=np.diag(np.square(_PRIOR_SD)),
-                tracks=0,
-                weak=NUMBERS,
-            )
+            return nothing_told(case)
 
     return answer
 

@@ -195,3 +195,16 @@ def test_no_tracks_tell_nothing(site):
 def test_a_wrong_prior_pose_is_doubted(site, wrong, words):
     doubt = learn_reference(site[1], wrong, WalkConfig(), 0).doubt
     assert re.search(words, doubt), doubt
+
+
+def test_a_field_is_as_free_as_its_site_needs(site):
+    def freedom(reference):
+        return math.sqrt(float(reference.speeds.field.prior_variance[-1]) * math.pi)
+
+    assert freedom(site[0]) == pytest.approx(0.003)  # one pace everywhere
+    slow, fast = (
+        tracks_of(seed, (PRIOR, 80), config=SiteConfig(lanes=1, speed_mean_mps=speed))[0]
+        for seed, speed in ((3, 1.0), (8, 1.6))
+    )
+    mixed = learn_reference(seen([*slow, *fast]), PRIOR, WalkConfig(), 0)
+    assert freedom(mixed) > 0.02

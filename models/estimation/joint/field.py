@@ -1,6 +1,6 @@
 """What is usual at a site: the mean of log speed or log stature by place and direction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,12 @@ class Field:
     directional: bool
     prior_mean: Array
     prior_variance: Array
+
+    def freer(self, share: float) -> "Field":
+        """The same field with that share of its freedom, the level's apart."""
+        variance = self.prior_variance * share**2
+        variance[0] = self.prior_variance[0]
+        return replace(self, prior_variance=variance)
 
     def features(self, measured: Measured) -> Array:
         """The rows (M, P) that the coefficients are multiplied by."""

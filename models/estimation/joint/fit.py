@@ -12,6 +12,7 @@ from models.estimation.joint.hierarchy import (
     Spread,
     Weights,
     curvature,
+    fitness,
     goodness,
     relearn,
     reweigh,
@@ -114,6 +115,15 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
         spread=spread,
         usual=float((usual * (features @ mean)).sum() / max(float(usual.sum()), 1e-9)),
     )
+
+
+def foretold(measured: Measured, learned: Learned) -> float:
+    """How well a learned field foretells what other tracks measured at the same pose."""
+    residual = measured.value - learned.field.features(measured) @ learned.mean
+    residual = np.where(measured.valid, residual, 0.0)
+    rows, spread = measured.rows, learned.spread
+    weights = reweigh(residual, measured.value, measured.valid, rows, spread)
+    return fitness(residual, weights, rows, spread)
 
 
 def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit:

@@ -230,6 +230,18 @@ def goodness(residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spr
     return np.asarray(total / np.maximum(number, 1) * np.minimum(number, _INDEPENDENT_ROWS))
 
 
+def fitness(residual: Array, weights: Weights, rows: Rows, spread: Spread) -> float:
+    """How well a field explains tracks: a log density, but for what the spread alone decides."""
+    half = (_FREEDOM + 1) / 2
+    scaled = weights.deviation(residual, rows) / spread.within_sd
+    within = (weights.usual * np.log1p(scaled**2 / _FREEDOM)).sum()
+    # Correlated rows count as fewer.
+    within *= (1 - spread.correlation) / (1 + spread.correlation)
+    level, trend = weights.own.T
+    between = np.log1p((level / spread.between_sd) ** 2 / _FREEDOM).sum()
+    return float(-half * (within + between) - 0.5 * ((trend / spread.trend_sd) ** 2).sum())
+
+
 def relearn(
     residual: Array, value: Array, valid: Mask, rows: Rows, weights: Weights, spread: Spread
 ) -> Spread:

@@ -7,7 +7,7 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
-from models.estimation.joint.fit import assumed, fit_pose, learn
+from models.estimation.joint.fit import assumed, fit_pose, foretold, learn
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
@@ -48,6 +48,8 @@ _TOPS_SPREAD = Spread(
 )
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
 _SPREAD_ROUNDS = 5
+_FREEDOMS = (0.03, 0.3, 1.0)  # of the field's variation by place and direction, shares of the most
+_TELLING_GAIN = 1.0  # of the log density, for a freer field to be worth it
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
 _DOUBT_RAD = float(np.radians(4.0))
@@ -55,8 +57,8 @@ _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
 _PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
 # Squared errors against predicted ones, before any is seen, and what that guess weighs.
-_SURPRISE = 2.0
-_SURPRISE_WEIGHT = 4.0
+_SURPRISE = 3.0
+_SURPRISE_WEIGHT = 6.0
 _LARGEST_SURPRISE = 9.0
 
 
@@ -110,6 +112,7 @@ def learn_reference(
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
     blank = assumed_reference(observations, prior, walk)
+    blank = _suited(observations, prior, blank, seed)
     site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
     whole = fit_pose(channels_of(observations, site, prior), numbers_of(prior), pose_prior(prior))
     offset = whole.candidate - numbers_of(prior)
@@ -154,6 +157,44 @@ def _doubt(
             "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
         )
     return ""
+
+
+def _suited(
+    observations: Observations, prior: CameraPose, blank: SiteReference, seed: int
+) -> SiteReference:
+    """A blank site whose speeds may vary by place and direction as much as its tracks show.
+
+    One half of the tracks must foretell the other: a field that is freer than the site needs costs
+    every estimate some of its precision.
+    """
+    rng = np.random.default_rng(seed)
+    halves = []
+    for _ in range(_FOLDS // 2):
+        order = rng.permutation(observations.tracks)
+        first, second = np.array_split(order, 2)
+        halves += [(np.sort(first), np.sort(second)), (np.sort(second), np.sort(first))]
+    at = numbers_of(prior)
+    # One spread for all, so that they differ in what they foretell alone.
+    spread = _learned(observations, prior, blank, 1).speeds.spread
+    best, found = -np.inf, blank
+    for freedom in _FREEDOMS:
+        speeds = replace(blank.speeds, field=blank.speeds.field.freer(freedom))
+        tried = replace(
+            blank,
+            speeds=replace(speeds, covariance=np.diag(speeds.field.prior_variance)),
+            statures=None,
+        )
+        foretelling = replace(tried, speeds=replace(tried.speeds, spread=spread))
+        told = 0.0
+        for known, unknown in halves:
+            site = _learned(of_tracks(observations, known), prior, foretelling, 0)
+            told += foretold(
+                measure_speeds(of_tracks(observations, unknown).steps, at, prior.heading_rad),
+                site.speeds,
+            )
+        if told > best + _TELLING_GAIN * len(halves):
+            best, found = told, replace(tried, statures=blank.statures)
+    return found
 
 
 def _learned(
