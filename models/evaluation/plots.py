@@ -11,7 +11,7 @@ from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-_COLORS = ("#136", "#c60", "#482", "#919", "#888", "#b22")
+_COLORS = ("#136", "#c60", "#482", "#919", "#888", "#b22", "#0aa", "#d7a", "#aa0")
 _GRID_M = 5.0
 
 
