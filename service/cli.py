@@ -139,7 +139,9 @@ def demo(
 def evaluate(
     scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
     seeds: Annotated[int, typer.Option(min=1, help="How many knocks a scene.")] = 12,
-    knocks: Annotated[str, typer.Option(help="Of still, knock, hard; with commas.")] = "knock",
+    knocks: Annotated[
+        str, typer.Option(help="Of still, knock, hard, pan, hard-pan; with commas.")
+    ] = "knock",
     regressors: Annotated[
         bool, typer.Option(help="Train regressors too: minutes for each scene.")
     ] = False,

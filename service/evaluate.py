@@ -23,7 +23,7 @@ from models.evaluation.report import ENOUGH_TRACKS, Overall, SceneFigures, by_sc
 from models.evaluation.scenes import load_scene
 
 _CURVE_TRACKS = [10, 20, 40, 80, 160, 320]
-_TABLE_WIDTH = 100
+_TABLE_WIDTH = 110
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +187,7 @@ def _scene_table(knock: str, seeds: int, figures: Sequence[SceneFigures]) -> Tab
     )  # fmt: skip
     table.add_column("scene (tracks)")
     table.add_column("estimator", no_wrap=True)
-    for name in ("angle, deg", "height, %", "covered", "declared", "drifting", "s"):
+    for name in ("angle, deg", "heading", "height, %", "covered", "declared", "drifting", "s"):
         table.add_column(name, justify="right", no_wrap=True)
     for scene in dict.fromkeys(f.scene_id for f in figures):
         own = [f for f in figures if f.scene_id == scene]
@@ -200,12 +200,13 @@ def _scene_table(knock: str, seeds: int, figures: Sequence[SceneFigures]) -> Tab
                 ("bar", bar.bar),
             ):
                 angle, _, height = words.partition(", ")
-                table.add_row("", name, angle.removesuffix(" deg"), height, style="dim")
+                table.add_row("", name, angle.removesuffix(" deg"), "", height, style="dim")
         for f in own:
             table.add_row(
                 f"{scene} ({f.tracks:.0f})" if f is own[0] else "",
                 f.estimator,
                 f"{f.angle_error_deg:.2f} ({f.angle_error_p90_deg:.1f})",
+                "" if f.heading_error_deg is None else f"{f.heading_error_deg:.2f}",
                 f"{100 * f.height_error:.1f} ({100 * f.height_error_p90:.0f})",
                 f"{f.coverage:.0%}",
                 f"{f.degenerate:.0%}",

@@ -19,6 +19,8 @@ from models.evaluation.protocol import (
     nothing_told,
 )
 from models.evaluation.scenes import Scene
+from models.flow.fusion import fused_estimate
+from models.flow.reference import learn_flow
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 
@@ -45,10 +47,31 @@ def joint_assumed(case: ProtocolCase) -> Answer:
     return _answer(joint_estimate(seen, case.prior_pose, reference))
 
 
+def fused(case: ProtocolCase) -> Answer:
+    """The joint estimate and the flow map together: the heading too."""
+    known, seen = (observe(tracks, case.intrinsics) for tracks in (case.reference, case.seen))
+    site = learn_reference(known, case.prior_pose, WalkConfig(), _SEED)
+    estimate = joint_estimate(seen, case.prior_pose, site)
+    flow = learn_flow(known, case.intrinsics, case.prior_pose, _SEED)
+    found = None
+    if flow is not None:
+        found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
+    if found is None:
+        return _answer(estimate)
+    return replace(
+        _answer(estimate),
+        values=found.values[:3],
+        covariance=found.covariance[:3, :3],
+        heading_rad=float(found.values[3]),
+        heading_sd_rad=float(np.sqrt(found.covariance[3, 3])),
+    )
+
+
 JOINT: dict[str, Estimator] = {
     "joint": joint,
     "joint, feet only": joint_feet,
     "joint, no reference": joint_assumed,
+    "fused": fused,
 }
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,16 +20,25 @@ _Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard devi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnockRange:
-    """How far a knock may go: uniform in tilt and roll, and in the logarithm of the height."""
+    """How far a knock may go: uniform in tilt and roll, heading, and in the log of the height."""
 
     angle_rad: float
     log_height: float
+    heading_rad: float = 0.0
 
 
 STILL = KnockRange(angle_rad=0.0, log_height=0.0)
 KNOCKED = KnockRange(angle_rad=math.radians(8), log_height=0.15)
 HARD = KnockRange(angle_rad=math.radians(15), log_height=0.35)
-RANGES = {"still": STILL, "knock": KNOCKED, "hard": HARD}
+PANNED = KnockRange(angle_rad=math.radians(8), log_height=0.15, heading_rad=math.radians(8))
+HARD_PANNED = KnockRange(angle_rad=math.radians(15), log_height=0.35, heading_rad=math.radians(20))
+RANGES = {
+    "still": STILL,
+    "knock": KNOCKED,
+    "hard": HARD,
+    "pan": PANNED,
+    "hard-pan": HARD_PANNED,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,13 +61,16 @@ class ProtocolCase:
 class Answer:
     """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
 
-    `weak` names those of the three that it declares the tracks cannot tell.
+    `weak` names those of the three that it declares the tracks cannot tell. `heading_rad` and its
+    standard deviation are what it says of the heading; None is the prior's.
     """
 
     values: Array
     covariance: Array
     tracks: int
     weak: tuple[str, ...] = ()
+    heading_rad: float | None = None
+    heading_sd_rad: float | None = None
 
 
 Estimator = Callable[[ProtocolCase], Answer]
@@ -68,7 +80,9 @@ Estimator = Callable[[ProtocolCase], Answer]
 class Outcome:
     """One case of one estimator. Triples are tilt and roll in degrees and log height.
 
-    `tracks` were seen after the knock, of which `used` gave the estimator something to go by.
+    `tracks` were seen after the knock, of which `used` gave the estimator something to go by. The
+    angle error is that of the whole rotation, heading included; `heading_error_deg` and whether
+    its interval `heading_covered` the truth are None for an estimator that says nothing of it.
     """
 
     scene_id: str
@@ -84,6 +98,8 @@ class Outcome:
     covered: tuple[bool, bool, bool]
     degenerate: bool
     seconds: float
+    heading_error_deg: float | None = None
+    heading_covered: bool | None = None
 
 
 def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
@@ -97,7 +113,10 @@ def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
     first = {people[index] for index in rng.permutation(len(people))[: len(people) // 2]}
     tilt, roll = rng.uniform(-1, 1, 2) * knock_range.angle_rad
     knock = Knock(
-        tilt_rad=tilt, roll_rad=roll, log_height=rng.uniform(-1, 1) * knock_range.log_height
+        tilt_rad=tilt,
+        roll_rad=roll,
+        log_height=rng.uniform(-1, 1) * knock_range.log_height,
+        heading_rad=rng.uniform(-1, 1) * knock_range.heading_rad,
     )
     knocked = knock.apply(scene.true_pose)
     seen = [
@@ -123,6 +142,12 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
     error[1] = math.remainder(error[1], 2 * math.pi)
     sd = np.sqrt(np.diag(answer.covariance))
     pose = pose_of_numbers(answer.values, case.prior_pose)
+    heading_error = heading_covered = None
+    if answer.heading_rad is not None and answer.heading_sd_rad is not None:
+        pose = replace(pose, heading_rad=answer.heading_rad)
+        off = math.remainder(answer.heading_rad - case.true_pose.heading_rad, 2 * math.pi)
+        heading_error = math.degrees(off)
+        heading_covered = abs(off) <= _Z90 * answer.heading_sd_rad
     covered = np.abs(error) <= _Z90 * sd
     return Outcome(
         scene_id=case.scene_id,
@@ -140,6 +165,8 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
         degenerate=bool(answer.weak),
         seconds=seconds,
+        heading_error_deg=heading_error,
+        heading_covered=heading_covered,
     )
 
 

@@ -45,11 +45,12 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Knock:
-    """A move of the camera: radians of tilt and roll, and the logarithm of the height ratio."""
+    """A move of the camera: radians of tilt, roll, heading, and the log of the height ratio."""
 
     tilt_rad: float = 0.0
     roll_rad: float = 0.0
     log_height: float = 0.0
+    heading_rad: float = 0.0
 
     def apply(self, pose: CameraPose) -> CameraPose:
         """The pose after the move."""
@@ -58,6 +59,7 @@ class Knock:
             height_m=pose.height_m * math.exp(self.log_height),
             tilt_rad=pose.tilt_rad + self.tilt_rad,
             roll_rad=pose.roll_rad + self.roll_rad,
+            heading_rad=pose.heading_rad + self.heading_rad,
         )
 
 

@@ -1,6 +1,7 @@
 """The virtual knock: halves by person, exact moves, honest judging."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from models.estimation.numbers import numbers_of
 from models.evaluation.protocol import (
     HARD,
     KNOCKED,
+    PANNED,
     STILL,
     Answer,
     draw_case,
@@ -105,3 +107,22 @@ def test_an_answer_is_judged_by_hand_derived_numbers(scene):
     assert np.subtract(outcome.drift, outcome.true_drift) == pytest.approx(
         [1, 0, 0.09531], abs=1e-5
     )
+
+
+def test_a_pan_changes_nothing_else_and_its_error_is_the_whole_rotations(scene):
+    plain, turned = draw_case(scene, 4, KNOCKED), draw_case(scene, 4, PANNED)
+    assert_allclose(numbers_of(turned.true_pose), numbers_of(plain.true_pose))
+    pan_deg = math.degrees(turned.true_pose.heading_rad - POSE.heading_rad)
+    assert 0 < abs(pan_deg) <= 8
+    right = Answer(values=numbers_of(turned.true_pose), covariance=np.eye(3) * 1e-6, tracks=9)
+    blind = judge_answer(turned, "blind", right, 0.0)
+    # A turn about the vertical is a turn by as much, however the camera is tilted.
+    assert blind.angle_error_deg == pytest.approx(abs(pan_deg), rel=1e-6)
+    assert blind.heading_error_deg is None
+    seeing = replace(
+        right, heading_rad=turned.true_pose.heading_rad + math.radians(0.5), heading_sd_rad=0.004
+    )
+    told = judge_answer(turned, "seeing", seeing, 0.0)
+    assert told.heading_error_deg == pytest.approx(0.5)
+    assert told.angle_error_deg == pytest.approx(0.5)
+    assert told.heading_covered is False

@@ -1,6 +1,7 @@
 """Figures of the protocol, by hand."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -40,6 +41,13 @@ def test_medians_and_shares_of_a_scene():
     # Beyond four standard deviations, 2 deg: the third alone.
     assert figures.drifting == 0.25
     assert figures.cases == 4
+    assert figures.heading_error_deg is None
+    told = [
+        replace(o, heading_error_deg=h, heading_covered=h < 2)
+        for o, h in zip(CASES, (1.0, 3.0, 1.5, 1.2), strict=True)
+    ]
+    assert by_scene(told)[0].heading_error_deg == pytest.approx(1.35)
+    assert by_scene(told)[0].heading_coverage == 0.75
 
 
 def test_slopes_are_least_squares():
