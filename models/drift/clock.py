@@ -2,7 +2,8 @@
 
 import math
 
-from models.drift.verdict import NUMBERS, Drift
+from models.drift.verdict import Drift
+from models.estimation.numbers import NUMBERS
 
 _SIGMAS = 4.0
 _LEAST_LOG = math.log(1.08)

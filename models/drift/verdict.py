@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.estimation.numbers import NUMBERS
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
-
-NUMBERS = ("tilt", "roll", "height")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

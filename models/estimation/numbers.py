@@ -9,6 +9,7 @@ from models.errors import ShapeError
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
+NUMBERS = ("tilt", "roll", "height")  # as they are named where they are told or not
 # How far an estimator is usually off on a site for good: foot points, places of other speed.
 SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 

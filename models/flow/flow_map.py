@@ -27,14 +27,13 @@ class FlowMap:
     """A log density (X, Y, 16) over place (1/m^2) and direction (1/rad) at grid nodes.
 
     Nodes stand `cell_m` apart from `corner` (2,) on; directions from +X on, evenly. `elsewhere` is
-    the log density off the grid; `people` is how many the map is of.
+    the log density off the grid.
     """
 
     corner: Array
     cell_m: float
     log_density: Array
     elsewhere: float
-    people: int
 
     def look(self, place: Array, direction: Array) -> tuple[Array, Array, Array]:
         """Log densities (M,) and their derivatives by place (M, 2) and direction (M,)."""
@@ -91,7 +90,7 @@ class Coverage:
         return float(self.shares @ inside)
 
 
-def learn_map(placed: Placement, weight: Array, people: int) -> FlowMap:
+def learn_map(placed: Placement, weight: Array) -> FlowMap:
     """The map of steps whose pose is known, each counted by its weight (M,).
 
     Raises:
@@ -115,7 +114,6 @@ def learn_map(placed: Placement, weight: Array, people: int) -> FlowMap:
         cell_m=cell_m,
         log_density=np.log(share / node),
         elsewhere=float(np.log(_ANYWHERE / smooth.size / node)),
-        people=people,
     )
 
 

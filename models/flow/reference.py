@@ -93,7 +93,7 @@ def learn_flow(
 
 def _mapped(observations: Observations, at: Array) -> tuple[FlowMap, Coverage]:
     walkers = walkers_of(observations, at)
-    flow = learn_map(place_steps(walkers.steps, at), _evenly(walkers), walkers.people)
+    flow = learn_map(place_steps(walkers.steps, at), _evenly(walkers))
     return flow, coverage_of(flow)
 
 

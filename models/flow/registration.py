@@ -10,7 +10,6 @@ from models.flow.flow_map import Coverage, FlowMap
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
-NUMBERS = ("tilt", "roll", "height", "heading")
 _STARTS = 3
 _APART_RAD = np.radians(5)
 _LONGEST_MOVE = 0.05

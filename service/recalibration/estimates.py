@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 
 from models.drift.clock import clock_fault
 from models.drift.verdict import (
-    NUMBERS,
     Drift,
     DriftLimits,
     DriftVerdict,
@@ -18,6 +17,7 @@ from models.drift.verdict import (
 )
 from models.estimation.averaged import PoseEstimate
 from models.estimation.joint.estimate import JointEstimate
+from models.estimation.numbers import NUMBERS
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding

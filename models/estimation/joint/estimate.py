@@ -10,11 +10,10 @@ from models.estimation.joint.groups import count_parties
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
-from models.estimation.numbers import numbers_of
+from models.estimation.numbers import NUMBERS, numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-NUMBERS = ("tilt", "roll", "height")
 _STARTS = 2
 _START_TRACKS = 80
 # Beyond these standard deviations tracks do not tell a number: angles in radians, log height.

@@ -178,12 +178,8 @@ def _suited(
     spread = _learned(observations, prior, blank, 1).speeds.spread
     best, found = -np.inf, blank
     for freedom in _FREEDOMS:
-        speeds = replace(blank.speeds, field=blank.speeds.field.freer(freedom))
-        tried = replace(
-            blank,
-            speeds=replace(speeds, covariance=np.diag(speeds.field.prior_variance)),
-            statures=None,
-        )
+        speeds = assumed(blank.speeds.field.freer(freedom), blank.speeds.spread)
+        tried = replace(blank, speeds=speeds, statures=None)
         foretelling = replace(tried, speeds=replace(tried.speeds, spread=spread))
         told = 0.0
         for known, unknown in halves:
