@@ -8,7 +8,7 @@ from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.reference import assumed_reference, learn_reference
-from models.estimation.numbers import numbers_of
+from models.estimation.numbers import NUMBERS, numbers_of
 from models.evaluation.protocol import (
     KNOCKED,
     Answer,
@@ -53,15 +53,19 @@ def fused(case: ProtocolCase) -> Answer:
     site = learn_reference(known, case.prior_pose, WalkConfig(), _SEED)
     estimate = joint_estimate(seen, case.prior_pose, site)
     flow = learn_flow(known, case.intrinsics, case.prior_pose, _SEED)
-    found = None
-    if flow is not None:
-        found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
-    if found is None:
+    if flow is None:
         return _answer(estimate)
-    return replace(
+    found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
+    answer = replace(
         _answer(estimate),
         values=found.values[:3],
         covariance=found.covariance[:3, :3],
+        weak=tuple(name for name in NUMBERS if name not in found.told),
+    )
+    if "heading" not in found.told:
+        return answer
+    return replace(
+        answer,
         heading_rad=float(found.values[3]),
         heading_sd_rad=float(np.sqrt(found.covariance[3, 3])),
     )
