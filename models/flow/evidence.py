@@ -105,7 +105,8 @@ def likelihood(
     owner, weight = steps.rows.owner_idx, walkers.weight
     scores = np.zeros((walkers.tracks, 4))
     np.add.at(scores, owner, weight[:, None] * score)
-    values = np.bincount(owner, weight * value, walkers.tracks)
+    values = np.zeros(walkers.tracks)
+    np.add.at(values, owner, weight * value)
     return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
 

@@ -144,7 +144,7 @@ def learn_map(
     counts = counts / counts.sum(axis=(1, 2, 3), keepdims=True)
     counts = (1 - _ANY_WAY) * counts + _ANY_WAY * counts.mean(axis=3, keepdims=True)
     share = counts * (1 - _ANYWHERE) + _ANYWHERE / whole.size
-    nodes = low + cell_m * np.indices(size).reshape(2, -1).T
+    nodes = low + cell_m * np.indices(tuple(size.tolist())).reshape(2, -1).T
     seen = seen_at(nodes).reshape(size)
     node = cell_m**2 * 2 * np.pi / DIRECTIONS
     return FlowMap(

@@ -82,7 +82,7 @@ def fused_estimate(
     known = precision_of(best, noise)
     values, covariance = settled(walkers, site, belief, best, known)
     if belief.precision is not precision:
-        covariance = np.linalg.inv(known + precision)
+        covariance = np.asarray(np.linalg.inv(known + precision))
     share = covariance @ known
     covariance = covariance + _elsewhere(peaks)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)

@@ -118,7 +118,7 @@ def settled(
         slope = site.likelihood(walkers, candidate).scores.sum(axis=0)
         move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
         candidate = candidate + move * min(1.0, _LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
-    return candidate, covariance
+    return candidate, np.asarray(covariance)
 
 
 def _climbed(

@@ -1,0 +1,165 @@
+"""The score test: whether, and which way, a camera has moved, long before a pose can say how far.
+
+At the pose where a camera is taken to be, each person's places and directions have a signed score
+along tilt, roll, log height and heading: how much likelier they were from a little further on. Of
+a still camera the scores are on average what they were in the reference; of one that has moved
+they are not, by as much as it has. Source: `estimation.md`, 3.4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import stdtr, stdtrit
+
+from models.flow.evidence import Walkers
+from models.flow.registration import Site
+from models.geometry.rotation import Array
+
+# How far both ways a score looks: radians, log height. The map is smoothed by about as much.
+_REACH = np.array([np.radians(2), np.radians(2), 0.05, np.radians(2)])
+_FEWEST = 8  # parties that a move is told by
+_MOST = 300
+_BLOCK = 3  # parties after one another that the bootstrap keeps together
+_DRAWS = 1500
+_BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's tail is theirs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StillScores:
+    """What scores are like while a camera stands: mean (4,) and covariance (4, 4) of a party's.
+
+    `bent` (4, 4) has in a column how the mean moves with each number. `looks` is how
+    many independent looks at a number the test of a window is worth; `parties` made the reference.
+    """
+
+    mean: Array
+    covariance: Array
+    bent: Array
+    looks: float
+    parties: float
+
+    def level(self, rate: float) -> float:
+        """What the statistic passes in a share `rate` of windows of a still camera."""
+        return float(stdtrit(self.parties - 1, rate / self.looks / 2)) ** 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """What the test says of a window: whether the camera has moved since a track, and which way.
+
+    `number` is 0 to 3 for tilt, roll, log height and heading, `sign` the way it went, and `parties`
+    how many say it; `statistic` is compared with `level`.
+    """
+
+    moved: bool
+    track_idx: int
+    number: int
+    sign: int
+    parties: int
+    statistic: float
+    level: float
+
+
+def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """The mean scores (P, 4) of each party, in the order of their last tracks (P,)."""
+    scores = np.stack(
+        [
+            site.likelihood(walkers, at + step).values - site.likelihood(walkers, at - step).values
+            for step in np.diag(_REACH)
+        ],
+        axis=1,
+    )
+    people = np.unique(walkers.steps.rows.owner_idx)
+    _, party_of = np.unique(walkers.party_idx[people], return_inverse=True)
+    size = np.bincount(party_of)
+    sums, last = np.zeros((size.size, 4)), np.zeros(size.size, dtype=np.int64)
+    np.add.at(sums, party_of, scores[people] / 2)
+    np.maximum.at(last, party_of, people)
+    order = np.argsort(last)
+    return (sums / size[:, None])[order], last[order]
+
+
+def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
+    """What is usual of the scores (P, 4) of parties, in the order of time.
+
+    How high the statistic gets is learned by bootstrap: a reference and a window are drawn anew,
+    the window some parties after one another at a time, and the one is tested by the other. So few
+    parties in the reference, heavy tails and parties that come together all raise the level.
+
+    Args:
+        scores: each scored by a map that its people have no part in.
+        bent: how the mean score changes with each number (4, 4): a column for a number.
+        seed: of the bootstrap.
+    """
+    count = len(scores)
+    covariance = np.cov(scores.T)
+    rng = np.random.default_rng(seed)
+    statistics = np.empty(_DRAWS)
+    for draw in range(_DRAWS):
+        drawn_mean = scores[rng.integers(0, count, count)].mean(axis=0)
+        starts = rng.integers(0, count, -(-_MOST // _BLOCK))
+        window = (starts[:, None] + np.arange(_BLOCK)).ravel() % count
+        statistics[draw] = _squares(scores[window], drawn_mean, covariance, bent, count).max()
+    passed = np.quantile(statistics, 1 - _BODY)
+    alone = 2 * float(stdtr(count - 1, -np.sqrt(passed)))
+    return StillScores(
+        mean=scores.mean(axis=0),
+        covariance=covariance,
+        bent=bent,
+        looks=max(_BODY / alone, 4.0),
+        parties=float(count),
+    )
+
+
+def has_moved(
+    walkers: Walkers, site: Site, at: Array, still: StillScores, rate: float
+) -> Move | None:
+    """Whether a camera that was at a pose (4,) has left it; None of fewer than 8 parties.
+
+    Every number of newest parties is asked, from 8 to 300.
+
+    Args:
+        walkers: the people, their tracks in the order of time.
+        site: the map.
+        at: where registration ends while the camera is still: the prior pose and the offset.
+        still: what is usual.
+        rate: the share of windows of a still camera that may be called moved.
+    """
+    scores, tracks = party_scores(walkers, site, at)
+    scores, tracks = scores[-_MOST:], tracks[-_MOST:]
+    if len(scores) < _FEWEST:
+        return None
+    squares = _squares(scores, still.mean, still.covariance, still.bent, still.parties)
+    count, number = np.unravel_index(int(squares.argmax()), squares.shape)
+    parties = int(count) + _FEWEST
+    apart = (scores[-parties:] - still.mean).sum(axis=0)
+    toward = _directions(still.covariance, still.bent)[number] @ apart
+    level = still.level(rate)
+    statistic = float(squares.max())
+    return Move(
+        moved=statistic > level,
+        track_idx=int(tracks[-parties]),
+        number=int(number),
+        sign=1 if toward > 0 else -1,
+        parties=parties,
+        statistic=statistic,
+        level=level,
+    )
+
+
+def _squares(scores: Array, mean: Array, covariance: Array, bent: Array, parties: float) -> Array:
+    """Squared standard scores (W, 4) of the newest 8, 9, ... parties' means, for each number."""
+    directions = _directions(covariance, bent)
+    along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
+    count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
+    variance = np.einsum("ki,ij,kj->k", directions, covariance, directions)
+    # The map is wrong by as much as its own parties' mean is.
+    return np.asarray((along / count) ** 2 / (variance * (1 / count + 1 / parties)))
+
+
+def _directions(covariance: Array, bent: Array) -> Array:
+    """Rows (4, 4): what to look along for each number, to see it best against the scatter."""
+    ridge = covariance + 0.02 * np.diag(np.diag(covariance)) + 1e-9 * np.eye(4)
+    return np.asarray(np.linalg.solve(ridge, bent).T)
+
