@@ -1,0 +1,201 @@
+"""The flow map grows with a still camera's tracks, stops at a doubt, and forgets what was none."""
+
+import time
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from sqlalchemy import delete, select
+
+from models.flow.packing import flow_from_bytes
+from service.recalibration.estimates import store_estimate
+from service.recalibration.evidence import gather, weigh
+from service.recalibration.growth import grow, keep_growth, take_growth
+from service.store import alerts, flow_maps, references
+from service.store.tables import EstimateRecord, FlowMapRecord, TrackRecord
+from tests.conftest import CAMERA
+from tests.service.street import KNOCKED, PRIOR, Street
+
+WANTED = 60
+UNSURE = 20
+DAY_S = 86_400.0
+
+
+def make_street(http, settings):
+    changes = {"drift_updates": 2, "flow_unsure_tracks": UNSURE, "flow_half_life_days": 10.0}
+    return Street(http, settings.model_copy(update=changes))
+
+
+@pytest.fixture
+def known(http, settings):
+    """A street whose reference is learned, and its map with it."""
+    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+    street = make_street(http, settings)
+    street.keep_to_lanes(PRIOR, WANTED)
+    assert street.look()["reference"]["state"] == "ready"
+    return street
+
+
+def map_of(street):
+    with street.context.store.read() as session:
+        return flow_maps.find(session, references.newest(session, "corner").id)
+
+
+def ended(street, first, last):
+    return [float(seen.time_s[-1]) for seen in street.seen[first:last]]
+
+
+def due(street):
+    with street.context.store.read() as session:
+        return take_growth(session, street.context.settings, "corner")
+
+
+def test_a_map_is_learned_with_its_reference(known):
+    first = map_of(known)
+    assert (first.tracks, first.weight) == (WANTED, WANTED)
+    assert first.to_s == pytest.approx(ended(known, 0, WANTED)[-1])
+    assert flow_from_bytes(first.data).flow.log_density.shape[2] == 16
+
+
+def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
+    first = map_of(known)
+    known.keep_to_lanes(PRIOR, 49 + UNSURE)
+    known.look()
+    assert map_of(known).learned_at == first.learned_at
+    known.keep_to_lanes(PRIOR, 1)
+    known.look()
+    grown = map_of(known)
+    assert grown.tracks == WANTED + 50  # the newest 20 may be of a move that nobody has noticed
+    assert grown.to_s == pytest.approx(ended(known, 0, WANTED + 50)[-1])
+    assert grown.data != first.data
+    known.look()
+    assert map_of(known).learned_at == grown.learned_at
+    known.keep_to_lanes(PRIOR, 20)
+    body = known.look()
+    assert map_of(known).learned_at == grown.learned_at
+    assert body["estimates"]["registered"]["tracks"] > 60  # by the grown map
+
+
+def test_older_tracks_count_less_and_no_more_than_so_many_at_all(known):
+    known.clock_s += 10 * DAY_S - 5 * 80 - 5 * WANTED - 40_000
+    known.clock_s = min(known.clock_s, time.time() + 20_000)
+    known.keep_to_lanes(PRIOR, 80)
+    known.look()
+    grown = map_of(known)
+    ends = np.array(ended(known, 0, WANTED + 60))
+    ages_days = (ends[-1] - ends) / DAY_S
+    assert grown.weight == pytest.approx((0.5 ** (ages_days / 10.0)).sum())
+    few = known.context.settings.model_copy(update={"flow_tracks": 50})
+    with known.context.store.write() as session:
+        record = flow_maps.find(session, grown.reference_id)
+        session.delete(record)
+    with known.context.store.read() as session:
+        period = take_growth(session, few, "corner")
+    assert len(period.trajectories) == 50
+    assert period.to_s == grown.to_s
+
+
+def test_a_worker_that_dies_before_it_has_grown_leaves_it_to_the_next(known):
+    known.keep_to_lanes(PRIOR, 90)
+    context = known.context
+    with context.store.read() as session:
+        evidence = gather(session, context.settings, "corner")
+    finding = weigh(evidence, 0)
+    with context.store.write() as session:
+        store_estimate(session, context.queue, context.settings, evidence, finding)
+    period = due(known)
+    data = grow(period, 0)  # and here it dies, or is thought to be dead
+    again = make_street(known.http, context.settings)
+    again.look()
+    grown = map_of(again)
+    assert (grown.tracks, grown.data) == (WANTED + 70, data)
+    with context.store.write() as session:
+        assert not keep_growth(session, "corner", period, b"late")
+    assert map_of(known).data == data
+    assert due(known) is None
+
+
+def test_it_stops_once_the_camera_may_have_moved(known):
+    first = map_of(known)
+    known.keep_to_lanes(PRIOR, 45)
+    known.look()
+    known.keep_to_lanes(KNOCKED, 60)
+    body = known.look()
+    assert "1 of 2 updates" in body["reason"]
+    assert known.alerts() == []
+    known.keep_to_lanes(KNOCKED, 60)
+    assert known.look()["state"] == "drifting"
+    known.keep_to_lanes(KNOCKED, 60)
+    known.look()
+    assert map_of(known).learned_at == first.learned_at
+
+
+def knocked_and_put_back(known, outcome):
+    """60 still, 60 knocked, the alert resolved, 100 still again; where the last ones begin."""
+    known.keep_to_lanes(PRIOR, 60)
+    known.look()
+    for _ in range(2):
+        known.keep_to_lanes(KNOCKED, 30)
+        known.look()
+    (alert,) = known.alerts(state="firing")
+    answer = {"outcome": outcome, "by": "Ada"}
+    known.http.post(f"/alerts/{alert['id']}/resolve", json=answer).raise_for_status()
+    known.clock_s = time.time() + 60
+    for _ in range(2):
+        known.keep_to_lanes(PRIOR, 50)
+        known.look()
+
+
+def test_what_was_seen_until_it_was_put_back_never_counts(known):
+    knocked_and_put_back(known, "put_back")
+    assert known.pose()["state"] == "ok"
+    grown = map_of(known)
+    assert grown.to_s == pytest.approx(ended(known, 0, 220 + 60 - UNSURE)[-1])
+    # Where exactly it moved is known give or take a few tracks.
+    assert grown.tracks == pytest.approx(WANTED + 60 + 100 - UNSURE, abs=4)
+    assert grown.tracks <= WANTED + 60 + 100 - UNSURE
+    with known.context.store.write() as session:
+        (alert,) = alerts.ended(session, "corner")
+        alert.outcome = "false_alarm"
+        session.delete(flow_maps.find(session, grown.reference_id))
+    assert len(due(known).trajectories) == WANTED + 60 + 60 + 100 - UNSURE
+
+
+def test_a_map_with_tracks_of_a_move_in_it_is_learned_without_them(known):
+    known.keep_to_lanes(PRIOR, 90)
+    known.look()
+    assert map_of(known).tracks == WANTED + 70
+    moved_s = ended(known, 0, WANTED + 30)[-1]
+    with known.context.store.write() as session:
+        record = alerts_put_back(session, moved_s)
+        session.add(record)
+    known.keep_to_lanes(PRIOR, 1)
+    known.look()
+    again = map_of(known)
+    assert again.tracks == WANTED + 29
+    assert again.to_s < moved_s
+    known.keep_to_lanes(PRIOR, 1)
+    known.look()
+    assert map_of(known).learned_at == again.learned_at
+
+
+def alerts_put_back(session, changed_s):
+    from service.store.tables import AlertRecord
+
+    now = datetime.now(UTC) + timedelta(seconds=1)
+    return AlertRecord(
+        id="a" * 32,
+        camera_id="corner",
+        kind="drift",
+        state="resolved",
+        source="estimate",
+        severity="warning",
+        reason="",
+        drift={},
+        opened_at=now,
+        changed_at=datetime.fromtimestamp(changed_s, UTC),
+        updated_at=now,
+        resolved_at=now,
+        outcome="put_back",
+    )
