@@ -32,9 +32,18 @@ class Doubt:
 def doubts(
     session: Session, settings: Settings, reference: SiteReferenceRecord
 ) -> tuple[Doubt, ...]:
-    """The ended doubts about a camera since a reference."""
+    """The ended doubts about a camera that reach beyond the period of a reference."""
     found = (_doubt_of(record, settings) for record in alerts.ended(session, reference.camera_id))
-    return tuple(doubt for doubt in found if doubt and doubt.to_s > (reference.to_s or 0.0))
+    return tuple(doubt for doubt in found if doubt and _concerns(doubt, reference))
+
+
+def _concerns(doubt: Doubt, reference: SiteReferenceRecord) -> bool:
+    if doubt.to_s <= (reference.to_s or 0.0):
+        return False
+    # A reset or a new prior pose has answered it, for whatever comes after; tracks may be posted
+    # long after they were walked, so that their times alone do not show it.
+    settled = doubt.resolved_at <= reference.created_at
+    return not (settled and doubt.from_s < (reference.from_s or 0.0))
 
 
 def still_bounds(

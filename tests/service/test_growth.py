@@ -166,6 +166,21 @@ def test_what_was_seen_until_it_was_put_back_never_counts(known):
     assert len(due(known).trajectories) == WANTED + 60 + 60 + 100 - UNSURE
 
 
+def test_a_reset_answers_what_was_doubted_before(known):
+    for _ in range(2):
+        known.keep_to_lanes(KNOCKED, 30)
+        known.look()
+    assert len(known.alerts(state="firing")) == 1
+    known.http.post("/cameras/corner/reference/reset").raise_for_status()
+    known.clock_s += 100
+    known.keep_to_lanes(PRIOR, WANTED)  # all of them walked hours before the reset
+    known.look()
+    assert map_of(known).tracks == WANTED
+    known.keep_to_lanes(PRIOR, 50 + UNSURE)
+    known.look()
+    assert map_of(known).tracks == WANTED + 50
+
+
 def test_a_false_alarm_lets_it_grow_on(known):
     known.keep_to_lanes(PRIOR, 60)
     known.look()
