@@ -75,8 +75,12 @@ def replay(
     scene_dir: Annotated[Path, typer.Argument(help="Folder with camera.json and tracks.csv.")],
     url: Annotated[str, typer.Option(help="The running service.")] = "http://127.0.0.1:8080",
     knock: Annotated[
-        str, typer.Option(help="Move the camera: tilt and roll in degrees, log height ratio.")
-    ] = "0,0,0",
+        str | None,
+        typer.Option(
+            help="Move the camera: tilt and roll in degrees, log height ratio. With --protocol how "
+            "far it may be moved: still, knock (the default), hard, pan or hard-pan."
+        ),
+    ] = None,
     speed: Annotated[
         float, typer.Option(min=0, help="Times as fast as recorded; 0: as fast as it goes.")
     ] = 0.0,
@@ -95,9 +99,8 @@ def replay(
     from service.replay import replay_scene
 
     if protocol is not None:
-        _replay_protocol(
-            scene_dir, url, protocol, "hard" if hard else "still" if still else "knock"
-        )
+        name = "hard" if hard else "still" if still else knock or "knock"
+        _replay_protocol(scene_dir, url, protocol, name)
         return
     console = Console()
     try:
@@ -106,7 +109,7 @@ def replay(
             scene, done = replay_scene(
                 scene_dir,
                 url,
-                knock=_knock(knock),
+                knock=_knock(knock or "0,0,0"),
                 speed=speed,
                 on_progress=lambda now: bar.update(task, total=now.tracks, completed=now.posted),
             )
@@ -200,8 +203,11 @@ def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
     from rich.progress import Progress
 
     from models.errors import CalibrationError
+    from models.evaluation.protocol import RANGES
     from service.replay_protocol import print_outcome, replay_protocol
 
+    if knock not in RANGES:
+        raise typer.BadParameter(f"knock: one of {', '.join(RANGES)}, got {knock!r}")
     console = Console()
     try:
         with Progress(console=console) as bar:

@@ -118,6 +118,7 @@ def print_outcome(outcome: ProtocolReplay, console: Console) -> None:
         ("tilt_deg", math.degrees(prior.tilt_rad), math.degrees(true.tilt_rad)),
         ("roll_deg", math.degrees(prior.roll_rad), math.degrees(true.roll_rad)),
         ("height_m", prior.height_m, true.height_m),
+        ("heading_deg", math.degrees(prior.heading_rad), math.degrees(true.heading_rad)),
     ):
         shown = "not told" if sd.get(field) is None else f"{sd[field]:.3f}"
         table.add_row(field, f"{before:.3f}", f"{after:.3f}", f"{pose[field]:.3f}", shown)

@@ -38,6 +38,14 @@ class Settings(BaseSettings):
     drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 
+    flow_tracks: int = Field(2_000, ge=50, description="newest tracks that a flow map is made of")
+    flow_half_life_days: float = Field(
+        30.0, gt=0, description="age at which a track counts half in it"
+    )
+    flow_unsure_tracks: int = Field(
+        100, ge=0, description="newest tracks that it leaves out: a move may be unnoticed"
+    )
+
     keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
     keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")

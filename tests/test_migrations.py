@@ -51,7 +51,7 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
     alembic.command.upgrade(config, "2026_11_21_first")
     with sqlite3.connect(settings.database_path) as connection:
         put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
-        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered", heading_rad=0.7)
         if origin == "accepted":
             put(connection, "prior_poses", id=2, camera_id="old", origin=origin,
                 created_at="2026-11-20 09:00:00")  # fmt: skip
@@ -70,6 +70,8 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
         assert (view.reference.tracks, view.reference.wanted) == (learned_of, 50)
         (history,) = pose_history(session, "old", None, None, 10)
         assert history.told == ["tilt", "roll", "height"]
+        assert (history.heading_rad, history.heading_sd_rad) == (0.7, None)
+        assert history.drift_heading_rad == 0
         assert list_alerts(session, "firing", "old", 10)[0].source == "estimate"
     alembic.command.downgrade(config, "2026_11_21_first")
     with sqlite3.connect(settings.database_path) as connection:

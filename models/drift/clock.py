@@ -3,7 +3,7 @@
 import math
 
 from models.drift.verdict import Drift
-from models.estimation.numbers import NUMBERS
+from models.estimation.numbers import ANGLES, NUMBERS
 
 _SIGMAS = 4.0
 _LEAST_LOG = math.log(1.08)
@@ -23,14 +23,11 @@ def clock_fault(drift: Drift, frame_rate_hz: float | None) -> str | None:
         drift: the estimate against the prior pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
-    if set(drift.told) != set(NUMBERS):
+    if not set(NUMBERS) <= set(drift.told):
         return None
     if abs(drift.log_height) <= max(_SIGMAS * drift.log_height_sd, _LEAST_LOG):
         return None
-    for angle, sd in (
-        (drift.tilt_rad, drift.tilt_sd_rad),
-        (drift.roll_rad, drift.roll_sd_rad),
-    ):
+    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.told):
         if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
             return None
     factor = math.exp(drift.log_height)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.numbers import NUMBERS
+from models.estimation.numbers import WITH_HEADING
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 
@@ -14,20 +14,31 @@ from models.geometry.rotation import Array, angle_between
 class Drift:
     """Estimate minus prior pose, each number with the standard deviation of the estimate.
 
-    `told` names those of tilt, roll, height that the tracks can tell; the others stand here but
-    count nowhere. `angle_rad` is the whole rotation between prior and `pose_after`.
+    `told` names those of tilt, roll, height, heading that the tracks can tell; the others stand
+    here but count nowhere. `angle_rad` is the whole rotation between prior and `pose_after`.
     """
 
     tilt_rad: float
     roll_rad: float
     height_m: float
     log_height: float
+    heading_rad: float
     angle_rad: float
     tilt_sd_rad: float
     roll_sd_rad: float
     height_sd_m: float
     log_height_sd: float
+    heading_sd_rad: float
     told: tuple[str, ...]
+
+    def of(self, name: str) -> tuple[float, float]:
+        """A number's drift and its standard deviation: in metres for height, else in radians."""
+        return {
+            "tilt": (self.tilt_rad, self.tilt_sd_rad),
+            "roll": (self.roll_rad, self.roll_sd_rad),
+            "height": (self.height_m, self.height_sd_m),
+            "heading": (self.heading_rad, self.heading_sd_rad),
+        }[name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +50,11 @@ class DriftLimits:
     floor_m: float
     updates: int
     clear_ratio: float
+
+    def of(self, name: str, sd: float) -> float:
+        """From where on a number's drift counts, given its standard deviation."""
+        floor = self.floor_m if name == "height" else self.floor_rad
+        return max(self.sigmas * sd, floor, 1e-12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,30 +76,32 @@ class DriftVerdict:
 
 
 def drift_between(
-    values: Array, covariance: Array, weak: tuple[str, ...], prior: CameraPose
+    values: Array, covariance: Array, told: tuple[str, ...], prior: CameraPose
 ) -> Drift:
-    """How far an estimate is from the prior pose; x, y and heading count as unmoved.
+    """How far an estimate is from the prior pose; x and y count as unmoved.
 
     Args:
-        values: tilt, roll (radians) and log height (3,).
-        covariance: of these (3, 3).
-        weak: those of tilt, roll, height that the tracks cannot tell.
+        values: tilt, roll (radians), log height, heading (radians) (4,).
+        covariance: of these (4, 4).
+        told: those of tilt, roll, height, heading that the tracks can tell.
         prior: the prior pose.
     """
-    tilt, roll, log_height = (float(value) for value in values)
-    tilt_sd, roll_sd, log_height_sd = (float(sd) for sd in np.sqrt(np.diag(covariance)))
+    tilt, roll, log_height, heading = (float(value) for value in values)
+    tilt_sd, roll_sd, log_height_sd, heading_sd = map(float, np.sqrt(np.diag(covariance)))
     height_m = math.exp(log_height)
     drift = Drift(
         tilt_rad=min(max(tilt, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
         roll_rad=math.remainder(roll - prior.roll_rad, 2 * math.pi),
         height_m=height_m - prior.height_m,
         log_height=log_height - math.log(prior.height_m),
+        heading_rad=math.remainder(heading - prior.heading_rad, 2 * math.pi),
         angle_rad=0.0,
         tilt_sd_rad=tilt_sd,
         roll_sd_rad=roll_sd,
         height_sd_m=height_m * log_height_sd,
         log_height_sd=log_height_sd,
-        told=tuple(name for name in NUMBERS if name not in weak),
+        heading_sd_rad=heading_sd,
+        told=tuple(name for name in WITH_HEADING if name in told),
     )
     turned = pose_after(drift, prior)
     return replace(
@@ -93,12 +111,16 @@ def drift_between(
 
 def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
     """The prior pose moved by what is told of the drift; what is not told stays the prior's."""
-    told = drift.told
+    turn = 2 * math.pi
+    by = {name: drift.of(name)[0] if name in drift.told else 0.0 for name in WITH_HEADING}
+    heading = prior.heading_rad + by["heading"]
     return replace(
         prior,
-        height_m=prior.height_m + (drift.height_m if "height" in told else 0.0),
-        tilt_rad=prior.tilt_rad + (drift.tilt_rad if "tilt" in told else 0.0),
-        roll_rad=prior.roll_rad + (drift.roll_rad if "roll" in told else 0.0),
+        height_m=prior.height_m + by["height"],
+        tilt_rad=prior.tilt_rad + by["tilt"],
+        roll_rad=prior.roll_rad + by["roll"],
+        # Within one turn, as a prior pose has to be.
+        heading_rad=heading if abs(heading) <= turn else math.fmod(heading, turn),
     )
 
 
@@ -110,16 +132,10 @@ def judge(drift: Drift, limits: DriftLimits, streak: int, drifted: tuple[str, ..
     tell is never beyond, and its drift does not end until it is told again. Where nothing is
     told, nothing changes.
     """
-    found = {
-        "tilt": (drift.tilt_rad, drift.tilt_sd_rad, limits.floor_rad),
-        "roll": (drift.roll_rad, drift.roll_sd_rad, limits.floor_rad),
-        "height": (drift.height_m, drift.height_sd_m, limits.floor_m),
-    }
-    ratios = {
-        name: abs(value) / max(limits.sigmas * sd, floor, 1e-12)
-        for name, (value, sd, floor) in found.items()
-        if name in drift.told
-    }
+    ratios = {}
+    for name in drift.told:
+        value, sd = drift.of(name)
+        ratios[name] = abs(value) / limits.of(name, sd)
     if not ratios:
         return DriftVerdict(streak=streak, excess=0.0, drifted=drifted)
     excess = max(ratios.values())
@@ -131,7 +147,7 @@ def judge(drift: Drift, limits: DriftLimits, streak: int, drifted: tuple[str, ..
     else:
         streak = 0
     if drifted:
-        drifted = tuple(name for name in NUMBERS if name in drifted or name in beyond)
+        drifted = tuple(n for n in WITH_HEADING if n in drifted or n in beyond)
         drifted = () if streak <= -limits.updates else drifted
     elif streak >= limits.updates:
         drifted = beyond

@@ -9,7 +9,10 @@ from models.errors import ShapeError
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-NUMBERS = ("tilt", "roll", "height")  # as they are named where they are told or not
+# As they are named where they are told or not, in the order of every (3,) and (4,).
+NUMBERS = ("tilt", "roll", "height")
+WITH_HEADING = (*NUMBERS, "heading")
+ANGLES = ("tilt", "roll", "heading")
 # How far an estimator is usually off on a site for good: foot points, places of other speed.
 SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 

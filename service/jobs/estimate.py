@@ -6,6 +6,7 @@ from service.jobs.context import JobContext
 from service.jobs.predictions import predict_pending
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
+from service.recalibration.growth import grow, keep_growth, take_growth
 from service.recalibration.learning import keep_reference, learn_period, take_period
 from service.recalibration.looking import begin_look, end_look
 
@@ -33,6 +34,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
         end_look(session, camera_id, newest_pk)
+    grow_if_due(context, camera_id)
 
 
 def learn_if_due(context: JobContext, camera_id: str) -> None:
@@ -48,3 +50,20 @@ def learn_if_due(context: JobContext, camera_id: str) -> None:
         "reference_learned" if learned else "reference_without_walkers",
         extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
     )
+
+
+def grow_if_due(context: JobContext, camera_id: str) -> None:
+    """Learn a camera's flow map anew, once enough tracks have come that are known to be still.
+
+    A worker that dies here leaves the map as it was; the next job finds it due again.
+    """
+    with context.store.read() as session:
+        period = take_growth(session, context.settings, camera_id)
+    if period is None:
+        return
+    data = grow(period, context.settings.seed)
+    with context.store.write() as session:
+        grown = keep_growth(session, camera_id, period, data)
+    if grown:
+        fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
+        log.info("flow_map_grown", extra=fields)

@@ -11,8 +11,6 @@ from service.errors import ConflictError, NotFoundError
 from service.store import alerts, events
 from service.store.tables import AlertRecord
 
-_POSE_KINDS = ("drift", "clock", "out_of_range")
-
 
 def open_alert(
     session: Session,
@@ -62,7 +60,7 @@ def open_alert(
 
 def fired_by_estimate(session: Session, camera_id: str) -> set[str]:
     """The kinds of a camera's open alerts that its estimates stand behind."""
-    found = (alerts.firing(session, camera_id, kind) for kind in _POSE_KINDS)
+    found = (alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
     return {record.kind for record in found if record and record.source == "estimate"}
 
 
@@ -77,7 +75,7 @@ def end_alert(
 
 def close_pose_alerts(session: Session, camera_id: str, outcome: str, by: str | None) -> None:
     """End the open alerts that measure a camera against its prior pose, if there are any."""
-    for kind in _POSE_KINDS:
+    for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
             _end(session, record, outcome, None, by)

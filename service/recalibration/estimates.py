@@ -15,15 +15,14 @@ from models.drift.verdict import (
     judge,
     pose_after,
 )
-from models.estimation.averaged import PoseEstimate
-from models.estimation.joint.estimate import JointEstimate
-from models.estimation.numbers import NUMBERS
+from models.estimation.numbers import ANGLES, NUMBERS
+from models.geometry.rotation import Array
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import made_against
-from service.recalibration.words import describe_drift
+from service.recalibration.words import FIELDS, describe_drift, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
 from service.store.tables import EstimateRecord, SiteReferenceRecord
@@ -41,9 +40,8 @@ def store_estimate(
         return None
     if (reference.ready_at is None) != (evidence.site is None):
         return None
-    drift = drift_between(
-        finding.joint.values, finding.joint.covariance, finding.joint.weak, evidence.prior
-    )
+    fused = finding.fused
+    drift = drift_between(fused.values, fused.covariance, fused.told, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
         record.state, record.reason = "learning", "the reference is being learned"
@@ -81,8 +79,11 @@ def _judge(
     streak, since = 0, None
     if last is not None and not made_against(reference, last):
         last = None
-    # An alert of before this reference stands until updates below the limits end it.
-    drifted: tuple[str, ...] = NUMBERS if firing & {"drift", "clock"} else ()
+    drifted: tuple[str, ...] = ()
+    if firing & {"drift", "clock"}:
+        # An alert of before this reference stands until updates below the limits end it.
+        before = estimates.newest_of_earlier(session, camera_id, reference.id)
+        drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
     if last is not None:
         streak, drifted, since = last.drift_streak, tuple(last.drifted), last.drift_since
     if drifted and not firing & {"drift", "clock"}:
@@ -107,7 +108,10 @@ def _judge(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
         words.append(f"{edge}; a training around the new estimate {training}")
-    words += [finding.joint.reason, reference.doubt]
+    words.append(finding.fused.reason)
+    if not set(NUMBERS) <= set(drift.told):
+        words.append(finding.joint.reason)
+    words.append(reference.doubt)
     record.reason = "; ".join(word for word in words if word)
     _alert(session, record, drift, verdict, clock=clock, edge=edge)
 
@@ -180,17 +184,20 @@ def _record(
         height_m=pose.height_m,
         tilt_rad=pose.tilt_rad,
         roll_rad=pose.roll_rad,
+        heading_rad=pose.heading_rad,
         height_sd_m=drift.height_sd_m,
         tilt_sd_rad=drift.tilt_sd_rad,
         roll_sd_rad=drift.roll_sd_rad,
+        heading_sd_rad=drift.heading_sd_rad,
         drift_height_m=drift.height_m,
         drift_tilt_rad=drift.tilt_rad,
         drift_roll_rad=drift.roll_rad,
+        drift_heading_rad=drift.heading_rad,
         drift_angle_rad=drift.angle_rad,
         drift_streak=0,
         drifted=[],
         drift_since=None,
-        raw=_raw(finding.joint, finding.averaged),
+        raw=_raw(finding),
         tracks=len(finding.tracks),
         from_s=min(track.started_s for track in finding.tracks),
         to_s=finding.tracks[-1].ended_s,
@@ -199,16 +206,15 @@ def _record(
     )
 
 
-def _raw(joint: JointEstimate, averaged: PoseEstimate | None) -> dict[str, Any]:
-    tilt, roll, log_height = (float(number) for number in joint.raw)
-    raw = {
-        "joint": {
-            "height_m": math.exp(log_height),
-            "tilt_deg": math.degrees(tilt),
-            "roll_deg": math.degrees(roll),
+def _raw(finding: Finding) -> dict[str, Any]:
+    joint, averaged = finding.joint, finding.averaged
+    raw = {"joint": {**_raw_numbers(joint.raw), "tracks": joint.walkers}}
+    if finding.registered is not None:
+        raw["registered"] = {
+            **_raw_numbers(finding.registered),
+            "heading_deg": math.degrees(finding.registered[3]),
             "tracks": joint.walkers,
         }
-    }
     if averaged is not None:
         raw["averaged"] = {
             "height_m": averaged.height_m,
@@ -219,16 +225,23 @@ def _raw(joint: JointEstimate, averaged: PoseEstimate | None) -> dict[str, Any]:
     return raw
 
 
+def _raw_numbers(numbers: Array) -> dict[str, float]:
+    tilt, roll, log_height = (float(number) for number in numbers[:3])
+    return {
+        "height_m": math.exp(log_height),
+        "tilt_deg": math.degrees(tilt),
+        "roll_deg": math.degrees(roll),
+    }
+
+
 def drift_body(drift: Drift) -> dict[str, float | None]:
     """The told drift as JSON, as in the pose and its alerts."""
-    told = drift.told
-    turned = {"tilt", "roll"} & set(told)
-    return {
-        "height_m": drift.height_m if "height" in told else None,
-        "tilt_deg": math.degrees(drift.tilt_rad) if "tilt" in told else None,
-        "roll_deg": math.degrees(drift.roll_rad) if "roll" in told else None,
-        "angle_deg": math.degrees(drift.angle_rad) if turned else None,
+    body: dict[str, float | None] = {
+        field: shown(name, drift.of(name)[0]) if name in drift.told else None
+        for name, field in FIELDS.items()
     }
+    turned = set(ANGLES) & set(drift.told)
+    return {**body, "angle_deg": math.degrees(drift.angle_rad) if turned else None}
 
 
 def drift_limits(settings: Settings) -> DriftLimits:

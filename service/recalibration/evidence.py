@@ -19,13 +19,16 @@ from models.estimation.joint.observations import Observations, observe, of_track
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import assumed_reference
 from models.estimation.joint.site import SiteReference
+from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.recalibration.fusing import FusedPose, by_speeds_alone, fuse
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.settings import Settings
-from service.store import cameras, estimates, references, tracks, trainings
+from service.store import cameras, estimates, flow_maps, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import (
     CameraRecord,
@@ -50,13 +53,14 @@ class SeenTrack:
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
-    `site` is the learned reference as bytes; None while it is being learned. `predictions` has
-    what the model in use says of the tracks.
+    `site` is the learned reference as bytes; None while it is being learned. So is `flow`; None
+    where there is no map. `predictions` has what the model in use says of the tracks.
     """
 
     camera_id: str
     reference_id: int
     site: bytes | None
+    flow: bytes | None
     intrinsics: Intrinsics
     prior: CameraPose
     walk: WalkConfig
@@ -67,9 +71,15 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What the evidence comes to. `tracks` are those after the `change`, where one was found."""
+    """What the evidence comes to. `tracks` are those after the `change`, where one was found.
+
+    `fused` is to be served; `registered` (4,) is that before the map's offset is taken off, None
+    where no map had a part.
+    """
 
     joint: JointEstimate
+    fused: FusedPose
+    registered: Array | None
     averaged: PoseEstimate | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
@@ -91,6 +101,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
     intrinsics = intrinsics_of(camera)
+    kept = flow_maps.find(session, reference.id)
     predictions: Sequence[PredictionRecord] = []
     if model is not None:
         pks = [record.id for record in records]
@@ -99,6 +110,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
         camera_id=camera_id,
         reference_id=reference.id,
         site=reference.data,
+        flow=None if kept is None else kept.data,
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         walk=walk_of(camera),
@@ -117,17 +129,22 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
 
 
 def weigh(evidence: Evidence, seed: int) -> Finding | None:
-    """The pose by both estimators, from the newest change on; None where too few people walk."""
+    """The pose by all estimators, from the newest change on; None where too few people walk."""
     observations = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
     if observations.walkers < FEWEST_WALKERS:
         return None
-    seen, change = evidence.tracks, None
+    prior, seen, change, registered = evidence.prior, evidence.tracks, None, None
     if evidence.site is None:
-        reference = assumed_reference(observations, evidence.prior, evidence.walk)
-        joint = joint_estimate(observations, evidence.prior, reference)
+        reference = assumed_reference(observations, prior, evidence.walk)
+        joint = joint_estimate(observations, prior, reference)
+        fused = by_speeds_alone(joint, prior)
     else:
         reference = reference_from_bytes(evidence.site)
-        change, joint = _since_change(evidence, observations, reference)
+        change, observations, joint = _since_change(evidence, observations, reference)
+        flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
+        fused = fuse(observations, evidence.intrinsics, prior, joint, flow)
+        if flow is not None and fused.registered:
+            registered = fused.values + flow.offset
         if change is not None:
             seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
     used = {track.pk for track in seen}
@@ -135,7 +152,14 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     averaged = None
     if len(predictions) >= FEWEST_TRACKS:
         averaged = averaged_estimate(predictions, seed)
-    return Finding(joint=joint, averaged=averaged, tracks=seen, change=change)
+    return Finding(
+        joint=joint,
+        fused=fused,
+        registered=registered,
+        averaged=averaged,
+        tracks=seen,
+        change=change,
+    )
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:
@@ -157,8 +181,8 @@ def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
 
 def _since_change(
     evidence: Evidence, observations: Observations, reference: SiteReference
-) -> tuple[SeenTrack | None, JointEstimate]:
-    """The first track after a change that is beyond doubt, and the estimate from there on."""
+) -> tuple[SeenTrack | None, Observations, JointEstimate]:
+    """The first track after a change that is beyond doubt, what is seen and told from there on."""
     prior = evidence.prior
     found = find_change(observations, prior, reference)
     if found is not None:
@@ -170,8 +194,8 @@ def _since_change(
         if min(before.walkers, after.walkers) >= FEWEST_WALKERS:
             joint = joint_estimate(after, prior, reference)
             if moved_beyond_doubt(joint_estimate(before, prior, reference), joint):
-                return change, joint
-    return None, joint_estimate(observations, prior, reference)
+                return change, after, joint
+    return None, observations, joint_estimate(observations, prior, reference)
 
 
 def _is_news(

@@ -19,17 +19,19 @@ from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_to_bytes
 from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
+from models.flow.packing import flow_to_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import open_alert
 from service.recalibration.evidence import as_predictions, walk_of
+from service.recalibration.fusing import learn_paths
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
-from service.store.tables import PredictionRecord
+from service.store.tables import FlowMapRecord, PredictionRecord
 
 _DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
 
@@ -49,9 +51,10 @@ class ReferencePeriod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedReference:
-    """What a reference has come to."""
+    """What a reference has come to; `flow` is its map as bytes, None where too few people walk."""
 
     site: SiteReference
+    flow: bytes | None
     offsets: dict[str, Any]
 
 
@@ -92,7 +95,10 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
     if len(period.predictions) >= FEWEST_TRACKS:
         estimate = averaged_estimate(period.predictions, seed)
         offsets["averaged"] = _averaged_offset(estimate, period.prior)
-    return LearnedReference(site=site, offsets=offsets)
+    flow = learn_paths(observations, period.intrinsics, period.prior, seed)
+    return LearnedReference(
+        site=site, flow=None if flow is None else flow_to_bytes(flow), offsets=offsets
+    )
 
 
 def keep_reference(
@@ -116,6 +122,16 @@ def keep_reference(
     record.offsets = learned.offsets
     record.doubt = site.doubt
     record.ready_at = datetime.now(UTC)
+    session.add(
+        FlowMapRecord(
+            reference_id=record.id,
+            data=learned.flow,
+            tracks=record.tracks,
+            weight=float(record.tracks),
+            to_s=period.to_s,
+            learned_at=record.ready_at,
+        )
+    )
     if site.doubt:
         open_alert(
             session,

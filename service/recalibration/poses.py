@@ -55,7 +55,7 @@ class PoseView:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Those of tilt, roll, height that are estimated."""
+        """Those of tilt, roll, height, heading that are estimated."""
         return () if self.estimate is None else tuple(self.estimate.told)
 
 
@@ -81,6 +81,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
             height_m=estimate.height_m,
             tilt_rad=estimate.tilt_rad,
             roll_rad=estimate.roll_rad,
+            heading_rad=estimate.heading_rad,
         )
     version = 0 if estimate is None else estimate.id
     model_id = None if model is None else model.id

@@ -1,6 +1,7 @@
 """The range that a model was trained for: what leaves it, and the training that then helps."""
 
 import math
+from dataclasses import replace
 
 from sqlalchemy.orm import Session
 
@@ -49,7 +50,9 @@ def train_around(
     newest = trainings.of_camera(session, camera_id, 1)
     if newest:
         centre = centre_of(session, newest[0])
-        apart = angle_between(centre.quaternion_wxyz, pose.quaternion_wxyz)
+        # A model knows nothing of the heading: a pan asks for no other training.
+        level = replace(pose, heading_rad=centre.heading_rad)
+        apart = angle_between(centre.quaternion_wxyz, level.quaternion_wxyz)
         if apart <= _SAME_RAD and abs(centre.height_m - pose.height_m) <= _SAME_M:
             return _ENDED[newest[0].state]
     return f"is {queue_training(session, queue, settings, camera_id, around=pose).state}"

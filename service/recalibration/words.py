@@ -4,20 +4,18 @@ import math
 
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
 
+# The numbers of a pose as fields of JSON.
+FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
+
 
 def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> str:
     """The told numbers against the prior pose and the limits; empty where none is told."""
-    said = {
-        "tilt": f"tilt {_degrees(drift.tilt_rad, drift.tilt_sd_rad)}",
-        "roll": f"roll {_degrees(drift.roll_rad, drift.roll_sd_rad)}",
-        "height": f"height {drift.height_m:+.2f} m (sd {drift.height_sd_m:.2f})",
-    }
     limit = (
         f"{limits.sigmas:g} sd and {math.degrees(limits.floor_rad):g} deg or {limits.floor_m:g} m"
     )
     if not drift.told:
         return f"beyond {limit} when it was last told" if verdict.drifting else ""
-    text = ", ".join(said[name] for name in drift.told) + " against the prior pose"
+    text = ", ".join(_said(drift, name) for name in drift.told) + " against the prior pose"
     if verdict.drifting and verdict.excess >= 1:
         updates = "1 update" if limits.updates == 1 else f"{limits.updates} updates"
         return f"{text}: beyond {limit} for {updates} or more"
@@ -29,5 +27,13 @@ def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> 
     return f"{text}: not beyond {limit}"
 
 
-def _degrees(angle_rad: float, sd_rad: float) -> str:
-    return f"{math.degrees(angle_rad):+.2f} deg (sd {math.degrees(sd_rad):.2f})"
+def shown(name: str, value: float) -> float:
+    """A number of a pose in the unit of its field."""
+    return value if name == "height" else math.degrees(value)
+
+
+def _said(drift: Drift, name: str) -> str:
+    value, sd = drift.of(name)
+    if name == "height":
+        return f"height {value:+.2f} m (sd {sd:.2f})"
+    return f"{name} {shown(name, value):+.2f} deg (sd {shown(name, sd):.2f})"

@@ -6,12 +6,12 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from models.estimation.numbers import ANGLES
 from service.recalibration.poses import PoseView
+from service.recalibration.words import FIELDS
 from service.schemas.base import Body, Who
 from service.schemas.geometry import PoseOut
 from service.store.tables import EstimateRecord
-
-_FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg"}
 
 
 class AcceptBody(Body):
@@ -32,6 +32,7 @@ class SdOut(BaseModel):
     height_m: float | None
     tilt_deg: float | None
     roll_deg: float | None
+    heading_deg: float | None
 
 
 class DriftOut(BaseModel):
@@ -43,6 +44,7 @@ class DriftOut(BaseModel):
     height_m: float | None
     tilt_deg: float | None
     roll_deg: float | None
+    heading_deg: float | None
     angle_deg: float | None
 
 
@@ -83,7 +85,7 @@ class ServedPoseOut(BaseModel):
             camera_id=view.camera_id,
             state=view.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[field for name, field in _FIELDS.items() if name in view.told],
+            estimated=[field for name, field in FIELDS.items() if name in view.told],
             sd=None if estimate is None else sd_out(estimate),
             drift=None if estimate is None else drift_out(estimate),
             estimates={} if estimate is None else estimate.raw,
@@ -110,6 +112,7 @@ class HistoryPoint(BaseModel):
     height_m: float
     tilt_deg: float
     roll_deg: float
+    heading_deg: float
     sd: SdOut | None
     drift: DriftOut | None
     tracks: int
@@ -124,6 +127,7 @@ class HistoryPoint(BaseModel):
             height_m=record.height_m,
             tilt_deg=math.degrees(record.tilt_rad),
             roll_deg=math.degrees(record.roll_rad),
+            heading_deg=math.degrees(record.heading_rad),
             sd=sd_out(record),
             drift=drift_out(record),
             tracks=record.tracks,
@@ -145,6 +149,7 @@ def sd_out(record: EstimateRecord) -> SdOut | None:
         height_m=_if_told(record, "height", record.height_sd_m),
         tilt_deg=_if_told(record, "tilt", math.degrees(record.tilt_sd_rad)),
         roll_deg=_if_told(record, "roll", math.degrees(record.roll_sd_rad)),
+        heading_deg=_if_told(record, "heading", math.degrees(record.heading_sd_rad or 0.0)),
     )
 
 
@@ -152,11 +157,12 @@ def drift_out(record: EstimateRecord) -> DriftOut | None:
     """Drift of what a stored estimate tells; None where it tells nothing."""
     if not record.told:
         return None
-    turned = {"tilt", "roll"} & set(record.told)
+    turned = set(ANGLES) & set(record.told)
     return DriftOut(
         height_m=_if_told(record, "height", record.drift_height_m),
         tilt_deg=_if_told(record, "tilt", math.degrees(record.drift_tilt_rad)),
         roll_deg=_if_told(record, "roll", math.degrees(record.drift_roll_rad)),
+        heading_deg=_if_told(record, "heading", math.degrees(record.drift_heading_rad)),
         angle_deg=math.degrees(record.drift_angle_rad) if turned else None,
     )
 

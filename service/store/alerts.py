@@ -7,6 +7,8 @@ from sqlalchemy.orm import Session
 
 from service.store.tables import AlertRecord
 
+POSE_KINDS = ("drift", "clock", "out_of_range")  # that hold a camera against its prior pose
+
 
 def find(session: Session, alert_id: str) -> AlertRecord | None:
     """The alert, or None."""
@@ -22,6 +24,17 @@ def firing(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
             AlertRecord.state == "firing",
         )
     ).first()
+
+
+def ended(session: Session, camera_id: str) -> Sequence[AlertRecord]:
+    """The alerts about a camera's pose that have ended."""
+    return session.scalars(
+        select(AlertRecord).where(
+            AlertRecord.camera_id == camera_id,
+            AlertRecord.kind.in_(POSE_KINDS),
+            AlertRecord.resolved_at.is_not(None),
+        )
+    ).all()
 
 
 def listed(

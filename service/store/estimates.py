@@ -19,6 +19,16 @@ def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     ).first()
 
 
+def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> EstimateRecord | None:
+    """The last estimate under an earlier reference, or None."""
+    return session.scalars(
+        select(EstimateRecord)
+        .where(EstimateRecord.camera_id == camera_id, EstimateRecord.reference_id < reference_id)
+        .order_by(EstimateRecord.id.desc())
+        .limit(1)
+    ).first()
+
+
 def between(
     session: Session, camera_id: str, start: datetime | None, end: datetime | None, limit: int
 ) -> Sequence[EstimateRecord]:

@@ -142,6 +142,25 @@ class SiteReferenceRecord(Record):
     __table_args__ = (Index(None, "camera_id", "id"),)
 
 
+class FlowMapRecord(Record):
+    """Where people walk at a reference's site (`models.flow`), learned of `tracks` tracks.
+
+    `data` is None where too few of them walk. `to_s` is when the last of them ended, `weight` what
+    they count for together, of whom older ones count less.
+    """
+
+    __tablename__ = "flow_maps"
+
+    reference_id: Mapped[int] = mapped_column(
+        ForeignKey("site_references.id", ondelete="CASCADE"), primary_key=True
+    )
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    tracks: Mapped[int]
+    weight: Mapped[float]
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+
+
 class TrackRecord(Record):
     """A stored track: points (N, 3) and boxes (N, 4) packed as little-endian float64."""
 
@@ -236,9 +255,10 @@ class PredictionRecord(Record):
 class EstimateRecord(Record):
     """The served pose at one time, and what is behind it.
 
-    Height, tilt and roll are the served ones: the prior's where the tracks cannot tell. Drifts and
-    standard deviations are the estimator's for all three; `told` names those that count. `raw` has
-    each estimator's own answer. `model_id` is of the averaged estimate beside the served one.
+    Height, tilt, roll and heading are the served ones: the prior's where the tracks cannot tell.
+    Drifts and standard deviations are the estimator's for all four; `told` names those that count.
+    `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
+    one. Estimates of before there were flow maps have no `heading_sd_rad`.
     """
 
     __tablename__ = "estimates"
@@ -252,19 +272,22 @@ class EstimateRecord(Record):
     )
     state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]
-    told: Mapped[list[str]]  # of tilt, roll, height
+    told: Mapped[list[str]]  # of tilt, roll, height, heading
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
     roll_rad: Mapped[float]
+    heading_rad: Mapped[float]
     height_sd_m: Mapped[float]
     tilt_sd_rad: Mapped[float]
     roll_sd_rad: Mapped[float]
+    heading_sd_rad: Mapped[float | None]
     drift_height_m: Mapped[float]
     drift_tilt_rad: Mapped[float]
     drift_roll_rad: Mapped[float]
+    drift_heading_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
     drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
-    drifted: Mapped[list[str]]  # of tilt, roll, height: what has been beyond since it began
+    drifted: Mapped[list[str]]  # of those: what has been beyond since it began
     drift_since: Mapped[datetime | None]
     raw: Mapped[dict[str, Any]]
     tracks: Mapped[int]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, delete, func, select
+from sqlalchemy import ColumnElement, Select, and_, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -25,6 +25,22 @@ class WindowBounds:
     started_from_s: float | None = None
     ended_after_s: float | None = None
     ended_from_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StillBounds:
+    """Tracks of a camera at its prior pose: those of its reference period, and later ones.
+
+    The period is of tracks that started at or after `started_from_s` and ended by
+    `reference_to_s`. Of later ones, the newest `unsure` of all its tracks do not count, nor those
+    that were seen at any time `without`, from and to.
+    """
+
+    camera_id: str
+    started_from_s: float | None
+    reference_to_s: float
+    unsure: int
+    without: tuple[tuple[float, float], ...]
 
 
 def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
@@ -87,6 +103,34 @@ def first(
         .order_by(TrackRecord.ended_s, TrackRecord.id)
         .limit(limit)
     ).all()
+
+
+def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[TrackRecord]:
+    """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
+    return session.scalars(
+        select(TrackRecord)
+        .where(*_still(bounds))
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(limit)
+    ).all()[::-1]
+
+
+def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
+    """How many tracks of a camera at its prior pose ended after a time."""
+    query = select(func.count()).select_from(TrackRecord).where(*_still(bounds))
+    if ended_after_s is not None:
+        query = query.where(TrackRecord.ended_s > ended_after_s)
+    return session.scalar(query) or 0
+
+
+def count_between(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
+    """How many tracks started after one time and before another."""
+    query = select(func.count()).where(
+        TrackRecord.camera_id == camera_id,
+        TrackRecord.started_s > from_s,
+        TrackRecord.started_s < to_s,
+    )
+    return session.scalar(query) or 0
 
 
 def newest(session: Session, camera_id: str, limit: int) -> Sequence[TrackRecord]:
@@ -167,6 +211,24 @@ def _started_from(camera_id: str, started_from_s: float | None) -> list[ColumnEl
     if started_from_s is not None:
         conditions.append(TrackRecord.started_s >= started_from_s)
     return conditions
+
+
+def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
+    newest = (
+        select(TrackRecord.id)
+        .where(TrackRecord.camera_id == bounds.camera_id)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(bounds.unsure)
+    )
+    outside = [
+        (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s)
+        for from_s, to_s in bounds.without
+    ]
+    later = and_(TrackRecord.id.not_in(newest), *outside)
+    return [
+        *_started_from(bounds.camera_id, bounds.started_from_s),
+        (TrackRecord.ended_s <= bounds.reference_to_s) | later,
+    ]
 
 
 def _window_ids(session: Session, bounds: WindowBounds) -> Select[int]:

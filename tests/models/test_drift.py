@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,33 @@ PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), headi
 LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, updates=3, clear_ratio=0.7)
 
 
-def drift(tilt_deg=0.0, roll_deg=0.0, height_m=6.0, *, sd_deg=0.05, sd_log=0.002, weak=()):
-    """An estimate that is so far from the prior pose."""
-    moved = [math.radians(tilt_deg), math.radians(roll_deg)]
-    values = np.array([PRIOR.tilt_rad + moved[0], PRIOR.roll_rad + moved[1], math.log(height_m)])
-    sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
-    return drift_between(values, np.diag(sd**2), weak, PRIOR)
+THREE = ("tilt", "roll", "height")
+FOUR = (*THREE, "heading")
+
+
+def drift(
+    tilt_deg=0.0,
+    roll_deg=0.0,
+    height_m=6.0,
+    heading_deg=0.0,
+    *,
+    sd_deg=0.05,
+    sd_log=0.002,
+    weak=(),
+    able=THREE,
+):
+    """An estimate that is so far from the prior pose; `weak` are left out of what it is able of."""
+    values = np.array(
+        [
+            PRIOR.tilt_rad + math.radians(tilt_deg),
+            PRIOR.roll_rad + math.radians(roll_deg),
+            math.log(height_m),
+            PRIOR.heading_rad + math.radians(heading_deg),
+        ]
+    )
+    sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log, math.radians(sd_deg)])
+    told = tuple(name for name in able if name not in weak)
+    return drift_between(values, np.diag(sd**2), told, PRIOR)
 
 
 def verdicts(drifts, drifted=()):
@@ -29,8 +51,8 @@ def verdicts(drifts, drifted=()):
 
 
 def test_drift_is_signed_and_roll_goes_round():
-    values = np.array([0.3, math.radians(-178), math.log(5.0)])
-    found = drift_between(values, np.eye(3) * 1e-6, (), PRIOR)
+    values = np.array([0.3, math.radians(-178), math.log(5.0), 1.0])
+    found = drift_between(values, np.eye(4) * 1e-6, THREE, PRIOR)
     assert found.height_m == pytest.approx(-1.0)
     assert found.log_height == pytest.approx(math.log(5 / 6))
     assert found.tilt_rad == pytest.approx(-0.1)
@@ -46,6 +68,29 @@ def test_what_is_not_told_stays_the_priors():
     assert (served.tilt_rad, served.height_m) == (PRIOR.tilt_rad, PRIOR.height_m)
     assert found.angle_rad == pytest.approx(math.radians(3))
     assert served.heading_rad == PRIOR.heading_rad
+
+
+def test_a_told_heading_is_a_drift_clockwise_positive():
+    found = drift(heading_deg=5, able=FOUR)
+    assert math.degrees(found.heading_rad) == pytest.approx(5)
+    assert pose_after(found, PRIOR).heading_rad == pytest.approx(PRIOR.heading_rad + 0.0872665)
+    assert math.degrees(found.angle_rad) == pytest.approx(5)
+    verdict = judge(found, LIMITS, 2, ())
+    assert verdict.drifted == ("heading",)
+    assert verdict.excess == pytest.approx(2.5)
+    untold = drift(heading_deg=5)
+    assert (untold.angle_rad, judge(untold, LIMITS, 2, ()).drifted) == (0.0, ())
+    assert pose_after(untold, PRIOR).heading_rad == PRIOR.heading_rad
+
+
+@pytest.mark.parametrize(("prior_deg", "served_deg"), [(40, 45), (359, 4), (-358, -353), (360, 5)])
+def test_a_heading_goes_round(prior_deg, served_deg):
+    prior = replace(PRIOR, heading_rad=math.radians(prior_deg))
+    whole = round(prior_deg / 360) * 360  # as an estimator may see it
+    values = np.array([0.4, prior.roll_rad, math.log(6), math.radians(prior_deg + 5 - whole)])
+    found = drift_between(values, np.eye(4) * 1e-6, FOUR, prior)
+    assert math.degrees(found.heading_rad) == pytest.approx(5)
+    assert math.degrees(pose_after(found, prior).heading_rad) == pytest.approx(served_deg)
 
 
 def test_a_single_update_beyond_the_limits_is_no_drift():
@@ -85,6 +130,7 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
     words = clock_fault(drift(height_m=7.2), 25.0)
     assert "+20 %" in words
     assert "30 frames a second were taken for 25" in words
+    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), 25.0) == words
     assert "lowered" in clock_fault(drift(height_m=5.0), None)
     for found in (
         drift(height_m=6.4),  # 7 %: under the least
@@ -92,5 +138,6 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
         drift(0.2, height_m=7.2),  # turned, by four deviations
         drift(1.1, height_m=7.2, sd_deg=2),  # turned, by more than a degree
         drift(height_m=7.2, weak=("roll",)),  # may have turned
+        drift(height_m=7.2, heading_deg=1.1, able=FOUR),  # has panned
     ):
         assert clock_fault(found, 25.0) is None

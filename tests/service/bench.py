@@ -11,6 +11,7 @@ from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import Finding, gather
+from service.recalibration.fusing import FusedPose, by_speeds_alone
 from service.recalibration.trainings import begin_training, publish_model
 from service.store import events, references, trainings
 from service.store.database import Store
@@ -50,9 +51,19 @@ class Bench:
             reference.ready_at = datetime.now(UTC)
 
     def see(
-        self, pose: CameraPose, people: int = 20, sd_deg=0.2, sd_log=0.01, weak=(), change=None
+        self,
+        pose: CameraPose,
+        people: int = 20,
+        sd_deg=0.2,
+        sd_log=0.01,
+        weak=(),
+        change=None,
+        paths=False,
     ):
-        """Post people, who come to a pose, and bring the estimate up to date."""
+        """Post people, who come to a pose, and bring the estimate up to date.
+
+        With `paths` they tell its heading too.
+        """
         first = self.count
         self.count += people
         self.clock_s += 60
@@ -74,8 +85,21 @@ class Bench:
                 weak=tuple(weak),
                 reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
             )
+            fused, registered = by_speeds_alone(joint, PRIOR), None
+            if paths:
+                sds = np.append(sd, math.radians(sd_deg))
+                fused = FusedPose(
+                    values=np.append(values, pose.heading_rad),
+                    covariance=np.diag(sds**2),
+                    told=(*fused.told, "heading"),
+                    reason="",
+                    registered=True,
+                )
+                registered = fused.values + 0.01
             finding = Finding(
                 joint=joint,
+                fused=fused,
+                registered=registered,
                 averaged=None,
                 tracks=evidence.tracks,
                 change=None if change is None else evidence.tracks[change],
@@ -100,10 +124,10 @@ class Bench:
             return [e.payload for e in events.after(session, 0, 1000) if e.type == type_]
 
 
-def moved(tilt_deg=0.0, roll_deg=0.0, height_m=0.0):
+def moved(tilt_deg=0.0, roll_deg=0.0, height_m=0.0, heading_deg=0.0):
     return CameraPose(
         height_m=PRIOR.height_m + height_m,
         tilt_rad=PRIOR.tilt_rad + math.radians(tilt_deg),
         roll_rad=PRIOR.roll_rad + math.radians(roll_deg),
-        heading_rad=PRIOR.heading_rad,
+        heading_rad=PRIOR.heading_rad + math.radians(heading_deg),
     )

@@ -12,6 +12,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
 from models.simulation.poses import repeated_pose
+from models.simulation.site import Lane, SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
 from service.job_queue import JobQueue
@@ -27,6 +28,8 @@ KNOCKED = CameraPose(
     height_m=6.3, tilt_rad=math.radians(27), roll_rad=math.radians(-3), heading_rad=math.radians(40)
 )
 
+LANES = SiteConfig(aside_m=0.8, standing_share=0.0)
+
 
 class Street:
     """People who walk past a camera one after the other, and the camera's service."""
@@ -39,6 +42,7 @@ class Street:
         self.seed = 0
         self.seen: list[Trajectory] = []
         self._bodies: list[dict[str, Any]] = []
+        self._lanes: list[Lane] = []
 
     def walk(
         self,
@@ -74,6 +78,14 @@ class Street:
             uv += rng.normal(0, 1.0, uv.shape)
             inside = LENS.contains(uv)
             self._see(0.4 * np.arange(-19, 1)[inside], uv[inside])
+        self._post()
+
+    def keep_to_lanes(self, pose: CameraPose, count: int) -> None:
+        """Post people of whom each walks one of three lanes, the same ones every time."""
+        if not self._lanes:
+            self._lanes = draw_lanes(LENS, PRIOR, LANES, np.random.default_rng(3))
+        for seen in walk_site(LENS, pose, self._lanes, LANES, count, self._next_rng()):
+            self._see(seen.time_s - seen.time_s[-1], seen.uv)
         self._post()
 
     def _next_rng(self) -> np.random.Generator:

@@ -75,6 +75,32 @@ def test_out_of_range_queues_one_training_around_the_estimate(bench):
     assert len(bench.trainings()) == 2
 
 
+def test_a_pan_alone_fires_and_clears_as_any_drift(bench):
+    for _ in range(3):
+        bench.see(moved(heading_deg=-5.0), paths=True)
+    (alert,) = bench.alerts(state="firing")
+    assert (alert["kind"], alert["severity"]) == ("drift", "critical")
+    assert alert["drift"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
+    assert alert["drift"]["angle_deg"] == pytest.approx(5.0, abs=0.5)
+    assert "heading -5.00 deg" in alert["reason"]
+    for _ in range(4):
+        bench.see(PRIOR)  # by speeds alone: they cannot tell that it was turned back
+    assert len(bench.alerts(state="firing")) == 1
+    for _ in range(3):
+        bench.see(PRIOR, paths=True)
+    assert bench.alerts(state="firing") == []
+
+
+def test_a_pan_asks_for_no_training(bench):
+    bench.see(moved(tilt_deg=14.0), paths=True)
+    with bench.store.write() as session:
+        attempt = begin_training(session, bench.settings, bench.trainings()[0]["id"])
+        end_training(session, attempt, "failed", "no walk is possible")
+    bench.see(moved(tilt_deg=14.0, heading_deg=25.0), paths=True)
+    assert "the new estimate has failed" in bench.pose()["reason"]
+    assert len(bench.trainings()) == 2
+
+
 def test_a_training_around_the_estimate_that_failed_is_not_queued_again(bench):
     bench.see(moved(tilt_deg=14.0))
     with bench.store.write() as session:
@@ -147,6 +173,8 @@ def test_an_alert_of_before_a_reference_ends_by_updates_after_it_alone(bench):
     for _ in range(4):
         bench.see(PRIOR)  # while the reference is learned again
     bench.learn()
+    for _ in range(3):
+        bench.see(PRIOR, weak=("tilt",))  # what had drifted has to be told to end
     for left in (1, 1, 0):
         bench.see(PRIOR)
         assert len(bench.alerts(state="firing")) == left

@@ -46,6 +46,42 @@ def test_the_pose_is_the_estimate_and_heading_is_carried_over(bench):
     assert body["model_id"] == bench.model_id
 
 
+def test_a_told_heading_is_in_the_pose_and_all_that_is_said_of_it(bench):
+    bench.see(moved(tilt_deg=0.5, heading_deg=-0.9), paths=True)
+    body = bench.pose()
+    assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
+    assert body["pose"]["heading_deg"] == pytest.approx(39.1)
+    assert body["drift"]["heading_deg"] == pytest.approx(-0.9)
+    assert body["drift"]["angle_deg"] == pytest.approx(math.hypot(0.5, 0.9), rel=0.01)
+    assert body["sd"]["heading_deg"] == pytest.approx(0.2)
+    assert "heading -0.90 deg (sd 0.20)" in body["reason"]
+    assert body["estimates"]["registered"] == {
+        "height_m": pytest.approx(6.0 * math.exp(0.01)),
+        "tilt_deg": pytest.approx(22.5 + math.degrees(0.01)),
+        "roll_deg": pytest.approx(1.0 + math.degrees(0.01)),
+        "heading_deg": pytest.approx(39.1 + math.degrees(0.01)),
+        "tracks": 20,
+    }
+    bench.see(moved(heading_deg=30.0))
+    body = bench.pose()
+    assert body["pose"]["heading_deg"] == pytest.approx(40)  # not told: the prior's
+    assert (body["sd"]["heading_deg"], body["drift"]["heading_deg"]) == (None, None)
+    first, second = bench.http.get("/cameras/corner/pose/history").json()["items"]
+    assert [first["heading_deg"], second["heading_deg"]] == pytest.approx([39.1, 40])
+    assert (first["drift"]["heading_deg"], second["drift"]["heading_deg"]) == (
+        pytest.approx(-0.9),
+        None,
+    )
+
+
+def test_an_accepted_heading_is_the_new_priors(bench):
+    bench.see(moved(heading_deg=5.0), paths=True)
+    bench.http.post("/cameras/corner/pose/accept").raise_for_status()
+    camera = bench.http.get("/cameras/corner").json()
+    assert camera["prior_pose"]["heading_deg"] == pytest.approx(45)
+    assert bench.pose()["pose"]["heading_deg"] == pytest.approx(45)
+
+
 def test_the_etag_changes_with_the_answer_only(bench):
     bench.see(PRIOR)
     first = bench.http.get("/cameras/corner/pose")
@@ -72,7 +108,9 @@ def test_a_number_that_is_not_told_is_nowhere_taken_for_known(bench):
     assert body["pose"]["tilt_deg"] == pytest.approx(22.0)
     assert body["pose"]["height_m"] == pytest.approx(6.0)
     assert body["pose"]["roll_deg"] == pytest.approx(1.3)
-    assert body["sd"] == {"height_m": None, "tilt_deg": None, "roll_deg": pytest.approx(0.2)}
+    sd = body["sd"]
+    assert sd.pop("roll_deg") == pytest.approx(0.2)
+    assert set(sd.values()) == {None}
     assert body["drift"]["tilt_deg"] is None
     assert body["drift"]["angle_deg"] == pytest.approx(0.3)
     assert "cannot tell tilt and height" in body["reason"]

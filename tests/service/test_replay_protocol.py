@@ -12,49 +12,70 @@ import pytest
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import observe
 from models.estimation.joint.reference import learn_reference
-from models.evaluation.protocol import KNOCKED, Answer, draw_case, judge_answer, pose_of_numbers
+from models.evaluation.protocol import RANGES, Answer, draw_case, judge_answer, pose_of_numbers
 from models.evaluation.scenes import load_scene
+from models.flow.packing import flow_from_bytes, flow_to_bytes
 from models.geometry.upright import tops_of_boxes
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.recalibration.fusing import fuse, learn_paths
 from service.replay_protocol import boxes_of, tops_carried
 
 SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
-SEED = 2  # a case in which boxes can say every upper edge that offline knows
+# Cases in which boxes can say every upper edge that offline knows; the second tells its heading.
+CASES = [("pets2009_s2l1_v001_sort", "knock", 2), ("wildtrack_c1", "pan", 3)]
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}")
-def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service):
-    folder = SCENES / "pets2009_s2l1_v001_sort"
+@pytest.mark.parametrize(("scene_id", "knock", "seed"), CASES)
+def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, scene_id, knock, seed):
+    folder = SCENES / scene_id
     service.start_again(drift_updates=1)
     done = subprocess.run(
         [sys.executable, "-m", "service.cli", "replay", str(folder), "--url", service.url]
-        + ["--protocol", str(SEED)],
+        + ["--protocol", str(seed), "--knock", knock],
         capture_output=True,
         text=True,
         timeout=200,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    case = draw_case(load_scene(folder), SEED, KNOCKED)
+    case = draw_case(load_scene(folder), seed, RANGES[knock])
     known, seen = observe(case.reference, case.intrinsics), observe(case.seen, case.intrinsics)
     site = learn_reference(known, case.prior_pose, WalkConfig(), service.settings.seed)
-    offline = joint_estimate(seen, case.prior_pose, site)
-    pose = pose_of_numbers(offline.values, case.prior_pose)
-    body = service.http.get(f"/cameras/{case.scene_id}-knock-{SEED}/pose").json()
+    joint = joint_estimate(seen, case.prior_pose, site)
+    paths = learn_paths(known, case.intrinsics, case.prior_pose, service.settings.seed)
+    stored = flow_from_bytes(flow_to_bytes(paths))
+    offline = fuse(seen, case.intrinsics, case.prior_pose, joint, stored)
+    pose = pose_of_numbers(offline.values[:3], case.prior_pose)
+    body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()
     sd = np.sqrt(np.diag(offline.covariance))
     told = {
         "tilt_deg": (math.degrees(pose.tilt_rad), math.degrees(sd[0])),
         "roll_deg": (math.degrees(pose.roll_rad), math.degrees(sd[1])),
         "height_m": (pose.height_m, pose.height_m * sd[2]),
     }
-    assert not offline.weak
+    assert {"tilt", "roll", "height"} <= set(offline.told)
+    assert ("heading" in offline.told) == (body["sd"]["heading_deg"] is not None)
+    heading_rad = None
+    if knock == "pan":
+        heading_rad = float(offline.values[3])
+        told["heading_deg"] = (math.degrees(heading_rad), math.degrees(sd[3]))
+        assert body["drift"]["heading_deg"] == pytest.approx(
+            math.degrees(case.true_pose.heading_rad - case.prior_pose.heading_rad), abs=1.5
+        )
     for field, (value, deviation) in told.items():
         assert f"{body['pose'][field]:.3f}" == f"{value:.3f}" in done.stdout
         assert f"{body['sd'][field]:.3f}" == f"{deviation:.3f}" in done.stdout
-    answer = Answer(values=offline.values, covariance=offline.covariance, tracks=offline.walkers)
-    outcome = judge_answer(case, "joint", answer, 0.0)
+    answer = Answer(
+        values=offline.values[:3],
+        covariance=offline.covariance[:3, :3],
+        tracks=joint.walkers,
+        heading_rad=heading_rad,
+        heading_sd_rad=float(sd[3]),
+    )
+    outcome = judge_answer(case, "fused", answer, 0.0)
     off = f"{outcome.angle_error_deg:.2f} deg and {100 * outcome.height_error:.1f} % of height off"
     assert off in done.stdout
     assert body["tracks"] == len(case.seen)

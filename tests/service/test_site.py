@@ -10,13 +10,15 @@ import pytest
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import learn_reference
+from models.flow.packing import flow_from_bytes, flow_to_bytes
 from models.simulation.walkers import WalkConfig
 from service.jobs.estimate import learn_if_due
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
+from service.recalibration.fusing import fuse, learn_paths
 from service.store import references
 from tests.conftest import CAMERA, track
-from tests.service.street import KNOCKED, PRIOR, Street, tall
+from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall
 
 WANTED = 60
 
@@ -38,6 +40,10 @@ def known(street):
 def reference_of(street):
     with street.context.store.read() as session:
         return references.newest(session, "corner")
+
+
+def as_stored(flow):
+    return flow_from_bytes(flow_to_bytes(flow))
 
 
 def served(body):
@@ -66,7 +72,7 @@ def test_a_reference_is_learned_of_the_first_tracks_without_any_model(street):
     assert body["tracks"] == 20
     assert body["state"] == "ok"
     assert body["model_id"] is None
-    assert set(body["estimates"]) == {"joint"}
+    assert set(body["estimates"]) == {"joint", "registered"}
     offset = reference_of(street).offsets["joint"]
     assert abs(offset["tilt_deg"]) < 1
     assert offset["sd"]["log_height"] > 0
@@ -76,9 +82,10 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     street.walk(PRIOR, WANTED)
     street.walk(KNOCKED, 50)
     body = street.look()
-    site = learn_reference(street.observed(0, WANTED), PRIOR, WalkConfig(), 0)
-    offline = joint_estimate(street.observed(WANTED, WANTED + 50), PRIOR, site)
-    tilt, roll, log_height = offline.values
+    known, seen = street.observed(0, WANTED), street.observed(WANTED, WANTED + 50)
+    joint = joint_estimate(seen, PRIOR, learn_reference(known, PRIOR, WalkConfig(), 0))
+    offline = fuse(seen, LENS, PRIOR, joint, as_stored(learn_paths(known, LENS, PRIOR, 0)))
+    tilt, roll, log_height, _ = offline.values
     assert served(body) == pytest.approx(
         [math.degrees(tilt), math.degrees(roll), math.exp(log_height)], abs=1e-6
     )
@@ -86,7 +93,30 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     assert body["sd"]["tilt_deg"] == pytest.approx(math.degrees(sd[0]), abs=1e-6)
     assert body["sd"]["height_m"] == pytest.approx(sd[2] * math.exp(log_height), abs=1e-6)
     raw = body["estimates"]["joint"]
-    assert raw["tilt_deg"] == pytest.approx(math.degrees(offline.raw[0]), abs=1e-6)
+    assert raw["tilt_deg"] == pytest.approx(math.degrees(joint.raw[0]), abs=1e-6)
+
+
+@pytest.mark.parametrize("pan_deg", [5, -5])
+def test_a_pure_pan_is_served_and_opens_an_alert(street, pan_deg):
+    change = {"reference_tracks": 150}
+    street.http.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
+    street.keep_to_lanes(PRIOR, 180)
+    body = street.look()
+    assert body["state"] == "ok"
+    assert body["pose"]["heading_deg"] == pytest.approx(40, abs=1.5)
+    panned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(pan_deg))
+    for _ in range(2):
+        street.keep_to_lanes(panned, 200)
+        body = street.look()
+    assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
+    assert body["drift"]["heading_deg"] == pytest.approx(pan_deg, abs=1.0)
+    assert body["pose"]["heading_deg"] == pytest.approx(40 + body["drift"]["heading_deg"])
+    assert body["drift"]["angle_deg"] == pytest.approx(5, abs=1.0)
+    assert body["state"] == "drifting"
+    (alert,) = street.alerts()
+    assert (alert["kind"], alert["state"]) == ("drift", "firing")
+    assert alert["drift"]["heading_deg"] == body["drift"]["heading_deg"]
+    assert "heading" in alert["reason"]
 
 
 def test_the_window_begins_at_a_change_and_the_pose_arrives(known):
@@ -219,7 +249,8 @@ def test_boxes_carry_how_tall_people_are(street):
         site.stature_m, rel=0.02
     )
     offline = joint_estimate(street.observed(WANTED, WANTED + 40), PRIOR, site)
-    assert served(body)[2] == pytest.approx(math.exp(offline.values[2]), abs=1e-6)
+    said = body["estimates"]["joint"]
+    assert said["height_m"] == pytest.approx(math.exp(offline.raw[2]), abs=1e-6)
     assert body["sd"]["height_m"] < 0.15  # by speeds alone it is 0.25 m
 
 
