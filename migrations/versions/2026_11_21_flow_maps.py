@@ -10,7 +10,7 @@ depends_on = None
 
 # Estimates of before told no heading: what was served was that of their prior pose.
 _PRIOR_HEADINGS = """
-UPDATE estimates SET drift_heading_rad = 0, heading_rad =
+UPDATE estimates SET suspected = 0, drift_heading_rad = 0, heading_rad =
     (SELECT p.heading_rad FROM prior_poses p WHERE p.id = estimates.prior_pose_id)
 """
 
@@ -36,14 +36,17 @@ def upgrade() -> None:
         batch.add_column(sa.Column("heading_rad", sa.Double(), nullable=True))
         batch.add_column(sa.Column("heading_sd_rad", sa.Double(), nullable=True))
         batch.add_column(sa.Column("drift_heading_rad", sa.Double(), nullable=True))
+        batch.add_column(sa.Column("suspected", sa.Boolean(), nullable=True))
     op.execute(_PRIOR_HEADINGS)
     with op.batch_alter_table("estimates") as batch:
         batch.alter_column("heading_rad", existing_type=sa.Double(), nullable=False)
         batch.alter_column("drift_heading_rad", existing_type=sa.Double(), nullable=False)
+        batch.alter_column("suspected", existing_type=sa.Boolean(), nullable=False)
 
 
 def downgrade() -> None:
     with op.batch_alter_table("estimates") as batch:
+        batch.drop_column("suspected")
         batch.drop_column("drift_heading_rad")
         batch.drop_column("heading_sd_rad")
         batch.drop_column("heading_rad")

@@ -34,7 +34,7 @@ class UsualFit:
             return False
         drop = self.mean - float(fits.mean())
         sd = self.sd * np.sqrt(1 / fits.size + 1 / self.parties)
-        return drop > max(_LEAST_DROP, -float(stdtrit(self.parties - 1, _RATE)) * sd)
+        return drop > max(_LEAST_DROP, -float(stdtrit(self.parties - 1, _RATE) * sd))
 
 
 def usual_fit(fits: Array) -> UsualFit:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.flow.placement import Placement
+from models.flow.rounding import rounded
 from models.geometry.rotation import Array
 
 DIRECTIONS = 16
@@ -150,11 +151,11 @@ def learn_map(
     return FlowMap(
         corner=low,
         cell_m=cell_m,
-        log_density=np.log(share / node),
+        log_density=rounded(np.log(share / node)),
         elsewhere=float(np.log(_ANYWHERE / whole.size / node)),
-        unseen=1 - seen,
+        unseen=np.rint((1 - seen) * 255) / 255,
         log_level=float(-np.log(max(seen.sum(), 1.0) * DIRECTIONS * node)),
-        people=whole.sum(axis=2) * 2 * np.pi * (_SMOOTH_M / cell_m) ** 2,
+        people=(whole.sum(axis=2) * 2 * np.pi * (_SMOOTH_M / cell_m) ** 2).astype(np.float32),
     )
 
 

@@ -10,6 +10,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.numbers import NUMBERS
 from models.flow.evidence import Walkers, walkers_of
+from models.flow.fit_test import party_fits
 from models.flow.reference import FlowReference, precision_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
@@ -31,9 +32,9 @@ class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
     `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` says in
-    words what they cannot and why, empty where they tell all. `registered` is whether the flow map
-    had a part; without, all is the joint estimate's and the heading the prior pose's. `rivals` are
-    headings (radians) of other poses that explain the tracks about as well.
+    words what is to be said of the flow map. `registered` is whether it had a part; without, all
+    is the joint estimate's and the heading the prior pose's. `rivals` are headings (radians) of
+    other poses that explain the tracks about as well.
     """
 
     values: Array
@@ -64,7 +65,7 @@ def fused_estimate(
     precision[3, 3] = _HEADING_SD**-2.0
     walkers = walkers_of(observations, mean)
     if walkers.parties < _FEWEST_PARTIES:
-        return _unregistered(joint, prior, joint.reason)
+        return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
     temper = reference.temper_for(walkers.people)
     search = partial(register, walkers, site, temper=temper, headings=_HEADINGS)
@@ -88,23 +89,26 @@ def fused_estimate(
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
     # Of the offset only as much is unsure as the map decides.
     covariance = covariance + share @ reference.offset_covariance @ share.T
+    if reference.fit.has_changed(party_fits(walkers, site, values)):
+        return by_speeds_alone(joint, prior, "the paths have changed: the flow map is left out")
+    rivals = tuple(
+        float(peak.candidate[3] - reference.offset[3])
+        for peak in peaks[1:]
+        if peak.value > best.value - _RIVAL
+    )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
         values=values - reference.offset,
         covariance=covariance,
         told=tuple(n for n, telling in zip(_FUSED, sd <= _TELLING_SD, strict=True) if telling),
-        reason="",
+        reason=_words(float(values[3] - reference.offset[3]), rivals, float(sd[3]), prior),
         registered=True,
-        rivals=tuple(
-            float(peak.candidate[3] - reference.offset[3])
-            for peak in peaks[1:]
-            if peak.value > best.value - _RIVAL
-        ),
+        rivals=rivals,
     )
 
 
-def _unregistered(joint: JointEstimate, prior: CameraPose, reason: str) -> FusedEstimate:
-    """The joint estimate alone."""
+def by_speeds_alone(joint: JointEstimate, prior: CameraPose, reason: str = "") -> FusedEstimate:
+    """The joint estimate with the prior's heading, which it cannot tell."""
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
     covariance[3, 3] = _HEADING_SD**2
@@ -115,6 +119,16 @@ def _unregistered(joint: JointEstimate, prior: CameraPose, reason: str) -> Fused
         reason=reason,
         registered=False,
     )
+
+
+def _words(heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPose) -> str:
+    if rivals:
+        turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
+        said = " and ".join(f"{math.degrees(turn):+.1f} deg" for turn in turns)
+        return f"turns of {said} explain where people walk about as well"
+    if sd > _TELLING_SD[3]:
+        return f"where people walk does not tell the heading (sd {math.degrees(sd):.1f} deg)"
+    return ""
 
 
 def _elsewhere(peaks: list[Peak]) -> Array:

@@ -17,11 +17,12 @@ from models.flow.registration import Site
 from models.geometry.rotation import Array
 
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.
-_REACH = np.array([np.radians(2), np.radians(2), 0.05, np.radians(2)])
+REACH = np.array([np.radians(2), np.radians(2), 0.05, np.radians(2)])
 _FEWEST = 8  # parties that a move is told by
 _MOST = 300
 _BLOCK = 3  # parties after one another that the bootstrap keeps together
 _DRAWS = 1500
+_RIDGE = 0.02  # of each score's variance is its own, so that no direction is too good
 _BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's tail is theirs
 
 
@@ -66,7 +67,7 @@ def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.ND
     scores = np.stack(
         [
             site.likelihood(walkers, at + step).values - site.likelihood(walkers, at - step).values
-            for step in np.diag(_REACH)
+            for step in np.diag(REACH)
         ],
         axis=1,
     )
@@ -134,7 +135,7 @@ def has_moved(
     count, number = np.unravel_index(int(squares.argmax()), squares.shape)
     parties = int(count) + _FEWEST
     apart = (scores[-parties:] - still.mean).sum(axis=0)
-    toward = _directions(still.covariance, still.bent)[number] @ apart
+    toward = _directions(still.covariance, still.bent)[0][number] @ apart
     level = still.level(rate)
     statistic = float(squares.max())
     return Move(
@@ -148,18 +149,41 @@ def has_moved(
     )
 
 
+def moved_within(
+    walkers: Walkers, site: Site, at: Array, still: StillScores, rate: float
+) -> int | None:
+    """The first track after a move that happened among those of a window; None where none did.
+
+    Parties before and after are held against one another, so that a camera which has stood
+    elsewhere for all of the window is not taken for one that moves again.
+    """
+    scores, tracks = party_scores(walkers, site, at)
+    if len(scores) < 2 * _FEWEST:
+        return None
+    directions, variance = _directions(still.covariance, still.bent)
+    along = np.cumsum(scores @ directions.T, axis=0)
+    before = np.arange(_FEWEST, len(scores) - _FEWEST + 1)[:, None]
+    after = len(scores) - before
+    first = along[_FEWEST - 1 : len(scores) - _FEWEST]
+    apart = (along[-1] - first) / after - first / before
+    squares = apart**2 / (variance * (1 / before + 1 / after))
+    if squares.max() < still.level(rate):
+        return None
+    parties, _ = np.unravel_index(int(squares.argmax()), squares.shape)
+    return int(tracks[int(parties) + _FEWEST])
+
+
 def _squares(scores: Array, mean: Array, covariance: Array, bent: Array, parties: float) -> Array:
     """Squared standard scores (W, 4) of the newest 8, 9, ... parties' means, for each number."""
-    directions = _directions(covariance, bent)
+    directions, variance = _directions(covariance, bent)
     along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
     count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
-    variance = np.einsum("ki,ij,kj->k", directions, covariance, directions)
     # The map is wrong by as much as its own parties' mean is.
     return np.asarray((along / count) ** 2 / (variance * (1 / count + 1 / parties)))
 
 
-def _directions(covariance: Array, bent: Array) -> Array:
-    """Rows (4, 4): what to look along for each number, to see it best against the scatter."""
-    ridge = covariance + 0.02 * np.diag(np.diag(covariance)) + 1e-9 * np.eye(4)
-    return np.asarray(np.linalg.solve(ridge, bent).T)
-
+def _directions(covariance: Array, bent: Array) -> tuple[Array, Array]:
+    """Rows (4, 4) to look along, to see each number best against the scatter; variances (4,)."""
+    ridge = covariance + _RIDGE * np.diag(np.diag(covariance)) + 1e-9 * np.eye(4)
+    directions = np.linalg.solve(ridge, bent).T
+    return np.asarray(directions), np.einsum("ki,ij,kj->k", directions, ridge, directions)

@@ -8,27 +8,26 @@ from typing import Any
 import numpy as np
 
 from models.errors import CheckpointError
-from models.flow.flow_map import FlowMap, coverage_of
+from models.flow.fit_test import UsualFit
+from models.flow.flow_map import FlowMap
+from models.flow.move_test import StillScores
 from models.flow.reference import FlowReference
 from models.flow.rounding import of_levels, to_levels
+from models.flow.view import coverage_of
 
 _FORMAT = 1
-# What is stored in a form of its own; all other fields are arrays or plain numbers and words.
-_OWN_FORM = ("flow", "coverage")
-_FIELDS = tuple(field.name for field in fields(FlowReference) if field.name not in _OWN_FORM)
+_NESTED = ("flow", "coverage", "still", "fit")
 
 
 def flow_to_bytes(reference: FlowReference) -> bytes:
-    """NumPy's `.npz` of a reference, its log densities rounded to 1/64."""
+    """NumPy's `.npz` of a reference, in whole numbers where its map is rounded to these."""
     flow = reference.flow
-    values: dict[str, Any] = {
-        "format": _FORMAT,
-        "map_corner": flow.corner,
-        "map_cell_m": flow.cell_m,
-        "map_elsewhere": flow.elsewhere,
-        "map_levels": to_levels(flow.log_density),
-        **{name: getattr(reference, name) for name in _FIELDS},
-    }
+    values: dict[str, Any] = {"format": _FORMAT}
+    for name, value in (("flow", flow), ("still", reference.still), ("fit", reference.fit)):
+        values |= {f"{name}.{key}": part for key, part in _fields(value).items()}
+    values |= {key: part for key, part in _fields(reference).items() if key not in _NESTED}
+    values["flow.log_density"] = to_levels(flow.log_density)
+    values["flow.unseen"] = np.rint(flow.unseen * 255).astype(np.uint8)
     with io.BytesIO() as file:
         np.savez_compressed(file, **values)
         return file.getvalue()
@@ -45,18 +44,26 @@ def flow_from_bytes(data: bytes) -> FlowReference:
             values = {name: file[name] for name in file.files}
         if int(values["format"]) != _FORMAT:
             raise CheckpointError(f"format: {_FORMAT} is needed, got {values['format']}")
-        flow = FlowMap(
-            corner=values["map_corner"],
-            cell_m=float(values["map_cell_m"]),
-            log_density=of_levels(values["map_levels"]),
-            elsewhere=float(values["map_elsewhere"]),
+        values["flow.log_density"] = of_levels(values["flow.log_density"])
+        values["flow.unseen"] = values["flow.unseen"] / 255
+        flow = FlowMap(**_taken(FlowMap, values, "flow."))
+        return FlowReference(
+            flow=flow,
+            coverage=coverage_of(flow),
+            still=StillScores(**_taken(StillScores, values, "still.")),
+            fit=UsualFit(**_taken(UsualFit, values, "fit.")),
+            **_taken(FlowReference, values, ""),
         )
-        rest = {name: _plain(values[name]) for name in _FIELDS}
-        return FlowReference(flow=flow, coverage=coverage_of(flow), **rest)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"flow: not readable: {error!r}") from error
 
 
-def _plain(array: Any) -> Any:
-    """An array, or the number or the words that one without axes holds."""
-    return array.item() if array.ndim == 0 else array
+def _fields(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in fields(value)}
+
+
+def _taken(kind: Any, values: dict[str, Any], prefix: str) -> dict[str, Any]:
+    """What is stored of a kind's fields: arrays, and numbers where these have no axes."""
+    names = [field.name for field in fields(kind) if prefix or field.name not in _NESTED]
+    found = {name: values[prefix + name] for name in names}
+    return {name: part if part.ndim else part.item() for name, part in found.items()}

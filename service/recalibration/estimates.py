@@ -108,6 +108,8 @@ def _judge(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
         words.append(f"{edge}; a training around the new estimate {training}")
+    if finding.move is not None:
+        words.append(describe_move(finding.move))
     words.append(finding.fused.reason)
     if not set(NUMBERS) <= set(drift.told):
         words.append(finding.joint.reason)
@@ -194,6 +196,7 @@ def _record(
         drift_roll_rad=drift.roll_rad,
         drift_heading_rad=drift.heading_rad,
         drift_angle_rad=drift.angle_rad,
+        suspected=finding.move is not None,
         drift_streak=0,
         drifted=[],
         drift_since=None,

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift.change_point import find_change
-from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -15,17 +13,18 @@ from models.estimation.averaged import (
     averaged_estimate,
 )
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
-from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import assumed_reference
-from models.estimation.joint.site import SiteReference
+from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
+from models.flow.move_test import Move
 from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
-from service.recalibration.fusing import FusedPose, by_speeds_alone, fuse
+from service.recalibration.changes import change_among, suspicion
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.settings import Settings
 from service.store import cameras, estimates, flow_maps, references, tracks, trainings
@@ -74,13 +73,15 @@ class Finding:
     """What the evidence comes to. `tracks` are those after the `change`, where one was found.
 
     `fused` is to be served; `registered` (4,) is that before the map's offset is taken off, None
-    where no map had a part.
+    where no map had a part. `move` is what the newest tracks say by where people walk, long before
+    a pose can say how far, if that is that the camera has moved.
     """
 
     joint: JointEstimate
-    fused: FusedPose
+    fused: FusedEstimate
     registered: Array | None
     averaged: PoseEstimate | None
+    move: Move | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
 
@@ -133,20 +134,27 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     observations = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
     if observations.walkers < FEWEST_WALKERS:
         return None
-    prior, seen, change, registered = evidence.prior, evidence.tracks, None, None
+    lens, prior = evidence.intrinsics, evidence.prior
+    seen, change, registered, move = evidence.tracks, None, None, None
     if evidence.site is None:
-        reference = assumed_reference(observations, prior, evidence.walk)
-        joint = joint_estimate(observations, prior, reference)
+        joint = joint_estimate(
+            observations, prior, assumed_reference(observations, prior, evidence.walk)
+        )
         fused = by_speeds_alone(joint, prior)
     else:
-        reference = reference_from_bytes(evidence.site)
-        change, observations, joint = _since_change(evidence, observations, reference)
+        site = reference_from_bytes(evidence.site)
         flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
-        fused = fuse(observations, evidence.intrinsics, prior, joint, flow)
-        if flow is not None and fused.registered:
-            registered = fused.values + flow.offset
-        if change is not None:
+        ends_s = np.array([track.ended_s for track in seen])
+        found, observations, joint = change_among(observations, ends_s, lens, prior, site, flow)
+        if found is not None:
+            change = seen[found]
             seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
+        if flow is None:
+            fused = by_speeds_alone(joint, prior)
+        else:
+            fused = fused_estimate(observations, lens, prior, joint, flow)
+            registered = fused.values + flow.offset if fused.registered else None
+            move = suspicion(observations, lens, prior, flow)
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
@@ -157,6 +165,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         fused=fused,
         registered=registered,
         averaged=averaged,
+        move=move,
         tracks=seen,
         change=change,
     )
@@ -177,25 +186,6 @@ def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
             [(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64
         ).reshape(-1, 4),
     )
-
-
-def _since_change(
-    evidence: Evidence, observations: Observations, reference: SiteReference
-) -> tuple[SeenTrack | None, Observations, JointEstimate]:
-    """The first track after a change that is beyond doubt, what is seen and told from there on."""
-    prior = evidence.prior
-    found = find_change(observations, prior, reference)
-    if found is not None:
-        change = evidence.tracks[found.track_idx]
-        ends = np.array([track.ended_s for track in evidence.tracks])
-        old, new = np.flatnonzero(ends < change.ended_s), np.flatnonzero(ends >= change.ended_s)
-        after = of_tracks(observations, new)
-        before = of_tracks(observations, old)
-        if min(before.walkers, after.walkers) >= FEWEST_WALKERS:
-            joint = joint_estimate(after, prior, reference)
-            if moved_beyond_doubt(joint_estimate(before, prior, reference), joint):
-                return change, after, joint
-    return None, observations, joint_estimate(observations, prior, reference)
 
 
 def _is_news(

@@ -9,11 +9,11 @@ from sqlalchemy.orm import Session
 from models.drift.change_point import FEWEST_BESIDE
 from models.estimation.joint.observations import observe
 from models.flow.packing import flow_to_bytes
+from models.flow.reference import learn_flow
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.trajectory import Trajectory
-from service.recalibration.fusing import learn_paths
 from service.recalibration.references import made_against
 from service.recalibration.stillness import Doubt, doubts, still_bounds
 from service.settings import Settings
@@ -90,7 +90,7 @@ def grow(period: GrowthPeriod, seed: int) -> bytes | None:
     if not period.trajectories:
         return None
     observations = observe(period.trajectories, period.intrinsics)
-    flow = learn_paths(observations, period.intrinsics, period.prior, seed, period.weights)
+    flow = learn_flow(observations, period.intrinsics, period.prior, seed, period.weights)
     return None if flow is None else flow_to_bytes(flow)
 
 
@@ -126,7 +126,7 @@ def _in_doubt(
     last = estimates.newest(session, reference.camera_id)
     if last is None or not made_against(reference, last) or not last.told:
         return True
-    if last.drift_streak > 0 or last.drifted:
+    if last.drift_streak > 0 or last.drifted or last.suspected:
         return True
     if any(alerts.firing(session, reference.camera_id, kind) for kind in alerts.POSE_KINDS):
         return True

@@ -20,13 +20,13 @@ from models.estimation.joint.packing import reference_to_bytes
 from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
 from models.flow.packing import flow_to_bytes
+from models.flow.reference import learn_flow
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import open_alert
 from service.recalibration.evidence import as_predictions, walk_of
-from service.recalibration.fusing import learn_paths
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
@@ -95,7 +95,7 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
     if len(period.predictions) >= FEWEST_TRACKS:
         estimate = averaged_estimate(period.predictions, seed)
         offsets["averaged"] = _averaged_offset(estimate, period.prior)
-    flow = learn_paths(observations, period.intrinsics, period.prior, seed)
+    flow = learn_flow(observations, period.intrinsics, period.prior, seed)
     return LearnedReference(
         site=site, flow=None if flow is None else flow_to_bytes(flow), offsets=offsets
     )

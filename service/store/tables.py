@@ -286,6 +286,7 @@ class EstimateRecord(Record):
     drift_roll_rad: Mapped[float]
     drift_heading_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
+    suspected: Mapped[bool]  # the score test says that the camera has moved
     drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
     drifted: Mapped[list[str]]  # of those: what has been beyond since it began
     drift_since: Mapped[datetime | None]

@@ -6,12 +6,12 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
+from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import Finding, gather
-from service.recalibration.fusing import FusedPose, by_speeds_alone
 from service.recalibration.trainings import begin_training, publish_model
 from service.store import events, references, trainings
 from service.store.database import Store
@@ -88,7 +88,7 @@ class Bench:
             fused, registered = by_speeds_alone(joint, PRIOR), None
             if paths:
                 sds = np.append(sd, math.radians(sd_deg))
-                fused = FusedPose(
+                fused = FusedEstimate(
                     values=np.append(values, pose.heading_rad),
                     covariance=np.diag(sds**2),
                     told=(*fused.told, "heading"),
@@ -101,6 +101,7 @@ class Bench:
                 fused=fused,
                 registered=registered,
                 averaged=None,
+                move=None,
                 tracks=evidence.tracks,
                 change=None if change is None else evidence.tracks[change],
             )

@@ -14,11 +14,12 @@ from models.estimation.joint.observations import observe
 from models.estimation.joint.reference import learn_reference
 from models.evaluation.protocol import RANGES, Answer, draw_case, judge_answer, pose_of_numbers
 from models.evaluation.scenes import load_scene
+from models.flow.fusion import fused_estimate
 from models.flow.packing import flow_from_bytes, flow_to_bytes
+from models.flow.reference import learn_flow
 from models.geometry.upright import tops_of_boxes
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
-from service.recalibration.fusing import fuse, learn_paths
 from service.replay_protocol import boxes_of, tops_carried
 
 SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
@@ -45,9 +46,9 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     known, seen = observe(case.reference, case.intrinsics), observe(case.seen, case.intrinsics)
     site = learn_reference(known, case.prior_pose, WalkConfig(), service.settings.seed)
     joint = joint_estimate(seen, case.prior_pose, site)
-    paths = learn_paths(known, case.intrinsics, case.prior_pose, service.settings.seed)
+    paths = learn_flow(known, case.intrinsics, case.prior_pose, service.settings.seed)
     stored = flow_from_bytes(flow_to_bytes(paths))
-    offline = fuse(seen, case.intrinsics, case.prior_pose, joint, stored)
+    offline = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, stored)
     pose = pose_of_numbers(offline.values[:3], case.prior_pose)
     body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()
     sd = np.sqrt(np.diag(offline.covariance))

@@ -10,12 +10,13 @@ import pytest
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import learn_reference
+from models.flow.fusion import fused_estimate
 from models.flow.packing import flow_from_bytes, flow_to_bytes
+from models.flow.reference import learn_flow
 from models.simulation.walkers import WalkConfig
 from service.jobs.estimate import learn_if_due
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
-from service.recalibration.fusing import fuse, learn_paths
 from service.store import references
 from tests.conftest import CAMERA, track
 from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall
@@ -84,7 +85,7 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     body = street.look()
     known, seen = street.observed(0, WANTED), street.observed(WANTED, WANTED + 50)
     joint = joint_estimate(seen, PRIOR, learn_reference(known, PRIOR, WalkConfig(), 0))
-    offline = fuse(seen, LENS, PRIOR, joint, as_stored(learn_paths(known, LENS, PRIOR, 0)))
+    offline = fused_estimate(seen, LENS, PRIOR, joint, as_stored(learn_flow(known, LENS, PRIOR, 0)))
     tilt, roll, log_height, _ = offline.values
     assert served(body) == pytest.approx(
         [math.degrees(tilt), math.degrees(roll), math.exp(log_height)], abs=1e-6

@@ -1,0 +1,76 @@
+"""From walkers at a known pose to a map that others can be registered to."""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.flow.evidence import Walkers
+from models.flow.flow_map import learn_map, slot_of
+from models.flow.placement import place_steps
+from models.flow.registration import Site
+from models.flow.view import coverage_of, in_view
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array
+
+_SHADE_M = 2.0  # over which the edge of what the reference saw is blurred, as the map is
+_SLOTS = 4  # parts of a day: night, morning, afternoon, evening, wherever midnight UTC falls
+_FEWEST_A_SLOT = 80  # people that a part of the day is asked by
+_CLEAR = 3.0  # standard errors by which parts of the day must foretell better
+
+
+def mapped(walkers: Walkers, weights: Array, intrinsics: Intrinsics, at: Array, slots: int) -> Site:
+    """The map of walkers seen from a known pose (4,), each counted by its weight (tracks,)."""
+    flow = learn_map(
+        place_steps(walkers.steps, at),
+        _evenly(walkers) * weights[walkers.steps.rows.owner_idx],
+        walkers.steps.rows.time_s,
+        lambda places: in_view(intrinsics, at, places, _SHADE_M),
+        slots,
+    )
+    return Site(flow=flow, coverage=coverage_of(flow), intrinsics=intrinsics)
+
+
+def slots_worth(
+    folds: list[tuple[Walkers, Array, Walkers]], intrinsics: Intrinsics, at: Array
+) -> int:
+    """Into how many parts a day should fall: 4 where these foretell people better, else one.
+
+    Args:
+        folds: walkers to learn of with their weights, and others to foretell.
+        intrinsics: of the camera.
+        at: the known pose (4,).
+    """
+    everyone = np.concatenate([_slot_of_people(asked) for _, _, asked in folds])
+    if (np.bincount(everyone, minlength=_SLOTS) >= _FEWEST_A_SLOT).sum() < 2:
+        return 1
+    gains = np.concatenate(
+        [
+            _foretold(asked, mapped(known, weights, intrinsics, at, _SLOTS), at)
+            - _foretold(asked, mapped(known, weights, intrinsics, at, 1), at)
+            for known, weights, asked in folds
+        ]
+    )
+    clear = gains.mean() > _CLEAR * gains.std() / np.sqrt(gains.size)
+    return _SLOTS if clear else 1
+
+
+def _foretold(walkers: Walkers, site: Site, at: Array) -> Array:
+    """The mean log density (P,) of each person."""
+    placed = place_steps(walkers.steps, at)
+    rows = walkers.steps.rows
+    slot_idx = site.flow.slot_of(rows.time_s)
+    value, _, _ = site.flow.look(placed.place, placed.direction, slot_idx)
+    sums = np.bincount(rows.owner_idx, _evenly(walkers) * value, walkers.tracks)
+    return np.asarray(sums[np.unique(rows.owner_idx)])
+
+
+def _slot_of_people(walkers: Walkers) -> npt.NDArray[np.int64]:
+    rows = walkers.steps.rows
+    _, first = np.unique(rows.owner_idx, return_index=True)
+    return slot_of(rows.time_s[first], _SLOTS)
+
+
+def _evenly(walkers: Walkers) -> Array:
+    """Weights (M,) by which each track counts once."""
+    owner_idx = walkers.steps.rows.owner_idx
+    number = np.bincount(owner_idx, minlength=walkers.tracks)
+    return np.asarray(1.0 / number[owner_idx])
