@@ -16,7 +16,7 @@ SERVICE_ROOMS = [
     {"migrate", "recalibration"},
     {"schemas", "jobs"},
     {"routes"},
-    {"app"},
+    {"app", "protocol_tables"},
     {"serve", "replay", "evaluate", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},

@@ -1,0 +1,102 @@
+"""The flow map as the protocol runs it: with the joint estimate, and alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.estimation.joint.estimate import joint_estimate
+from models.estimation.numbers import NUMBERS
+from models.evaluation.joint_runs import joint_answer
+from models.evaluation.learned import Learned
+from models.evaluation.protocol import Answer, nothing_told
+from models.flow.evidence import Walkers, likelihood, walkers_of
+from models.flow.fusion import fused_estimate
+from models.flow.reference import FlowReference, candidate_of
+from models.flow.registration import Belief, Peak, register
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array
+
+_HEADINGS = np.radians(np.arange(-24.0, 25.0, 4.0))
+# Tilts and rolls around the prior's: paths are narrow, a climb from 8 deg off ends beside them.
+_NODES = [np.radians([tilt, roll, 0, 0]) for tilt in (-6, 0, 6) for roll in (-6, 0, 6)]
+_CLIMBED = 2
+_BROAD = np.diag(np.array([np.radians(8), np.radians(8), 0.2, np.radians(15)]) ** -2.0)
+_FEWEST = 5
+_WEAK_SD = np.array([np.radians(2), np.radians(2), 0.12])  # as in the joint estimate
+
+
+def fused(learned: Learned) -> Answer:
+    """The joint estimate and the flow map together: the heading too."""
+    case = learned.case
+    estimate = joint_estimate(learned.seen, case.prior_pose, learned.site)
+    answer = joint_answer(estimate)
+    if learned.flow is None:
+        return answer
+    found = fused_estimate(learned.seen, case.intrinsics, case.prior_pose, estimate, learned.flow)
+    if found is None:
+        return answer
+    return _with_heading(answer, found.values, found.covariance)
+
+
+def registration(learned: Learned) -> Answer:
+    """The flow map alone, around the prior pose: nothing is known of speeds."""
+    case, reference = learned.case, learned.flow
+    if reference is None:
+        return nothing_told(case)
+    mean = candidate_of(case.prior_pose) + reference.offset
+    walkers = walkers_of(learned.seen, mean)
+    if walkers.people < _FEWEST:
+        return nothing_told(case)
+    peaks = _peaks(walkers, reference, case.intrinsics, mean)
+    best = peaks[0]
+    own = np.linalg.inv(best.information / reference.temper + _BROAD)
+    # Other poses that explain the tracks, each by its chance, are a part of what is unsure.
+    chances = np.exp([peak.value - best.value for peak in peaks])
+    apart = np.array([peak.candidate - best.candidate for peak in peaks])
+    elsewhere = (apart * (chances / chances.sum())[:, None]).T @ apart
+    covariance = own + reference.offset_covariance + elsewhere
+    sd = np.sqrt(np.diag(covariance))[:3]
+    weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _WEAK_SD, strict=True) if is_weak)
+    answer = replace(nothing_told(case), tracks=walkers.people, weak=weak)
+    return _with_heading(answer, best.candidate - reference.offset, covariance)
+
+
+def _peaks(
+    walkers: Walkers, reference: FlowReference, intrinsics: Intrinsics, mean: Array
+) -> list[Peak]:
+    """Peaks under a broad belief around the mean, the highest first, from the likeliest nodes."""
+
+    def chance(candidate: Array) -> float:
+        map_says = likelihood(walkers, reference.flow, reference.coverage, intrinsics, candidate)
+        apart = candidate - mean
+        return map_says.value / reference.temper - 0.5 * float(apart @ _BROAD @ apart)
+
+    turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
+    likeliest = sorted(_NODES, key=lambda node: -max(chance(mean + node + t) for t in turns))
+    peaks = []
+    for node in likeliest[:_CLIMBED]:
+        for peak in register(
+            walkers,
+            reference.flow,
+            reference.coverage,
+            intrinsics,
+            Belief(mean=mean + node, precision=_BROAD),
+            temper=reference.temper,
+            headings=_HEADINGS,
+        ):
+            # The belief stood at the node; one step takes the peak to where it is around the mean.
+            posterior = peak.information / reference.temper + _BROAD
+            candidate = peak.candidate - np.linalg.solve(posterior, _BROAD @ node)
+            peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+    return sorted(peaks, key=lambda peak: -peak.value)
+
+
+def _with_heading(answer: Answer, values: Array, covariance: Array) -> Answer:
+    """The answer with tilt, roll, log height, heading (4,) and their covariance (4, 4)."""
+    return replace(
+        answer,
+        values=values[:3],
+        covariance=covariance[:3, :3],
+        heading_rad=float(values[3]),
+        heading_sd_rad=float(np.sqrt(covariance[3, 3])),
+    )
