@@ -17,7 +17,7 @@ SERVICE_ROOMS = [
     {"schemas", "jobs"},
     {"routes"},
     {"app", "protocol_tables"},
-    {"serve", "replay", "evaluate", "centred"},
+    {"serve", "replay", "evaluate", "flow_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},
 ]

@@ -15,7 +15,7 @@ from models.trajectory import Trajectory
 
 NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
-_Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
+Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,8 +152,8 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         pose = replace(pose, heading_rad=answer.heading_rad)
         off = math.remainder(answer.heading_rad - case.true_pose.heading_rad, 2 * math.pi)
         heading_error = math.degrees(off)
-        heading_covered = abs(off) <= _Z90 * answer.heading_sd_rad
-    covered = np.abs(error) <= _Z90 * sd
+        heading_covered = abs(off) <= Z90 * answer.heading_sd_rad
+    covered = np.abs(error) <= Z90 * sd
     return Outcome(
         scene_id=case.scene_id,
         estimator=estimator,
