@@ -17,10 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from models.errors import ShapeError
 from models.evaluation.estimators import UNTRAINED
-from models.evaluation.joint_runs import joint, track_errors
 from models.evaluation.learned import learn_case
 from models.evaluation.protocol import (
-    KNOCKED,
     RANGES,
     Answer,
     Estimator,
@@ -29,11 +27,10 @@ from models.evaluation.protocol import (
     draw_case,
     judge_answer,
 )
-from models.evaluation.report import ENOUGH_TRACKS, by_scene, overall
+from models.evaluation.report import by_scene, overall
 from models.evaluation.scenes import load_scene
+from service.protocol_plots import draw_plots
 from service.protocol_tables import TABLE_WIDTH, overall_table, scene_table
-
-_CURVE_TRACKS = [10, 20, 40, 80, 160, 320]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,28 +80,25 @@ def run_protocol(
     # Spawned, not forked: torch's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
     columns = TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with (
-        ProcessPoolExecutor(processes, mp_context=context) as pool,
-        Progress(*columns, console=console) as bar,
-    ):
-        row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
-        waiting = {pool.submit(_run, task): task for task in tasks}
-        for done in as_completed(waiting):
-            results += done.result()
-            bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
-            _write(output, results)
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        with Progress(*columns, console=console) as bar:
+            row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
+            waiting = {pool.submit(_run, task): task for task in tasks}
+            for done in as_completed(waiting):
+                results += done.result()
+                bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
+                _write(output, results)
         order = {load_scene(folder).scene_id: place for place, folder in enumerate(folders)}
         results.sort(key=lambda r: (order[r.outcome.scene_id], r.outcome.seed))
-        curves = _curves(pool, folders, seeds) if plots is not None else {}
-    _write(output, results)
-    for knock in knocks:
-        own = [result.outcome for result in results if result.knock == knock]
-        console.print(scene_table(knock, seeds, by_scene(own)))
-        console.print(overall_table(knock, overall(own)))
-    console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
-    if plots is not None:
-        _plot(plots, folders, results, curves)
-        console.print(f"{plots} has the plots")
+        _write(output, results)
+        by_knock = {k: [r.outcome for r in results if r.knock == k] for k in knocks}
+        for knock, own in by_knock.items():
+            console.print(scene_table(knock, seeds, by_scene(own)))
+            console.print(overall_table(knock, overall(own)))
+        console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
+        if plots is not None:
+            draw_plots(plots, folders, seeds, by_knock, pool)
+            console.print(f"{plots} has the plots; {time.monotonic() - started:.0f} s in all")
 
 
 def _tasks(
@@ -145,47 +139,6 @@ def _asked(case: ProtocolCase, trained: Mapping[str, Estimator]) -> dict[str, Ca
         return {name: partial(estimator, case) for name, estimator in trained.items()}
     learned = learn_case(case)
     return {name: partial(estimator, learned) for name, estimator in UNTRAINED.items()}
-
-
-def _curves(
-    pool: ProcessPoolExecutor, folders: Sequence[Path], seeds: int
-) -> dict[str, list[tuple[int, float, float]]]:
-    """Errors over the number of tracks, of scenes with enough of them."""
-    enough = [
-        folder
-        for folder in folders
-        if len(draw_case(load_scene(folder), 0, KNOCKED).seen) >= ENOUGH_TRACKS
-    ]
-    pairs = list(product(enough, range(seeds)))
-    found: dict[str, list[tuple[int, float, float]]] = {}
-    for (folder, _), points in zip(pairs, pool.map(_curve, pairs), strict=True):
-        found.setdefault(folder.name, []).extend(points)
-    return found
-
-
-def _curve(pair: tuple[Path, int]) -> list[tuple[int, float, float]]:
-    folder, seed = pair
-    return track_errors(load_scene(folder), seed, _CURVE_TRACKS)
-
-
-def _plot(
-    folder: Path,
-    scenes: Sequence[Path],
-    results: Sequence[_Result],
-    curves: dict[str, list[tuple[int, float, float]]],
-) -> None:
-    from models.evaluation.plots import plot_drift, plot_ground, plot_track_errors
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for knock in dict.fromkeys(result.knock for result in results):
-        own = [result.outcome for result in results if result.knock == knock]
-        if knock != "still":
-            plot_drift(own, folder / f"drift-{knock}.png")
-    for scene in scenes:
-        case = draw_case(load_scene(scene), 0, KNOCKED)
-        plot_ground(case, joint(learn_case(case)).values, folder / f"ground-{scene.name}.png")
-    if curves:
-        plot_track_errors(curves, folder / "tracks.png")
 
 
 def _write(output: Path, results: Sequence[_Result]) -> None:

@@ -16,7 +16,7 @@ SERVICE_ROOMS = [
     {"migrate", "recalibration"},
     {"schemas", "jobs"},
     {"routes"},
-    {"app", "protocol_tables"},
+    {"app", "protocol_plots", "protocol_tables"},
     {"serve", "replay", "evaluate", "flow_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},

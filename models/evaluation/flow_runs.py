@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.observations import Observations
+from models.estimation.joint.site import SiteReference
 from models.estimation.numbers import NUMBERS
 from models.evaluation.joint_runs import joint_answer
 from models.evaluation.learned import Learned
-from models.evaluation.protocol import Answer, nothing_told
+from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
 from models.flow.evidence import Walkers, likelihood, walkers_of
 from models.flow.fusion import fused_estimate
 from models.flow.reference import FlowReference, candidate_of
@@ -27,12 +29,18 @@ _WEAK_SD = np.array([np.radians(2), np.radians(2), 0.12])  # as in the joint est
 
 def fused(learned: Learned) -> Answer:
     """The joint estimate and the flow map together: the heading too."""
-    case = learned.case
-    estimate = joint_estimate(learned.seen, case.prior_pose, learned.site)
+    return fused_answer(learned.case, learned.seen, learned.site, learned.flow)
+
+
+def fused_answer(
+    case: ProtocolCase, seen: Observations, site: SiteReference, flow: FlowReference | None
+) -> Answer:
+    """The fused pose of what is seen; without a map, or with too few people, the joint one."""
+    estimate = joint_estimate(seen, case.prior_pose, site)
     answer = joint_answer(estimate)
-    if learned.flow is None:
+    if flow is None:
         return answer
-    found = fused_estimate(learned.seen, case.intrinsics, case.prior_pose, estimate, learned.flow)
+    found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
     if found is None:
         return answer
     return _with_heading(answer, found.values, found.covariance)

@@ -86,7 +86,12 @@ def test_evaluate_knocks_scenes_and_says_how_each_estimator_did(tmp_path):
     assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
     assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
     assert "bar (or declared)" in text  # the bar stands beside the figures
-    for name in ("drift-knock.png", "ground-meva_g336_school.png"):
+    for name in (
+        "drift-knock.png",
+        "ground-meva_g336_school.png",
+        "flow-meva_g336_school.png",
+        "flow-tracks.png",
+    ):
         assert (plots / name).stat().st_size > 5000
 
 
