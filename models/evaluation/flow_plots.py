@@ -122,7 +122,7 @@ def curve_of(points: Sequence[CurvePoint]) -> Array:
 
 def _draw_map(panel: Any, flow: FlowMap) -> Any:
     """Densities over places in colours, and lines along the way where it is clear."""
-    density = np.exp(flow.log_density)
+    density = _all_day(flow)
     places = density.sum(axis=2)
     size = np.array(places.shape)
     far = flow.corner + (size - 1) * flow.cell_m
@@ -184,8 +184,13 @@ def _on_ground(learned: Learned, pose: CameraPose, uv: Array) -> Array:
 
 def _window(flow: FlowMap) -> tuple[Array, Array]:
     """Corners (2,) of a rectangle that holds the camera and nearly all people, with a border."""
-    places = np.exp(flow.log_density).sum(axis=2)
+    places = _all_day(flow).sum(axis=2)
     walked = np.argwhere(places > places.max() * 10.0 ** (-_DECADES / 2))
     ends = flow.corner + np.stack([walked.min(axis=0), walked.max(axis=0)]) * flow.cell_m
     ends = np.concatenate([ends, np.zeros((1, 2))])
     return ends.min(axis=0) - _AROUND_M, ends.max(axis=0) + _AROUND_M
+
+
+def _all_day(flow: FlowMap) -> Array:
+    """Densities (X, Y, 16) of all parts of the day together."""
+    return np.asarray(np.exp(flow.log_density).mean(axis=0))

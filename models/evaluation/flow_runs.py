@@ -11,17 +11,17 @@ from models.estimation.numbers import NUMBERS
 from models.evaluation.joint_runs import joint_answer
 from models.evaluation.learned import Learned
 from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
-from models.flow.evidence import Walkers, likelihood, walkers_of
+from models.flow.evidence import Walkers, walkers_of
 from models.flow.fusion import fused_estimate
-from models.flow.reference import FlowReference, candidate_of
-from models.flow.registration import Belief, Peak, register
-from models.geometry.intrinsics import Intrinsics
+from models.flow.reference import FlowReference, candidate_of, precision_of
+from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.rotation import Array
 
 _HEADINGS = np.radians(np.arange(-24.0, 25.0, 4.0))
 # Tilts and rolls around the prior's: paths are narrow, a climb from 8 deg off ends beside them.
 _NODES = [np.radians([tilt, roll, 0, 0]) for tilt in (-6, 0, 6) for roll in (-6, 0, 6)]
 _CLIMBED = 2
+_SAME_END = np.radians(0.3)
 _BROAD = np.diag(np.array([np.radians(8), np.radians(8), 0.2, np.radians(15)]) ** -2.0)
 _FEWEST = 5
 _WEAK_SD = np.array([np.radians(2), np.radians(2), 0.12])  # as in the joint estimate
@@ -41,9 +41,15 @@ def fused_answer(
     if flow is None:
         return answer
     found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
-    if found is None:
-        return answer
-    return _with_heading(answer, found.values, found.covariance)
+    answer = replace(
+        answer,
+        values=found.values[:3],
+        covariance=found.covariance[:3, :3],
+        weak=tuple(name for name in NUMBERS if name not in found.told),
+    )
+    return (
+        _with_heading(answer, found.values, found.covariance) if "heading" in found.told else answer
+    )
 
 
 def registration(learned: Learned) -> Answer:
@@ -53,49 +59,46 @@ def registration(learned: Learned) -> Answer:
         return nothing_told(case)
     mean = candidate_of(case.prior_pose) + reference.offset
     walkers = walkers_of(learned.seen, mean)
-    if walkers.people < _FEWEST:
+    if walkers.parties < _FEWEST:
         return nothing_told(case)
-    peaks = _peaks(walkers, reference, case.intrinsics, mean)
+    site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
+    belief = Belief(mean=mean, precision=_BROAD)
+    peaks = _peaks(walkers, site, belief, temper)
     best = peaks[0]
-    own = np.linalg.inv(best.information / reference.temper + _BROAD)
+    known = precision_of(best, reference.surprise * reference.map_noise(walkers.people))
+    values, covariance = settled(walkers, site, belief, best, known)
     # Other poses that explain the tracks, each by its chance, are a part of what is unsure.
     chances = np.exp([peak.value - best.value for peak in peaks])
     apart = np.array([peak.candidate - best.candidate for peak in peaks])
     elsewhere = (apart * (chances / chances.sum())[:, None]).T @ apart
-    covariance = own + reference.offset_covariance + elsewhere
+    covariance = covariance + reference.offset_covariance + elsewhere
     sd = np.sqrt(np.diag(covariance))[:3]
     weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _WEAK_SD, strict=True) if is_weak)
-    answer = replace(nothing_told(case), tracks=walkers.people, weak=weak)
-    return _with_heading(answer, best.candidate - reference.offset, covariance)
+    answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
+    return _with_heading(answer, values - reference.offset, covariance)
 
 
-def _peaks(
-    walkers: Walkers, reference: FlowReference, intrinsics: Intrinsics, mean: Array
-) -> list[Peak]:
-    """Peaks under a broad belief around the mean, the highest first, from the likeliest nodes."""
+def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:
+    """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
 
     def chance(candidate: Array) -> float:
-        map_says = likelihood(walkers, reference.flow, reference.coverage, intrinsics, candidate)
-        apart = candidate - mean
-        return map_says.value / reference.temper - 0.5 * float(apart @ _BROAD @ apart)
+        return site.likelihood(walkers, candidate).value / temper + belief.log_density(candidate)
 
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
-    likeliest = sorted(_NODES, key=lambda node: -max(chance(mean + node + t) for t in turns))
-    peaks = []
-    for node in likeliest[:_CLIMBED]:
-        for peak in register(
-            walkers,
-            reference.flow,
-            reference.coverage,
-            intrinsics,
-            Belief(mean=mean + node, precision=_BROAD),
-            temper=reference.temper,
-            headings=_HEADINGS,
-        ):
+    starts = {
+        number: max(chance(belief.mean + node + turn) for turn in turns)
+        for number, node in enumerate(_NODES)
+    }
+    likeliest = sorted(starts, key=lambda number: -starts[number])
+    peaks: list[Peak] = []
+    for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
+        around = replace(belief, mean=belief.mean + node)
+        for peak in register(walkers, site, around, temper=temper, headings=_HEADINGS):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            posterior = peak.information / reference.temper + _BROAD
-            candidate = peak.candidate - np.linalg.solve(posterior, _BROAD @ node)
-            peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+            posterior = peak.curvature / temper + belief.precision
+            candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
+            if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
+                peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

@@ -56,7 +56,7 @@ class ChangedResult:
 
     Angles to the truth and to the pose by as many tracks on the old paths, how far these were
     from the truth, and the log of the height against the truth's. `reason` is what the estimate
-    says, `covered` is as in `KnockedResult`.
+    says, `registered` whether the map had a part in it, `covered` is as in `KnockedResult`.
     """
 
     tracks: int
@@ -66,6 +66,7 @@ class ChangedResult:
     off_truth_log_height: float
     covered: tuple[bool, ...]
     reason: str
+    registered: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +181,8 @@ def _judge_change(
         unchanged_off_truth_deg=_angle_deg(old, truth),
         off_truth_log_height=float(errors[2]),
         covered=_covered(errors, found.covariance),
-        reason=str(getattr(found, "reason", "")),
+        reason=found.reason,
+        registered=found.registered,
     )
 
 

@@ -47,9 +47,7 @@ class LearnedPlace:
         """The fused pose that tracks tell."""
         lens, prior = self.place.intrinsics, self.place.prior
         joint = joint_estimate(tracks, prior, self.speeds)
-        found = fused_estimate(tracks, lens, prior, joint, self.flow)
-        assert found is not None
-        return found
+        return fused_estimate(tracks, lens, prior, joint, self.flow)
 
 
 def draw_place(rng: np.random.Generator) -> Place:

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.estimation.joint.observations import Observations, Steps
-from models.flow.flow_map import Coverage, FlowMap
+from models.estimation.joint.groups import parties_of
+from models.estimation.joint.observations import Observations, Steps, steps_where
+from models.flow.flow_map import FlowMap
 from models.flow.placement import place_steps
+from models.flow.view import Coverage
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
@@ -15,50 +17,58 @@ _STANDING_MPS = 0.35
 _TRACK_STEPS = 2.0  # a track tells as much as two independent steps at the most
 _NO_GROUND = -30.0
 _LEAST_SEEN = 1e-3
-_DIFFERENCE = 0.01  # radians, and log height: for how much a camera sees of the map
+_DIFFERENCE = 0.01  # radians, and log height
+# How busy ground is that the reference did not see, against the known: tried, and a prior on it.
+_BUSY_LOG = np.linspace(np.log(0.02), np.log(4.0), 9)
+_BUSY_MEAN, _BUSY_SD = np.log(0.5), 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walkers:
-    """Steps of people who move: weights (M,) that add up to at most 2 a track, owners (M,)."""
+    """Steps of people who move.
+
+    `weight` (M,) adds up to at most 2 a track; `party_idx` (tracks,) is the party of each track.
+    """
 
     steps: Steps
-    owner_idx: npt.NDArray[np.int64]
     weight: Array
+    party_idx: npt.NDArray[np.int64]
     tracks: int
 
     @property
     def people(self) -> int:
         """How many tracks have a step."""
-        return int(np.unique(self.owner_idx).size)
+        return int(np.unique(self.steps.rows.owner_idx).size)
+
+    @property
+    def parties(self) -> int:
+        """How many parties have a step."""
+        return int(np.unique(self.party_idx[np.unique(self.steps.rows.owner_idx)]).size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likelihood:
-    """A log likelihood of all tracks, and the score (N, 4) of each."""
+    """A log likelihood of all tracks, and what each has in it: values (N,), scores (N, 4)."""
 
     value: float
+    values: Array
     scores: Array
 
 
 def walkers_of(observations: Observations, candidate: Array) -> Walkers:
     """The steps that are walked, seen from a candidate (4,) that is about right."""
-    steps = observations.steps
-    placed = place_steps(steps, candidate)
-    moving = placed.valid & (placed.length_m > _STANDING_MPS * steps.seconds)
-    rows = np.flatnonzero(moving)
-    owner_idx = steps.rows.owner_idx[rows]
-    number = np.bincount(owner_idx, minlength=observations.tracks)
+    placed = place_steps(observations.steps, candidate)
+    moving = placed.valid & (placed.length_m > _STANDING_MPS * observations.steps.seconds)
+    steps = steps_where(observations.steps, moving)
+    rows = steps.rows
+    way = np.stack([np.cos(placed.direction), np.sin(placed.direction)], axis=1)
+    number = np.bincount(rows.owner_idx, minlength=observations.tracks)
     return Walkers(
-        steps=Steps(
-            start_rays=steps.start_rays[rows],
-            end_rays=steps.end_rays[rows],
-            swayed_rays=steps.swayed_rays[rows],
-            seconds=steps.seconds[rows],
-            rows=steps.rows,
+        steps=steps,
+        weight=np.minimum(1.0, _TRACK_STEPS / number[rows.owner_idx]),
+        party_idx=parties_of(
+            rows.time_s, rows.owner_idx, placed.place[moving], way[moving], observations.tracks
         ),
-        owner_idx=owner_idx,
-        weight=np.minimum(1.0, _TRACK_STEPS / number[owner_idx]),
         tracks=observations.tracks,
     )
 
@@ -66,32 +76,71 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
 def likelihood(
     walkers: Walkers, flow: FlowMap, coverage: Coverage, intrinsics: Intrinsics, candidate: Array
 ) -> Likelihood:
-    """How likely the walkers' places and directions in the image are, given that they are seen."""
-    placed = place_steps(walkers.steps, candidate)
-    density, by_place, by_direction = flow.look(placed.place, placed.direction)
-    ok = placed.valid
-    value = np.where(ok, density + placed.log_ratio, _NO_GROUND)
+    """How likely the walkers' places and directions in the image are, given that they are seen.
+
+    How busy the ground is that the reference did not see is whatever suits the tracks best: a
+    camera that has turned to a square must not be pulled back for it, nor sent to an empty one.
+    """
+    steps = walkers.steps
+    placed = place_steps(steps, candidate)
+    slot_idx = flow.slot_of(steps.rows.time_s)
+    known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
+    unseen, unseen_by_place = flow.look_unseen(placed.place)
+    (seen, d_seen), (beyond, d_beyond) = _seen(coverage, intrinsics, candidate)
+    busy = _busiest(walkers, known, unseen * np.exp(flow.log_level), seen, beyond, slot_idx)
+    extra = busy * np.exp(flow.log_level)
+    density = np.exp(known) + extra * unseen
+    own = np.exp(known) / density
+    in_all = seen + busy * beyond
+    value = np.where(placed.valid, np.log(density) + placed.log_ratio, _NO_GROUND)
+    by_place = own[:, None] * by_place + (extra / density)[:, None] * unseen_by_place
     score = (
         np.einsum("mi,mik->mk", by_place, placed.d_place)
-        + by_direction[:, None] * placed.d_direction
+        + (own * by_direction)[:, None] * placed.d_direction
         + placed.d_log_ratio
     )
-    score[~ok] = 0.0
-    seen, d_seen = _seen(coverage, intrinsics, candidate)
-    weight, owner = walkers.weight, walkers.owner_idx
+    score[~placed.valid] = 0.0
+    value = value - np.log(in_all)[slot_idx]
+    score = score - ((d_seen + busy * d_beyond) / in_all[:, None])[slot_idx]
+    owner, weight = steps.rows.owner_idx, walkers.weight
     scores = np.zeros((walkers.tracks, 4))
-    np.add.at(scores, owner, weight[:, None] * (score - d_seen))
-    return Likelihood(value=float((weight * (value - seen)).sum()), scores=scores)
+    np.add.at(scores, owner, weight[:, None] * score)
+    values = np.bincount(owner, weight * value, walkers.tracks)
+    return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
 
-def _seen(coverage: Coverage, intrinsics: Intrinsics, candidate: Array) -> tuple[float, Array]:
-    """The log of the share that is seen, and its differences (4,)."""
+def _busiest(
+    walkers: Walkers,
+    known: Array,
+    unseen: Array,
+    seen: Array,
+    beyond: float,
+    slot_idx: npt.NDArray[np.int64],
+) -> float:
+    """How busy unseen ground is for the tracks to be most likely, of those that are tried."""
+    there = unseen > 0
+    busy = np.exp(_BUSY_LOG)
+    weight = walkers.weight[there]
+    gain = np.log1p(np.outer(busy, unseen[there] / np.exp(known[there]))) @ weight
+    share = np.bincount(slot_idx, walkers.weight, seen.size)
+    cost = np.log(seen + np.outer(busy, np.full(seen.size, beyond))) @ share
+    prior = 0.5 * ((_BUSY_LOG - _BUSY_MEAN) / _BUSY_SD) ** 2
+    return float(busy[np.argmax(gain - cost - prior)])
 
-    def log_share(at: Array) -> float:
-        return float(np.log(max(coverage.seen_from(intrinsics, at), _LEAST_SEEN)))
 
+def _seen(
+    coverage: Coverage, intrinsics: Intrinsics, candidate: Array
+) -> tuple[tuple[Array, Array], tuple[float, Array]]:
+    """Shares that are seen (S,) and their slopes (S, 4); the unknown one and its (4,)."""
+
+    def shares(at: Array) -> Array:
+        known, unknown = coverage.seen_from(intrinsics, at)
+        return np.append(known, unknown)
+
+    here = shares(candidate)
     slopes = [
-        (log_share(candidate + step) - log_share(candidate - step)) / (2 * _DIFFERENCE)
+        (shares(candidate + step) - shares(candidate - step)) / (2 * _DIFFERENCE)
         for step in _DIFFERENCE * np.eye(4)
     ]
-    return log_share(candidate), np.array(slopes)
+    slope = np.stack(slopes, axis=1)
+    return (np.maximum(here[:-1], _LEAST_SEEN), slope[:-1]), (float(here[-1]), slope[-1])

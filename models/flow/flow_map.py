@@ -1,13 +1,13 @@
 """The flow map: how often people are where, and which way they walk, on a grid of the ground."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from models.flow.placement import Placement
-from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array, rotation_from_angles
+from models.geometry.rotation import Array
 
 DIRECTIONS = 16
 _CELL_M = 0.5
@@ -18,38 +18,51 @@ _SMOOTH_KAPPA = 6.0  # of the von Mises kernel over directions: 24 deg
 _ANYWHERE = 0.1  # of all people walk anywhere in the grid, any way
 _ANY_WAY = 0.15  # of those at a place walk any way
 _QUANTILE = 0.002  # of the places at each side are left out of the grid
-_BLOCK = 3  # cells along a side that are looked at as one for what a camera sees
-_NEAREST_M = 0.1
+_SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlowMap:
-    """A log density (X, Y, 16) over place (1/m^2) and direction (1/rad) at grid nodes.
+    """A log density (S, X, Y, 16) over place (1/m^2) and direction (1/rad) at grid nodes.
 
-    Nodes stand `cell_m` apart from `corner` (2,) on; directions from +X on, evenly. `elsewhere` is
-    the log density off the grid.
+    Nodes stand `cell_m` apart from `corner` (2,) on; directions from +X on, evenly; S equal parts
+    of the day from midnight UTC on, or one. `elsewhere` is the log density off the grid. `unseen`
+    (X, Y) is how much of each node's ground the reference did not see, `log_level` the log density
+    where that is all, were people as many there as on the known ground. `people` (X, Y) is how
+    many people's steps made a node: how sure it is.
     """
 
     corner: Array
     cell_m: float
     log_density: Array
     elsewhere: float
+    unseen: Array
+    log_level: float
+    people: Array
 
-    def look(self, place: Array, direction: Array) -> tuple[Array, Array, Array]:
+    @property
+    def slots(self) -> int:
+        """Into how many parts the day falls."""
+        return int(self.log_density.shape[0])
+
+    def slot_of(self, time_s: Array) -> npt.NDArray[np.int64]:
+        """The part of the day of each time (M,)."""
+        return slot_of(time_s, self.slots)
+
+    def look(
+        self, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
+    ) -> tuple[Array, Array, Array]:
         """Log densities (M,) and their derivatives by place (M, 2) and direction (M,)."""
-        at = (place - self.corner) / self.cell_m
-        size = np.array(self.log_density.shape[:2])
-        inside = np.all((at >= 0) & (at < size - 1.001), axis=1)
-        at = np.where(inside[:, None], at, 0.5)
-        first = np.floor(at).astype(np.int64)
+        first, parts, inside = self._cells(place)
         turn = (direction % (2 * np.pi)) / (2 * np.pi) * DIRECTIONS
         way = np.floor(turn).astype(np.int64)
-        parts = np.concatenate([at - first, (turn - way)[:, None]], axis=1)
-        value, slopes = np.zeros(len(at)), np.zeros((len(at), 3))
+        parts = np.concatenate([parts, (turn - way)[:, None]], axis=1)
+        value, slopes = np.zeros(len(parts)), np.zeros((len(parts), 3))
         for corner in np.ndindex(2, 2, 2):
             sides = np.array(corner)
             share = np.where(sides == 1, parts, 1 - parts)
             node = self.log_density[
+                slot_idx,
                 first[:, 0] + corner[0],
                 first[:, 1] + corner[1],
                 (way + corner[2]) % DIRECTIONS,
@@ -63,35 +76,48 @@ class FlowMap:
         slopes[~inside] = 0.0
         return np.where(inside, value, self.elsewhere), slopes[:, :2], slopes[:, 2]
 
+    def look_unseen(self, place: Array) -> tuple[Array, Array]:
+        """Which part (M,) of the ground at places was not seen, and its slopes (M, 2)."""
+        first, parts, inside = self._cells(place)
+        value, slopes = np.zeros(len(parts)), np.zeros((len(parts), 2))
+        for corner in np.ndindex(2, 2):
+            sides = np.array(corner)
+            share = np.where(sides == 1, parts, 1 - parts)
+            node = self.unseen[first[:, 0] + corner[0], first[:, 1] + corner[1]]
+            value += share.prod(axis=1) * node
+            slopes += (2 * sides - 1) * share[:, ::-1] * node[:, None]
+        return np.where(inside, value, 0.0), np.where(inside[:, None], slopes / self.cell_m, 0.0)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Coverage:
-    """The map in blocks, to tell how much of it a camera sees: places (B, 2) and shares (B,)."""
-
-    places: Array
-    shares: Array
-    block_m: float
-
-    def seen_from(self, intrinsics: Intrinsics, candidate: Array) -> float:
-        """The share of all people who are where a camera (4,) looks; lens distortion left out."""
-        tilt, roll, log_height, heading = candidate
-        rotation = rotation_from_angles(tilt, roll, heading)
-        height = np.full((len(self.places), 1), -np.exp(log_height))
-        rays = np.concatenate([self.places, height], axis=1) @ rotation.T
-        ahead = rays[:, 2] > _NEAREST_M
-        depth = np.where(ahead, rays[:, 2], 1.0)
-        u = intrinsics.fx * rays[:, 0] / depth + intrinsics.cx
-        v = intrinsics.fy * rays[:, 1] / depth + intrinsics.cy
-        # A block crosses the edge bit by bit, so that the share has slopes and no steps.
-        blur = intrinsics.fx * self.block_m / depth
-        inside = ahead.astype(np.float64)
-        for at, size in ((u, intrinsics.width), (v, intrinsics.height)):
-            inside *= np.clip(at / blur + 0.5, 0, 1) * np.clip((size - at) / blur + 0.5, 0, 1)
-        return float(self.shares @ inside)
+    def _cells(self, place: Array) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
+        """The nodes (M, 2) before places, how far beyond (M, 2) these are, and who is inside."""
+        at = (place - self.corner) / self.cell_m
+        size = np.array(self.log_density.shape[1:3])
+        inside = np.all((at >= 0) & (at < size - 1.001), axis=1)
+        at = np.where(inside[:, None], at, 0.5)
+        first = np.floor(at).astype(np.int64)
+        return first, at - first, inside
 
 
-def learn_map(placed: Placement, weight: Array) -> FlowMap:
-    """The map of steps whose pose is known, each counted by its weight (M,).
+def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
+    """Which of so many equal parts of a UTC day each time (M,) is in."""
+    return np.floor(time_s % 86_400 / 86_400 * slots).astype(np.int64) % slots
+
+
+def learn_map(
+    placed: Placement,
+    weight: Array,
+    time_s: Array,
+    seen_at: Callable[[Array], Array],
+    slots: int = 1,
+) -> FlowMap:
+    """The map of steps seen from a known pose, each counted by its weight (M,).
+
+    Args:
+        placed: the steps on the ground.
+        weight: those of a person add up to how much that person counts.
+        time_s: when each step was (M,).
+        seen_at: which part (N,) of the ground around places (N, 2) that pose sees.
+        slots: into how many parts the day falls.
 
     Raises:
         ValueError: no step counts.
@@ -104,32 +130,31 @@ def learn_map(placed: Placement, weight: Array) -> FlowMap:
     low, high = low - _MARGIN_M, high + _MARGIN_M
     cell_m = max(_CELL_M, float((high - low).max()) / (_MOST_CELLS - 2))
     size = np.ceil((high - low) / cell_m).astype(np.int64) + 2
-    counts = _binned((place - low) / cell_m, direction, weight, size)
-    smooth = _smoothed(counts, _SMOOTH_M / cell_m)
-    smooth = (1 - _ANY_WAY) * smooth + _ANY_WAY * smooth.mean(axis=2, keepdims=True)
-    share = smooth / smooth.sum() * (1 - _ANYWHERE) + _ANYWHERE / smooth.size
+    at = (place - low) / cell_m
+    slot_idx = slot_of(time_s[used], slots)
+    counts = np.stack(
+        [
+            _smoothed(_binned(at[own], direction[own], weight[own], size), _SMOOTH_M / cell_m)
+            for own in (slot_idx == slot for slot in range(slots))
+        ]
+    )
+    whole = counts.sum(axis=0)
+    if slots > 1:
+        counts = counts + _SLOT_WEIGHT * whole / whole.sum()
+    counts = counts / counts.sum(axis=(1, 2, 3), keepdims=True)
+    counts = (1 - _ANY_WAY) * counts + _ANY_WAY * counts.mean(axis=3, keepdims=True)
+    share = counts * (1 - _ANYWHERE) + _ANYWHERE / whole.size
+    nodes = low + cell_m * np.indices(size).reshape(2, -1).T
+    seen = seen_at(nodes).reshape(size)
     node = cell_m**2 * 2 * np.pi / DIRECTIONS
     return FlowMap(
         corner=low,
         cell_m=cell_m,
         log_density=np.log(share / node),
-        elsewhere=float(np.log(_ANYWHERE / smooth.size / node)),
-    )
-
-
-def coverage_of(flow: FlowMap) -> Coverage:
-    """The map in blocks of 3 x 3 nodes."""
-    node = flow.cell_m**2 * 2 * np.pi / DIRECTIONS
-    shares = np.exp(flow.log_density).sum(axis=2) * node
-    rows, columns = (-(-length // _BLOCK) for length in shares.shape)
-    padded = np.zeros((rows * _BLOCK, columns * _BLOCK))
-    padded[: shares.shape[0], : shares.shape[1]] = shares
-    blocks = padded.reshape(rows, _BLOCK, columns, _BLOCK).sum(axis=(1, 3))
-    middle = (
-        np.indices((rows, columns)).reshape(2, -1).T * _BLOCK + (_BLOCK - 1) / 2
-    ) * flow.cell_m
-    return Coverage(
-        places=flow.corner + middle, shares=blocks.ravel(), block_m=_BLOCK * flow.cell_m
+        elsewhere=float(np.log(_ANYWHERE / whole.size / node)),
+        unseen=1 - seen,
+        log_level=float(-np.log(max(seen.sum(), 1.0) * DIRECTIONS * node)),
+        people=whole.sum(axis=2) * 2 * np.pi * (_SMOOTH_M / cell_m) ** 2,
     )
 
 

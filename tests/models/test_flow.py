@@ -79,8 +79,9 @@ def test_the_density_is_one_in_all_and_high_where_people_walk(site):
     assert np.exp(flow.log_density).sum() * node == pytest.approx(1, abs=1e-6)
     walkers = walkers_of(known, candidate_of(PRIOR))
     placed = place_steps(walkers.steps, candidate_of(PRIOR))
-    along, _, _ = flow.look(placed.place, placed.direction)
-    across, _, _ = flow.look(placed.place, placed.direction + math.pi / 2)
+    all_day = np.zeros(len(placed.place), dtype=np.int64)
+    along, _, _ = flow.look(placed.place, placed.direction, all_day)
+    across, _, _ = flow.look(placed.place, placed.direction + math.pi / 2, all_day)
     assert np.mean(along) > np.mean(across) + 1
     assert np.mean(along) > flow.elsewhere + 4
 
@@ -90,20 +91,28 @@ def test_slopes_of_the_map_are_those_of_differences(site):
     flow = site[0].flow
     place = flow.corner + rng.uniform(5, 30, (40, 2))
     direction = rng.uniform(-math.pi, math.pi, 40)
-    _, by_place, by_direction = flow.look(place, direction)
+    all_day = np.zeros(40, dtype=np.int64)
+
+    def value(place: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        return flow.look(place, direction, all_day)[0]
+
+    _, by_place, by_direction = flow.look(place, direction, all_day)
+    unseen, unseen_by_place = flow.look_unseen(place)
+    assert unseen.min() < 0.1 < 0.9 < unseen.max()
     for axis in (0, 1):
         step = 1e-7 * np.eye(2)[axis]
-        found = (
-            flow.look(place + step, direction)[0] - flow.look(place - step, direction)[0]
-        ) / 2e-7
+        found = (value(place + step, direction) - value(place - step, direction)) / 2e-7
         assert_allclose(by_place[:, axis], found, atol=1e-4)
-    turned = flow.look(place, direction + 1e-7)[0] - flow.look(place, direction - 1e-7)[0]
+        found = flow.look_unseen(place + step)[0] - flow.look_unseen(place - step)[0]
+        assert_allclose(unseen_by_place[:, axis], found / 2e-7, atol=1e-4)
+    turned = value(place, direction + 1e-7) - value(place, direction - 1e-7)
     assert_allclose(by_direction, turned / 2e-7, atol=1e-4)
 
 
 def test_off_the_grid_is_elsewhere(site):
     flow = site[0].flow
-    value, by_place, by_direction = flow.look(flow.corner[None] - 1.0, np.zeros(1))
+    at = flow.corner[None] - 1.0
+    value, by_place, by_direction = flow.look(at, np.zeros(1), np.zeros(1, dtype=np.int64))
     assert_allclose(value, flow.elsewhere)
     assert not by_place.any()
     assert not by_direction.any()
@@ -113,8 +122,13 @@ def test_a_camera_sees_what_is_before_it(site):
     coverage = site[0].coverage
     assert coverage.shares.sum() == pytest.approx(1, abs=1e-6)
     at = candidate_of(PRIOR)
-    assert coverage.seen_from(LENS, at) > 0.8
-    assert coverage.seen_from(LENS, at + [0, 0, 0, math.pi]) < 0.02
+    known, unknown = coverage.seen_from(LENS, at)
+    assert known > 0.8
+    assert unknown < 0.1
+    known, unknown = coverage.seen_from(LENS, at + [0, 0, 0, math.radians(30)])
+    assert known < 0.5
+    assert unknown > 0.15
+    assert coverage.seen_from(LENS, at + [0, 0, 0, math.pi])[0] < 0.02
 
 
 def test_scores_are_derivatives_of_the_likelihood(site):
@@ -136,7 +150,8 @@ def test_a_turned_camera_is_told_with_its_heading(site):
     for tracks, pose in ((after, TURNED), (still, PRIOR)):
         joint = joint_estimate(tracks, PRIOR, speeds)
         fused = fused_estimate(tracks, LENS, PRIOR, joint, reference)
-        assert fused is not None
+        assert fused.registered
+        assert fused.told == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
         assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 1.0
         assert np.abs(off / np.sqrt(np.diag(fused.covariance))).max() < 3.5
@@ -148,4 +163,8 @@ def test_few_people_make_no_map_and_no_registration(site):
     (few,) = tracks_of(3, (PRIOR, 8))
     assert learn_flow(seen(few), LENS, PRIOR, 0) is None
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
-    assert fused_estimate(seen(few[:3]), LENS, PRIOR, joint, reference) is None
+    fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, reference)
+    assert not fused.registered
+    assert "heading" not in fused.told
+    assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])
+    assert_allclose(fused.covariance[:3, :3], joint.covariance)

@@ -32,6 +32,7 @@ def site(number: int, error_deg: float, *, off_deg: float) -> SiteResults:
                 unchanged_off_truth_deg=0.1,
                 off_truth_log_height=0.0,
                 covered=(True, True, off_deg < 1, True),
+                registered=True,
                 reason="paths have changed" if off_deg > 1 else "",
             ),
         ),

@@ -21,15 +21,40 @@ def count_parties(speeds: Measured) -> int:
 
     People of one party share their pace and their pauses: twenty of them tell hardly more than one.
     """
-    bins, positions, ways, owners = _sampled(speeds)
+    assert speeds.direction is not None
+    walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(_STANDING_MPS)))
+    rows = speeds.rows
+    labels = parties_of(
+        rows.time_s[walking],
+        rows.owner_idx[walking],
+        speeds.place[walking],
+        speeds.direction[walking],
+        rows.owners,
+    )
+    return int(np.unique(labels[np.unique(rows.owner_idx[walking])]).size)
+
+
+def parties_of(
+    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array, owners: int
+) -> npt.NDArray[np.int64]:
+    """The party (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
+
+    Args:
+        time_s: when each step was (M,).
+        owner_idx: the track of each (M,).
+        place: where it was on the ground (M, 2), metres.
+        way: unit vectors (M, 2) of where it went.
+        owners: how many tracks there are; those without steps are each a party.
+    """
+    bins, positions, ways, owner_idx = _sampled(time_s, owner_idx, place, way)
     together: Counter[tuple[int, int]] = Counter()
-    lengths = Counter(owners.tolist())
+    lengths = Counter(owner_idx.tolist())
     firsts = np.flatnonzero(np.diff(bins, prepend=np.nan))
     for rows in np.split(np.arange(bins.size), firsts[1:]):
         for i, j in combinations(rows, 2):
             near = np.hypot(*(positions[i] - positions[j])) < _NEAR_M
             if near and ways[i] @ ways[j] > _SAME_WAY:
-                together[(owners[i], owners[j])] += 1
+                together[(owner_idx[i], owner_idx[j])] += 1
     parties = {owner: {owner} for owner in lengths}
     for (one, other), count in together.items():
         if (
@@ -39,16 +64,17 @@ def count_parties(speeds: Measured) -> int:
             joined = parties[one] | parties[other]
             for owner in joined:
                 parties[owner] = joined
-    return len({id(party) for party in parties.values()})
+    labels = np.arange(owners)
+    for party in parties.values():
+        labels[list(party)] = min(party)
+    return labels
 
 
-def _sampled(speeds: Measured) -> tuple[Array, Array, Array, npt.NDArray[np.int64]]:
-    """One moving row for each track and time bin: bins (K,), places, directions (K, 2), owners."""
-    assert speeds.direction is not None
-    moving = np.flatnonzero(speeds.valid & (speeds.value > np.log(_STANDING_MPS)))
-    owner = speeds.rows.owner_idx[moving]
-    since_s = speeds.rows.time_s[moving] - speeds.rows.time_s.min(initial=np.inf)
+def _sampled(
+    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array
+) -> tuple[Array, Array, Array, npt.NDArray[np.int64]]:
+    """One step for each track and time bin: bins (K,), places, directions (K, 2), owners."""
+    since_s = time_s - time_s.min(initial=np.inf)
     time_bin = np.floor(since_s / _BIN_S + 1e-3)
-    _, first = np.unique(np.stack([time_bin, owner]), axis=1, return_index=True)
-    chosen = moving[first]
-    return time_bin[first], speeds.place[chosen], speeds.direction[chosen], owner[first]
+    _, first = np.unique(np.stack([time_bin, owner_idx]), axis=1, return_index=True)
+    return time_bin[first], place[first], way[first], owner_idx[first]

@@ -4,7 +4,7 @@ Nothing here depends on the pose, so it is worked out once for all poses that ar
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -138,23 +138,33 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
     """The observations of some tracks only, given by ascending indices."""
     renumber = np.full(observations.tracks, -1)
     renumber[chosen] = np.arange(chosen.size)
-    steps, tops = observations.steps, observations.tops
-    kept = renumber[steps.rows.owner_idx] >= 0
+    tops = observations.tops
+    steps = steps_where(observations.steps, renumber[observations.steps.rows.owner_idx] >= 0)
+    every = np.ones(len(steps.rows), dtype=bool)
     kept_tops = renumber[tops.rows.owner_idx] >= 0
     return Observations(
-        steps=Steps(
-            start_rays=steps.start_rays[kept],
-            end_rays=steps.end_rays[kept],
-            swayed_rays=steps.swayed_rays[kept],
-            seconds=steps.seconds[kept],
-            rows=_kept(steps.rows, kept, renumber, chosen.size),
-        ),
+        steps=replace(steps, rows=_kept(steps.rows, every, renumber, chosen.size)),
         tops=Tops(
             foot_rays=tops.foot_rays[kept_tops],
             top_y=tops.top_y[kept_tops],
             rows=_kept(tops.rows, kept_tops, renumber, chosen.size),
         ),
         tracks=int(chosen.size),
+    )
+
+
+def steps_where(steps: Steps, kept: Mask) -> Steps:
+    """Some of the steps; one whose step before it is not among them is linked to none."""
+    rows = steps.rows
+    linked = rows.linked.copy()
+    linked[1:] &= kept[:-1]
+    same = np.arange(rows.owners)
+    return Steps(
+        start_rays=steps.start_rays[kept],
+        end_rays=steps.end_rays[kept],
+        swayed_rays=steps.swayed_rays[kept],
+        seconds=steps.seconds[kept],
+        rows=_kept(replace(rows, linked=linked), kept, same, rows.owners),
     )
 
 
