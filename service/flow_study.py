@@ -89,7 +89,7 @@ def changed_table(found: Sequence[SiteResults]) -> Table:
         shares = (
             float(np.mean([result.off_truth_deg > 1 for result in own])),
             float(np.mean([all(result.covered) for result in own])),
-            float(np.mean([bool(result.reason) for result in own])),
+            float(np.mean(["path" in result.reason for result in own])),
         )
         table.add_row(str(own[0].tracks), *angles, *(f"{share:.0%}" for share in shares))
     return table
