@@ -1,4 +1,4 @@
-"""The command line: serve, worker, migrate, replay, demo, evaluate, centred."""
+"""The command line: serve, worker, migrate, replay, demo, evaluate, flow-study, centred."""
 
 import math
 import sys
@@ -169,6 +169,19 @@ def evaluate(
     except CalibrationError as error:
         Console(stderr=True).print(f"[red]evaluate failed:[/] {error}")
         raise typer.Exit(1) from error
+
+
+@app.command()
+def flow_study(
+    sites: Annotated[int, typer.Option(min=1, help="How many simulated sites.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
+    processes: Annotated[int, typer.Option(min=1, help="Sites at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("flow-study.json"),
+) -> None:
+    """Simulated sites: how well a flow map tells a knock, and what a new path does to a pose."""
+    from service.flow_study import run_flow_study
+
+    run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
 
 
 @app.command()

@@ -4,26 +4,33 @@ import json
 import multiprocessing
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from models.errors import ShapeError
-from models.evaluation.bar import BARS
-from models.evaluation.joint_runs import JOINT, joint, track_errors
-from models.evaluation.protocol import KNOCKED, RANGES, Outcome, draw_case, judge_answer
-from models.evaluation.report import ENOUGH_TRACKS, Overall, SceneFigures, by_scene, overall
+from models.evaluation.estimators import UNTRAINED
+from models.evaluation.learned import learn_case
+from models.evaluation.protocol import (
+    RANGES,
+    Answer,
+    Estimator,
+    Outcome,
+    ProtocolCase,
+    draw_case,
+    judge_answer,
+)
+from models.evaluation.report import by_scene, overall
 from models.evaluation.scenes import load_scene
-
-_CURVE_TRACKS = [10, 20, 40, 80, 160, 320]
-_TABLE_WIDTH = 110
+from service.protocol_plots import draw_plots
+from service.protocol_tables import TABLE_WIDTH, overall_table, scene_table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,35 +73,32 @@ def run_protocol(
             raise ShapeError(f"knocks: {', '.join(RANGES)} are known, got {knock!r}")
     for folder in folders:
         load_scene(folder)
-    console = Console(width=max(Console().width, _TABLE_WIDTH))
+    console = Console(width=max(Console().width, TABLE_WIDTH))
     started = time.monotonic()
     tasks = _tasks(folders, seeds, knocks, regressors)
     results: list[_Result] = []
     # Spawned, not forked: torch's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
     columns = TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with (
-        ProcessPoolExecutor(processes, mp_context=context) as pool,
-        Progress(*columns, console=console) as bar,
-    ):
-        row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
-        waiting = {pool.submit(_run, task): task for task in tasks}
-        for done in as_completed(waiting):
-            results += done.result()
-            bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
-            _write(output, results)
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        with Progress(*columns, console=console) as bar:
+            row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
+            waiting = {pool.submit(_run, task): task for task in tasks}
+            for done in as_completed(waiting):
+                results += done.result()
+                bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
+                _write(output, results)
         order = {load_scene(folder).scene_id: place for place, folder in enumerate(folders)}
         results.sort(key=lambda r: (order[r.outcome.scene_id], r.outcome.seed))
-        curves = _curves(pool, folders, seeds) if plots is not None else {}
-    _write(output, results)
-    for knock in knocks:
-        own = [result.outcome for result in results if result.knock == knock]
-        console.print(_scene_table(knock, seeds, by_scene(own)))
-        console.print(_overall_table(knock, overall(own)))
-    console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
-    if plots is not None:
-        _plot(plots, folders, results, curves)
-        console.print(f"{plots} has the plots")
+        _write(output, results)
+        by_knock = {k: [r.outcome for r in results if r.knock == k] for k in knocks}
+        for knock, own in by_knock.items():
+            console.print(scene_table(knock, seeds, by_scene(own)))
+            console.print(overall_table(knock, overall(own)))
+        console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
+        if plots is not None:
+            draw_plots(plots, folders, seeds, by_knock, pool)
+            console.print(f"{plots} has the plots; {time.monotonic() - started:.0f} s in all")
 
 
 def _tasks(
@@ -113,61 +117,28 @@ def _tasks(
 
 def _run(task: _Task) -> list[_Result]:
     scene = load_scene(task.folder)
-    estimators = JOINT
+    trained: dict[str, Estimator] = {}
     if task.trained:
         from models.evaluation.regressors import prepare_regressors
 
-        estimators = prepare_regressors(scene, seed=0)
+        trained = prepare_regressors(scene, seed=0)
     results = []
     for knock, seed in product(task.knocks, task.seeds):
         case = draw_case(scene, seed, RANGES[knock])
-        for name, estimator in estimators.items():
+        for name, ask in _asked(case, trained).items():
             started = time.monotonic()
-            answer = estimator(case)
+            answer = ask()
             outcome = judge_answer(case, name, answer, time.monotonic() - started)
             results.append(_Result(knock=knock, outcome=outcome))
     return results
 
 
-def _curves(
-    pool: ProcessPoolExecutor, folders: Sequence[Path], seeds: int
-) -> dict[str, list[tuple[int, float, float]]]:
-    """Errors over the number of tracks, of scenes with enough of them."""
-    enough = [
-        folder
-        for folder in folders
-        if len(draw_case(load_scene(folder), 0, KNOCKED).seen) >= ENOUGH_TRACKS
-    ]
-    pairs = list(product(enough, range(seeds)))
-    found: dict[str, list[tuple[int, float, float]]] = {}
-    for (folder, _), points in zip(pairs, pool.map(_curve, pairs), strict=True):
-        found.setdefault(folder.name, []).extend(points)
-    return found
-
-
-def _curve(pair: tuple[Path, int]) -> list[tuple[int, float, float]]:
-    folder, seed = pair
-    return track_errors(load_scene(folder), seed, _CURVE_TRACKS)
-
-
-def _plot(
-    folder: Path,
-    scenes: Sequence[Path],
-    results: Sequence[_Result],
-    curves: dict[str, list[tuple[int, float, float]]],
-) -> None:
-    from models.evaluation.plots import plot_drift, plot_ground, plot_track_errors
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for knock in dict.fromkeys(result.knock for result in results):
-        own = [result.outcome for result in results if result.knock == knock]
-        if knock != "still":
-            plot_drift(own, folder / f"drift-{knock}.png")
-    for scene in scenes:
-        case = draw_case(load_scene(scene), 0, KNOCKED)
-        plot_ground(case, joint(case).values, folder / f"ground-{scene.name}.png")
-    if curves:
-        plot_track_errors(curves, folder / "tracks.png")
+def _asked(case: ProtocolCase, trained: Mapping[str, Estimator]) -> dict[str, Callable[[], Answer]]:
+    """The trained estimators, or else all others; these learn the case's reference once."""
+    if trained:
+        return {name: partial(estimator, case) for name, estimator in trained.items()}
+    learned = learn_case(case)
+    return {name: partial(estimator, learned) for name, estimator in UNTRAINED.items()}
 
 
 def _write(output: Path, results: Sequence[_Result]) -> None:
@@ -179,51 +150,3 @@ def _write(output: Path, results: Sequence[_Result]) -> None:
         "outcomes": [{"knock": r.knock, **asdict(r.outcome)} for r in results],
     }
     output.write_text(json.dumps(document, indent=1))
-
-
-def _scene_table(knock: str, seeds: int, figures: Sequence[SceneFigures]) -> Table:
-    table = Table(
-        title=f"{knock}, {seeds} seeds: medians (90th percentiles)", title_justify="left"
-    )  # fmt: skip
-    table.add_column("scene (tracks)")
-    table.add_column("estimator", no_wrap=True)
-    for name in ("angle, deg", "heading", "height, %", "covered", "declared", "drifting", "s"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for scene in dict.fromkeys(f.scene_id for f in figures):
-        own = [f for f in figures if f.scene_id == scene]
-        table.add_section()
-        if knock == "knock" and scene in BARS:
-            bar = BARS[scene]
-            for name, words in (
-                ("floor: site speed", bar.site_speed),
-                ("floor: offset", bar.offset),
-                ("bar", bar.bar),
-            ):
-                angle, _, height = words.partition(", ")
-                table.add_row("", name, angle.removesuffix(" deg"), "", height, style="dim")
-        for f in own:
-            table.add_row(
-                f"{scene} ({f.tracks:.0f})" if f is own[0] else "",
-                f.estimator,
-                f"{f.angle_error_deg:.2f} ({f.angle_error_p90_deg:.1f})",
-                "" if f.heading_error_deg is None else f"{f.heading_error_deg:.2f}",
-                f"{100 * f.height_error:.1f} ({100 * f.height_error_p90:.0f})",
-                f"{f.coverage:.0%}",
-                f"{f.degenerate:.0%}",
-                f"{f.drifting:.0%}",
-                f"{f.seconds:.2f}",
-            )
-    return table
-
-
-def _overall_table(knock: str, rows: Sequence[Overall]) -> Table:
-    table = Table(title=f"{knock}, all scenes")
-    table.add_column("estimator", no_wrap=True)
-    for column in ("slope: tilt", "roll", "log height", "90 % covers: tilt", "roll", "height"):
-        table.add_column(column, justify="right")
-    for row in rows:
-        slopes = ["", "", ""]
-        if row.slope is not None and row.slope_se is not None:
-            slopes = [f"{s:.3f} ± {e:.3f}" for s, e in zip(row.slope, row.slope_se, strict=True)]
-        table.add_row(row.estimator, *slopes, *(f"{c:.0%}" for c in row.coverage))
-    return table

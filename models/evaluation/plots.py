@@ -11,19 +11,19 @@ from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-_COLORS = ("#136", "#c60", "#482", "#919", "#888", "#b22", "#0aa", "#d7a", "#aa0")
+COLORS = ("#136", "#c60", "#482", "#919", "#888", "#b22", "#0aa", "#d7a", "#aa0")
 _GRID_M = 5.0
 
 
 def plot_drift(outcomes: Sequence[Outcome], path: Path) -> None:
     """Error over true drift: a panel for tilt, roll and height, a colour for each estimator."""
-    pyplot = _pyplot()
+    pyplot = pyplot_of_files()
     figure, panels = pyplot.subplots(1, 3, figsize=(11, 3.4), constrained_layout=True)
     names = list(dict.fromkeys(outcome.estimator for outcome in outcomes))
     for number, (panel, label, scale) in enumerate(
         zip(panels, ("tilt, deg", "roll, deg", "height, %"), (1, 1, 100), strict=True)
     ):
-        for name, color in zip(names, _COLORS, strict=False):
+        for name, color in zip(names, COLORS, strict=False):
             own = [o for o in outcomes if o.estimator == name and not o.degenerate]
             true = np.array([o.true_drift[number] for o in own]) * scale
             error = np.array([o.drift[number] - o.true_drift[number] for o in own]) * scale
@@ -41,7 +41,7 @@ def plot_ground(case: ProtocolCase, values: Array, path: Path) -> None:
 
     Source: Xu et al. 2020, figure 5 (ground plane re-projected with true and estimated pose).
     """
-    pyplot = _pyplot()
+    pyplot = pyplot_of_files()
     lens = case.intrinsics
     figure, panel = pyplot.subplots(figsize=(8, 8 * lens.height / lens.width))
     for trajectory in case.seen:
@@ -69,9 +69,9 @@ def plot_track_errors(curves: Mapping[str, Sequence[tuple[int, float, float]]], 
 
     `curves` has (tracks, error, bound) in degrees, of all seeds together.
     """
-    pyplot = _pyplot()
+    pyplot = pyplot_of_files()
     figure, panel = pyplot.subplots(figsize=(6, 4), constrained_layout=True)
-    for (scene, points), color in zip(curves.items(), _COLORS, strict=False):
+    for (scene, points), color in zip(curves.items(), COLORS, strict=False):
         counts = sorted({count for count, _, _ in points})
         rms = [_rms([e for count, e, _ in points if count == n]) for n in counts]
         bound = [_rms([b for count, _, b in points if count == n]) for n in counts]
@@ -105,7 +105,8 @@ def _rms(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _pyplot() -> Any:
+def pyplot_of_files() -> Any:
+    """Matplotlib's pyplot, drawing to files alone."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -15,7 +15,7 @@ from models.trajectory import Trajectory
 
 NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
-_Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
+Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,8 +81,10 @@ class Outcome:
     """One case of one estimator. Triples are tilt and roll in degrees and log height.
 
     `tracks` were seen after the knock, of which `used` gave the estimator something to go by. The
-    angle error is that of the whole rotation, heading included; `heading_error_deg` and whether
-    its interval `heading_covered` the truth are None for an estimator that says nothing of it.
+    angle error is that of the whole rotation, heading included; `tilt_roll_error_deg` is what it
+    would be were the heading right. `heading_error_deg` and whether its interval `heading_covered`
+    the truth are None for an estimator that says nothing of it. `seconds` are those of the answer,
+    less what all estimators of the case share.
     """
 
     scene_id: str
@@ -94,6 +96,8 @@ class Outcome:
     drift: tuple[float, float, float]
     sd: tuple[float, float, float]
     angle_error_deg: float
+    tilt_roll_error_deg: float
+    true_heading_drift_deg: float
     height_error: float
     covered: tuple[bool, bool, bool]
     degenerate: bool
@@ -142,13 +146,14 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
     error[1] = math.remainder(error[1], 2 * math.pi)
     sd = np.sqrt(np.diag(answer.covariance))
     pose = pose_of_numbers(answer.values, case.prior_pose)
+    level = pose_of_numbers(answer.values, case.true_pose)
     heading_error = heading_covered = None
     if answer.heading_rad is not None and answer.heading_sd_rad is not None:
         pose = replace(pose, heading_rad=answer.heading_rad)
         off = math.remainder(answer.heading_rad - case.true_pose.heading_rad, 2 * math.pi)
         heading_error = math.degrees(off)
-        heading_covered = abs(off) <= _Z90 * answer.heading_sd_rad
-    covered = np.abs(error) <= _Z90 * sd
+        heading_covered = abs(off) <= Z90 * answer.heading_sd_rad
+    covered = np.abs(error) <= Z90 * sd
     return Outcome(
         scene_id=case.scene_id,
         estimator=estimator,
@@ -158,8 +163,10 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         true_drift=_printed(true - prior),
         drift=_printed(true + error - prior),
         sd=_printed(sd),
-        angle_error_deg=math.degrees(
-            float(angle_between(pose.quaternion_wxyz, case.true_pose.quaternion_wxyz))
+        angle_error_deg=_angle_deg(pose, case.true_pose),
+        tilt_roll_error_deg=_angle_deg(level, case.true_pose),
+        true_heading_drift_deg=math.degrees(
+            case.true_pose.heading_rad - case.prior_pose.heading_rad
         ),
         height_error=abs(math.expm1(error[2])),
         covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
@@ -197,6 +204,10 @@ def _taken(trajectories: list[Trajectory]) -> tuple[Trajectory, ...]:
     """What the service takes, in the order that trackers post: as the tracks end."""
     taken = [trajectory for trajectory in trajectories if trajectory.long_enough]
     return tuple(sorted(taken, key=lambda trajectory: float(trajectory.time_s[-1])))
+
+
+def _angle_deg(one: CameraPose, other: CameraPose) -> float:
+    return math.degrees(float(angle_between(one.quaternion_wxyz, other.quaternion_wxyz)))
 
 
 def _printed(triple: Array) -> tuple[float, float, float]:

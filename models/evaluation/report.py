@@ -17,7 +17,9 @@ _ALARM_FLOOR = np.array([1.0, 1.0, 0.04])  # deg, deg, log height
 class SceneFigures:
     """One estimator on one scene: medians and 90th percentiles, and shares of the cases.
 
-    `drifting` is the share whose drift is beyond four standard deviations and 1 deg or 4 %: on a
+    `angle_error_deg` is of the whole rotation, `tilt_roll_error_deg` of tilt and roll alone, to
+    compare those that say nothing of the heading on a camera that was panned, too. `drifting` is
+    the share whose drift is beyond four standard deviations and 1 deg or 4 %: on a
     still camera, false alarms. Of the heading, what those say that tell it: the median error, and
     the share of 90 % intervals that hold the truth.
     """
@@ -28,6 +30,7 @@ class SceneFigures:
     tracks: float
     angle_error_deg: float
     angle_error_p90_deg: float
+    tilt_roll_error_deg: float
     height_error: float
     height_error_p90: float
     coverage: float
@@ -44,7 +47,8 @@ class Overall:
 
     `slope` of estimated against true drift in tilt, roll, log height, over scenes with at least 70
     tracks, each with its standard error; none where the camera is still. `coverage` is the share
-    of stated 90 % intervals that hold the truth, for each of the three.
+    of stated 90 % intervals that hold the truth, for each of the three. The same of the heading is
+    None where nothing is said of it; its slope, where the camera is not panned.
     """
 
     estimator: str
@@ -52,6 +56,9 @@ class Overall:
     slope: tuple[float, float, float] | None
     slope_se: tuple[float, float, float] | None
     coverage: tuple[float, float, float]
+    heading_slope: float | None
+    heading_slope_se: float | None
+    heading_coverage: float | None
 
 
 def by_scene(outcomes: Sequence[Outcome]) -> list[SceneFigures]:
@@ -71,6 +78,8 @@ def overall(outcomes: Sequence[Outcome]) -> list[Overall]:
         own = [outcome for outcome in outcomes if outcome.estimator == name]
         big = [outcome for outcome in own if outcome.scene_id in enough]
         slope, slope_se = _slopes(big)
+        heading_slope, heading_slope_se = _heading_slope(big)
+        headings = [o.heading_covered for o in own if o.heading_covered is not None]
         tilt, roll, height = (float(share) for share in np.mean([o.covered for o in own], axis=0))
         found.append(
             Overall(
@@ -79,6 +88,9 @@ def overall(outcomes: Sequence[Outcome]) -> list[Overall]:
                 slope=slope,
                 slope_se=slope_se,
                 coverage=(tilt, roll, height),
+                heading_slope=heading_slope,
+                heading_slope_se=heading_slope_se,
+                heading_coverage=float(np.mean(headings)) if headings else None,
             )
         )
     return found
@@ -98,6 +110,7 @@ def _figures(scene_id: str, estimator: str, group: Sequence[Outcome]) -> SceneFi
         tracks=float(np.mean([outcome.tracks for outcome in group])),
         angle_error_deg=float(np.median(angles)),
         angle_error_p90_deg=float(np.quantile(angles, 0.9)),
+        tilt_roll_error_deg=float(np.median([o.tilt_roll_error_deg for o in group])),
         height_error=float(np.median(heights)),
         height_error_p90=float(np.quantile(heights, 0.9)),
         coverage=float(np.mean([outcome.covered for outcome in group])),
@@ -120,6 +133,19 @@ def _slopes(
         *(_slope(true[:, number], told[:, number]) for number in range(3)), strict=True
     )
     return slopes, errors
+
+
+def _heading_slope(outcomes: Sequence[Outcome]) -> tuple[float | None, float | None]:
+    pairs = np.array(
+        [
+            (o.true_heading_drift_deg, o.true_heading_drift_deg + o.heading_error_deg)
+            for o in outcomes
+            if o.heading_error_deg is not None
+        ]
+    ).reshape(-1, 2)
+    if len(pairs) < 3 or not pairs[:, 0].std() > 0:
+        return None, None
+    return _slope(pairs[:, 0], pairs[:, 1])
 
 
 def _slope(true: Array, told: Array) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from service.recalibration.alerts import end_alert, fired_by_estimate, open_aler
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import made_against
-from service.recalibration.words import FIELDS, describe_drift, shown
+from service.recalibration.words import FIELDS, describe_drift, describe_move, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
 from service.store.tables import EstimateRecord, SiteReferenceRecord

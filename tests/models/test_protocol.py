@@ -119,6 +119,8 @@ def test_a_pan_changes_nothing_else_and_its_error_is_the_whole_rotations(scene):
     # A turn about the vertical is a turn by as much, however the camera is tilted.
     assert blind.angle_error_deg == pytest.approx(abs(pan_deg), rel=1e-6)
     assert blind.heading_error_deg is None
+    assert blind.tilt_roll_error_deg == pytest.approx(0, abs=1e-6)
+    assert blind.true_heading_drift_deg == pytest.approx(pan_deg)
     seeing = replace(
         right, heading_rad=turned.true_pose.heading_rad + math.radians(0.5), heading_sd_rad=0.004
     )
@@ -126,3 +128,11 @@ def test_a_pan_changes_nothing_else_and_its_error_is_the_whole_rotations(scene):
     assert told.heading_error_deg == pytest.approx(0.5)
     assert told.angle_error_deg == pytest.approx(0.5)
     assert told.heading_covered is False
+    rolled = replace(seeing, values=seeing.values + [0, math.radians(1), 0])
+    both = judge_answer(turned, "both", rolled, 0.0)
+    # A turn of 0.5 deg about the vertical and of 1 deg about the axis, `tilt` below the horizon:
+    # as vectors the angle between them is 90 deg less the tilt, up or down.
+    assert both.tilt_roll_error_deg == pytest.approx(1.0)
+    shared = 2 * 0.5 * math.sin(turned.true_pose.tilt_rad)
+    ends = [math.sqrt(1.25 + sign * shared) for sign in (1, -1)]
+    assert min(abs(both.angle_error_deg - end) for end in ends) < 1e-2

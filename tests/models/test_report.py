@@ -21,6 +21,8 @@ def outcome(seed: int, true: float, told: float, **changed: object) -> Outcome:
         "drift": (told, told, told / 100),
         "sd": (0.5, 0.5, 0.01),
         "angle_error_deg": abs(told - true),
+        "tilt_roll_error_deg": abs(told - true) / 2,
+        "true_heading_drift_deg": 0.0,
         "height_error": abs(told - true) / 100,
         "covered": (True, True, False),
         "degenerate": False,
@@ -36,6 +38,7 @@ def test_medians_and_shares_of_a_scene():
     (figures,) = by_scene(CASES)
     assert figures.angle_error_deg == 1.0
     assert figures.angle_error_p90_deg == pytest.approx(1.7)
+    assert figures.tilt_roll_error_deg == 0.5
     assert figures.height_error == pytest.approx(0.01)
     assert figures.coverage == pytest.approx(2 / 3)
     # Beyond four standard deviations, 2 deg: the third alone.
@@ -57,6 +60,22 @@ def test_slopes_are_least_squares():
     assert figures.slope_se is not None
     assert figures.slope_se[0] == pytest.approx(math.sqrt(2 / 2 / 8))
     assert figures.coverage == (1.0, 1.0, 0.0)
+
+
+def test_the_slope_of_the_heading_is_that_of_those_who_tell_it():
+    panned = [
+        replace(o, true_heading_drift_deg=true, heading_error_deg=error, heading_covered=error < 2)
+        for o, true, error in zip(CASES, (-2.0, 0.0, 2.0, 0.0), (1.0, 0.0, 1.0, 2.0), strict=True)
+    ]
+    (figures,) = overall(panned)
+    # As above: true -2, 0, 2, 0 and told -1, 0, 3, 2.
+    assert figures.heading_slope == pytest.approx(1.0)
+    assert figures.heading_slope_se == pytest.approx(math.sqrt(2 / 2 / 8))
+    assert figures.heading_coverage == 0.75
+    (silent,) = overall(CASES)
+    assert (silent.heading_slope, silent.heading_coverage) == (None, None)
+    (unpanned,) = overall([replace(o, true_heading_drift_deg=0.0) for o in panned])
+    assert (unpanned.heading_slope, unpanned.heading_coverage) == (None, 0.75)
 
 
 def test_a_scene_with_few_tracks_has_no_say_in_the_slope():

@@ -82,11 +82,16 @@ def test_evaluate_knocks_scenes_and_says_how_each_estimator_did(tmp_path):
         "--output", str(output), "--plots", str(plots),
     )  # fmt: skip
     outcomes = json.loads(output.read_text())["outcomes"]
-    assert len(outcomes) == 2 * 2 * 2 * 4  # scenes, ranges, seeds, estimators
+    assert len(outcomes) == 2 * 2 * 2 * 5  # scenes, ranges, seeds, estimators
     assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
     assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
-    assert "8 %, or declared" in text  # the bar stands beside the figures
-    for name in ("drift-knock.png", "ground-meva_g336_school.png"):
+    assert "bar (or declared)" in text  # the bar stands beside the figures
+    for name in (
+        "drift-knock.png",
+        "ground-meva_g336_school.png",
+        "flow-meva_g336_school.png",
+        "flow-tracks.png",
+    ):
         assert (plots / name).stat().st_size > 5000
 
 

@@ -1,0 +1,113 @@
+"""The flow map as the protocol runs it: with the joint estimate, and alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.observations import Observations
+from models.estimation.joint.site import SiteReference
+from models.estimation.numbers import NUMBERS
+from models.evaluation.joint_runs import joint_answer
+from models.evaluation.learned import Learned
+from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
+from models.flow.evidence import Walkers, walkers_of
+from models.flow.fusion import fused_estimate
+from models.flow.reference import FlowReference, candidate_of, precision_of
+from models.flow.registration import Belief, Peak, Site, register, settled
+from models.geometry.rotation import Array
+
+_HEADINGS = np.radians(np.arange(-24.0, 25.0, 4.0))
+# Tilts and rolls around the prior's: paths are narrow, a climb from 8 deg off ends beside them.
+_NODES = [np.radians([tilt, roll, 0, 0]) for tilt in (-6, 0, 6) for roll in (-6, 0, 6)]
+_CLIMBED = 2
+_SAME_END = np.radians(0.3)
+_BROAD = np.diag(np.array([np.radians(8), np.radians(8), 0.2, np.radians(15)]) ** -2.0)
+_FEWEST = 5
+_WEAK_SD = np.array([np.radians(2), np.radians(2), 0.12])  # as in the joint estimate
+
+
+def fused(learned: Learned) -> Answer:
+    """The joint estimate and the flow map together: the heading too."""
+    return fused_answer(learned.case, learned.seen, learned.site, learned.flow)
+
+
+def fused_answer(
+    case: ProtocolCase, seen: Observations, site: SiteReference, flow: FlowReference | None
+) -> Answer:
+    """The fused pose of what is seen; without a map, or with too few people, the joint one."""
+    estimate = joint_estimate(seen, case.prior_pose, site)
+    answer = joint_answer(estimate)
+    if flow is None:
+        return answer
+    found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
+    answer = replace(
+        answer,
+        values=found.values[:3],
+        covariance=found.covariance[:3, :3],
+        weak=tuple(name for name in NUMBERS if name not in found.told),
+    )
+    return (
+        _with_heading(answer, found.values, found.covariance) if "heading" in found.told else answer
+    )
+
+
+def registration(learned: Learned) -> Answer:
+    """The flow map alone, around the prior pose: nothing is known of speeds."""
+    case, reference = learned.case, learned.flow
+    if reference is None:
+        return nothing_told(case)
+    mean = candidate_of(case.prior_pose) + reference.offset
+    walkers = walkers_of(learned.seen, mean)
+    if walkers.parties < _FEWEST:
+        return nothing_told(case)
+    site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
+    belief = Belief(mean=mean, precision=_BROAD)
+    peaks = _peaks(walkers, site, belief, temper)
+    best = peaks[0]
+    known = precision_of(best, reference.surprise * reference.map_noise(walkers.people))
+    values, covariance = settled(walkers, site, belief, best, known)
+    # Other poses that explain the tracks, each by its chance, are a part of what is unsure.
+    chances = np.exp([peak.value - best.value for peak in peaks])
+    apart = np.array([peak.candidate - best.candidate for peak in peaks])
+    elsewhere = (apart * (chances / chances.sum())[:, None]).T @ apart
+    covariance = covariance + reference.offset_covariance + elsewhere
+    sd = np.sqrt(np.diag(covariance))[:3]
+    weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _WEAK_SD, strict=True) if is_weak)
+    answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
+    return _with_heading(answer, values - reference.offset, covariance)
+
+
+def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:
+    """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
+
+    def chance(candidate: Array) -> float:
+        return site.likelihood(walkers, candidate).value / temper + belief.log_density(candidate)
+
+    turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
+    starts = {
+        number: max(chance(belief.mean + node + turn) for turn in turns)
+        for number, node in enumerate(_NODES)
+    }
+    likeliest = sorted(starts, key=lambda number: -starts[number])
+    peaks: list[Peak] = []
+    for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
+        around = replace(belief, mean=belief.mean + node)
+        for peak in register(walkers, site, around, temper=temper, headings=_HEADINGS):
+            # The belief stood at the node; one step takes the peak to where it is around the mean.
+            posterior = peak.curvature / temper + belief.precision
+            candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
+            if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
+                peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+    return sorted(peaks, key=lambda peak: -peak.value)
+
+
+def _with_heading(answer: Answer, values: Array, covariance: Array) -> Answer:
+    """The answer with tilt, roll, log height, heading (4,) and their covariance (4, 4)."""
+    return replace(
+        answer,
+        values=values[:3],
+        covariance=covariance[:3, :3],
+        heading_rad=float(values[3]),
+        heading_sd_rad=float(np.sqrt(covariance[3, 3])),
+    )

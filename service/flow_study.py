@@ -1,0 +1,112 @@
+"""`surefoot flow-study`: the flow map on simulated sites, in parallel; tables and JSON."""
+
+import json
+import multiprocessing
+import platform
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from models.evaluation.flow_study import REFERENCE_TRACKS, SiteResults, study_site
+
+_TABLE_WIDTH = 110
+
+
+def run_flow_study(*, sites: int, seed: int, processes: int, output: Path) -> None:
+    """Study simulated sites, print what was found, write JSON.
+
+    The JSON grows as sites end, so an interrupted study keeps what it has.
+    """
+    console = Console(width=max(Console().width, _TABLE_WIDTH))
+    started = time.monotonic()
+    found: list[SiteResults] = []
+    # Spawned, not forked, as for every other pool here.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        waiting = [pool.submit(study_site, site, seed) for site in range(sites)]
+        for done in track(as_completed(waiting), "sites", total=sites, console=console):
+            found.append(done.result())
+            found.sort(key=lambda results: results.site)
+            _write(output, seed, found)
+    console.print(knocked_table(found))
+    console.print(changed_table(found))
+    simulated, learned, estimated = (
+        float(np.median([getattr(results, name) for results in found]))
+        for name in ("simulated_s", "learned_s", "estimated_s")
+    )
+    console.print(
+        f"a site: {simulated:.1f} s simulated, {learned:.1f} s learned, {estimated:.1f} s "
+        f"estimated (medians); {output} has all; {time.monotonic() - started:.0f} s"
+    )
+
+
+def knocked_table(found: Sequence[SiteResults]) -> Table:
+    """Errors after a knock, by the number of tracks, and how often intervals hold the truth."""
+    table = Table(
+        title=f"knocked: {len(found)} sites, {REFERENCE_TRACKS} reference tracks; "
+        "median errors (90th percentiles), share that the 90 % interval covers",
+        title_justify="left",
+    )
+    for name in ("tracks", "tilt, deg", "roll, deg", "pan, deg", "height, %"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for number in range(len(found[0].knocked)):
+        own = [results.knocked[number] for results in found]
+        errors = np.abs([result.errors for result in own]) * [1, 1, 1, 100]
+        covered = np.mean([result.covered for result in own], axis=0)
+        cells = [
+            f"{np.median(error):.2f} ({np.quantile(error, 0.9):.2f}) {share:.0%}"
+            for error, share in zip(errors.T, covered, strict=True)
+        ]
+        table.add_row(str(own[0].tracks), *cells)
+    return table
+
+
+def changed_table(found: Sequence[SiteResults]) -> Table:
+    """How far a still camera's pose moves when half of the people take a new path."""
+    table = Table(
+        title="still, half on a new path: median angles (90th percentile; largest), deg",
+        title_justify="left",
+    )
+    for name in (
+        "tracks", "off the truth", "off the pose\nby old paths", "by old paths,\noff the truth",
+        "beyond\n1 deg", "all four\ncovered", "paths\nnamed",
+    ):  # fmt: skip
+        table.add_column(name, justify="right", no_wrap=True)
+    for number in range(len(found[0].changed)):
+        own = [results.changed[number] for results in found]
+        angles = [
+            _spread([getattr(result, name) for result in own])
+            for name in ("off_truth_deg", "off_unchanged_deg", "unchanged_off_truth_deg")
+        ]
+        shares = (
+            float(np.mean([result.off_truth_deg > 1 for result in own])),
+            float(np.mean([all(result.covered) for result in own])),
+            float(np.mean(["path" in result.reason for result in own])),
+        )
+        table.add_row(str(own[0].tracks), *angles, *(f"{share:.0%}" for share in shares))
+    return table
+
+
+def _spread(values: Sequence[float]) -> str:
+    return f"{np.median(values):.2f} ({np.quantile(values, 0.9):.2f}; {max(values):.2f})"
+
+
+def _write(output: Path, seed: int, found: Sequence[SiteResults]) -> None:
+    document: dict[str, Any] = {
+        "machine": {
+            "processor": platform.processor() or platform.machine(),
+            "cores": multiprocessing.cpu_count(),
+        },
+        "seed": seed,
+        "reference_tracks": REFERENCE_TRACKS,
+        "sites": [asdict(results) for results in found],
+    }
+    output.write_text(json.dumps(document, indent=1))
