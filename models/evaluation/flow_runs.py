@@ -13,7 +13,7 @@ from models.evaluation.learned import Learned
 from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
 from models.flow.evidence import Walkers, walkers_of
 from models.flow.fusion import fused_estimate
-from models.flow.reference import FlowReference, candidate_of, precision_of
+from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.rotation import Array
 
@@ -57,7 +57,7 @@ def registration(learned: Learned) -> Answer:
     case, reference = learned.case, learned.flow
     if reference is None:
         return nothing_told(case)
-    mean = candidate_of(case.prior_pose) + reference.offset
+    mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
     if walkers.parties < _FEWEST:
         return nothing_told(case)
@@ -65,17 +65,17 @@ def registration(learned: Learned) -> Answer:
     belief = Belief(mean=mean, precision=_BROAD)
     peaks = _peaks(walkers, site, belief, temper)
     best = peaks[0]
-    known = precision_of(best, reference.surprise * reference.map_noise(walkers.people))
-    values, covariance = settled(walkers, site, belief, best, known)
+    known = reference.precision(best, walkers.people, best.candidate - mean)
+    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
     # Other poses that explain the tracks, each by its chance, are a part of what is unsure.
     chances = np.exp([peak.value - best.value for peak in peaks])
     apart = np.array([peak.candidate - best.candidate for peak in peaks])
     elsewhere = (apart * (chances / chances.sum())[:, None]).T @ apart
-    covariance = covariance + reference.offset_covariance + elsewhere
+    covariance = covariance + elsewhere
     sd = np.sqrt(np.diag(covariance))[:3]
     weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _WEAK_SD, strict=True) if is_weak)
     answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
-    return _with_heading(answer, values - reference.offset, covariance)
+    return _with_heading(answer, values, covariance)
 
 
 def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:

@@ -7,26 +7,26 @@ import numpy.typing as npt
 
 from models.flow.evidence import Walkers
 from models.flow.fit_test import party_fits
-from models.flow.move_test import REACH, party_scores
-from models.flow.registration import Belief, Peak, Site, register
+from models.flow.move_test import REACH, parties_in_time, party_scores
+from models.flow.registration import Site, curvature_of
 from models.geometry.rotation import Array
 
 FOLDS = 4
-# How unsure the pose of a fold is before it is registered: so that its own end is seen.
-LOOSE_SD = np.array([np.radians(6), np.radians(6), 0.3, np.radians(15)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossFit:
     """What folds of parties say of maps of all others, at and around the known pose.
 
-    `peaks` are where registration ends, of `parties` each. `scores` (P, 4) and `fits` (P,) are of
-    parties, scores in the order of time; `bent` (4, 4) has in a column how the mean score of a
-    camera that has moved differs, for each number.
+    `slopes` (P, 4) are sums of a party's scores of `people` (P,) in it, `curvature` (4, 4) is of
+    all. `scores` (P, 4), of the score test, and `fits` (P,) are of parties; slopes and scores are
+    in the order of time. `bent` (4, 4) has in a column how the mean score of a camera that has
+    moved differs, for each number.
     """
 
-    peaks: list[Peak]
-    parties: list[int]
+    slopes: Array
+    people: Array
+    curvature: Array
     scores: Array
     bent: Array
     fits: Array
@@ -39,24 +39,23 @@ def cross_fit(folds: list[tuple[Site, Walkers, npt.NDArray[np.int64]]], at: Arra
         folds: the map, the walkers left out of it, and which tracks of all these are.
         at: the known pose (4,).
     """
-    belief = Belief(mean=at, precision=np.diag(LOOSE_SD**-2.0))
-    peaks = [
-        register(walkers, site, belief, temper=1.0, headings=[0.0])[0] for site, walkers, _ in folds
-    ]
     scored = [party_scores(walkers, site, at) for site, walkers, _ in folds]
     scores = np.concatenate([scores for scores, _ in scored])
     times = np.concatenate(
         [tracks[last] for (_, last), (_, _, tracks) in zip(scored, folds, strict=True)]
     )
+    order = np.argsort(times)
+    sums = [_party_sums(walkers, site.scores(walkers, at, at)) for site, walkers, _ in folds]
     # A camera that has moved on sees people as one that stays would from a little back.
     bent = [
         (_mean_score(folds, at - step) - _mean_score(folds, at + step)) / (2 * reach)
         for step, reach in zip(np.diag(REACH), REACH, strict=True)
     ]
     return CrossFit(
-        peaks=peaks,
-        parties=[walkers.parties for _, walkers, _ in folds],
-        scores=scores[np.argsort(times)],
+        slopes=np.concatenate([own for own, _ in sums])[order],
+        people=np.concatenate([people for _, people in sums])[order],
+        curvature=np.sum([curvature_of(walkers, site, at) for site, walkers, _ in folds], axis=0),
+        scores=scores[order],
         bent=np.stack(bent, axis=1),
         fits=np.concatenate([party_fits(walkers, site, at) for site, walkers, _ in folds]),
     )
@@ -67,6 +66,15 @@ def dealt(walkers: Walkers, seed: int) -> npt.NDArray[np.int64]:
     parties = np.unique(walkers.party_idx)
     fold_of = np.random.default_rng(seed).permutation(parties.size) % FOLDS
     return np.asarray(fold_of[np.searchsorted(parties, walkers.party_idx)])
+
+
+def _party_sums(walkers: Walkers, scores: Array) -> tuple[Array, Array]:
+    """Sums (P, 4) of the scores of each party, and its people (P,), in the order of time."""
+    people, party_of, _ = parties_in_time(walkers)
+    size = np.bincount(party_of)
+    sums = np.zeros((size.size, 4))
+    np.add.at(sums, party_of, scores[people])
+    return sums, size.astype(np.float64)
 
 
 def _mean_score(folds: list[tuple[Site, Walkers, npt.NDArray[np.int64]]], at: Array) -> Array:

@@ -9,7 +9,7 @@ from models.estimation.joint.groups import parties_of
 from models.estimation.joint.observations import Observations, Steps, steps_where
 from models.flow.flow_map import FlowMap
 from models.flow.placement import place_steps
-from models.flow.view import Coverage
+from models.flow.view import Coverage, known_shares
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
@@ -87,8 +87,8 @@ def likelihood(
     known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     unseen, unseen_by_place = flow.look_unseen(placed.place)
     (seen, d_seen), (beyond, d_beyond) = _seen(coverage, intrinsics, candidate)
-    busy = _busiest(walkers, known, unseen * np.exp(flow.log_level), seen, beyond, slot_idx)
-    extra = busy * np.exp(flow.log_level)
+    busy = _busiest(walkers, known, unseen * np.exp(flow.log_typical), seen, beyond, slot_idx)
+    extra = busy * np.exp(flow.log_typical)
     density = np.exp(known) + extra * unseen
     own = np.exp(known) / density
     in_all = seen + busy * beyond
@@ -108,6 +108,46 @@ def likelihood(
     values = np.zeros(walkers.tracks)
     np.add.at(values, owner, weight * value)
     return Likelihood(value=float(values.sum()), values=values, scores=scores)
+
+
+def anchored_scores(
+    walkers: Walkers,
+    flow: FlowMap,
+    coverage: Coverage,
+    intrinsics: Intrinsics,
+    candidate: Array,
+    anchor: Array,
+) -> Array:
+    """The scores (N, 4) of people in those parts of the picture that see known ground.
+
+    Which these are is told at an anchor (4,), about where the candidate is, and stays so. Unlike
+    the whole likelihood's, the mean of these scores is nothing at the truth whatever people do on
+    ground that the reference did not see.
+    """
+    steps = walkers.steps
+    slot_idx = flow.slot_of(steps.rows.time_s)
+    unseen, _ = flow.look_unseen(place_steps(steps, anchor).place)
+    placed = place_steps(steps, candidate)
+    _, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
+    score = (
+        np.einsum("mi,mik->mk", by_place, placed.d_place)
+        + by_direction[:, None] * placed.d_direction
+        + placed.d_log_ratio
+    )
+
+    def log_shares(at: Array) -> Array:
+        shares = known_shares(coverage, flow, intrinsics, at, anchor)
+        return np.asarray(np.log(np.maximum(shares, _LEAST_SEEN)))
+
+    slopes = [
+        (log_shares(candidate + step) - log_shares(candidate - step)) / (2 * _DIFFERENCE)
+        for step in _DIFFERENCE * np.eye(4)
+    ]
+    score = score - np.stack(slopes, axis=1)[slot_idx]
+    weight = walkers.weight * (1 - unseen) * placed.valid
+    scores = np.zeros((walkers.tracks, 4))
+    np.add.at(scores, steps.rows.owner_idx, weight[:, None] * score)
+    return scores
 
 
 def _busiest(

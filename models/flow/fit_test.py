@@ -7,11 +7,11 @@ does, the paths themselves have changed, and the map says nothing true of the ca
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from models.flow.evidence import Walkers
 from models.flow.placement import place_steps
 from models.flow.registration import Site
+from models.flow.student import value_below
 from models.flow.view import in_view
 from models.geometry.rotation import Array
 
@@ -33,8 +33,8 @@ class UsualFit:
         if not fits.size:
             return False
         drop = self.mean - float(fits.mean())
-        sd = self.sd * np.sqrt(1 / fits.size + 1 / self.parties)
-        return drop > max(_LEAST_DROP, -float(stdtrit(self.parties - 1, _RATE) * sd))
+        sd = self.sd * float(np.sqrt(1 / fits.size + 1 / self.parties))
+        return drop > max(_LEAST_DROP, -value_below(_RATE, self.parties - 1) * sd)
 
 
 def usual_fit(fits: Array) -> UsualFit:

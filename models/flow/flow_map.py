@@ -14,12 +14,23 @@ DIRECTIONS = 16
 _CELL_M = 0.5
 _MOST_CELLS = 160  # along one side of the grid; a wider site has larger cells
 _MARGIN_M = 12.0  # around where people were seen: where a knock may put them
-_SMOOTH_M = 1.0
-_SMOOTH_KAPPA = 6.0  # of the von Mises kernel over directions: 24 deg
 _ANYWHERE = 0.1  # of all people walk anywhere in the grid, any way
 _ANY_WAY = 0.15  # of those at a place walk any way
 _QUANTILE = 0.002  # of the places at each side are left out of the grid
+_UNKNOWN_COST = 0.5  # of a person on ground that nobody knows, against the usual log density
 _SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins with
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grain:
+    """How fine a map is: the Gaussian over places, the von Mises kernel over directions, the day.
+
+    `slots` is into how many parts the day falls.
+    """
+
+    smooth_m: float = 1.0
+    smooth_kappa: float = 6.0  # 24 deg
+    slots: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +39,9 @@ class FlowMap:
 
     Nodes stand `cell_m` apart from `corner` (2,) on; directions from +X on, evenly; S equal parts
     of the day from midnight UTC on, or one. `elsewhere` is the log density off the grid. `unseen`
-    (X, Y) is how much of each node's ground the reference did not see, `log_level` the log density
-    where that is all, were people as many there as on the known ground. `people` (X, Y) is how
+    (X, Y) is how much of each node's ground the reference did not see. Were people as many there as
+    on the known ground, `log_level` would be their mean log density and `log_typical` that of a
+    person: they heap on paths there, too. `people` (X, Y) is how
     many people's steps made a node: how sure it is.
     """
 
@@ -39,6 +51,7 @@ class FlowMap:
     elsewhere: float
     unseen: Array
     log_level: float
+    log_typical: float
     people: Array
 
     @property
@@ -57,22 +70,19 @@ class FlowMap:
         first, parts, inside = self._cells(place)
         turn = (direction % (2 * np.pi)) / (2 * np.pi) * DIRECTIONS
         way = np.floor(turn).astype(np.int64)
-        parts = np.concatenate([parts, (turn - way)[:, None]], axis=1)
+        shares, steepness = _cubic(turn - way)
+        ways = (way + np.arange(-1, 3)[:, None]) % DIRECTIONS  # (4, M)
         value, slopes = np.zeros(len(parts)), np.zeros((len(parts), 3))
-        for corner in np.ndindex(2, 2, 2):
+        for corner in np.ndindex(2, 2):
             sides = np.array(corner)
             share = np.where(sides == 1, parts, 1 - parts)
-            node = self.log_density[
-                slot_idx,
-                first[:, 0] + corner[0],
-                first[:, 1] + corner[1],
-                (way + corner[2]) % DIRECTIONS,
+            nodes = self.log_density[
+                slot_idx, first[:, 0] + corner[0], first[:, 1] + corner[1], ways
             ]
+            node = (shares * nodes).sum(axis=0)
             value += share.prod(axis=1) * node
-            sign = 2 * sides - 1
-            slopes[:, 0] += sign[0] * share[:, 1] * share[:, 2] * node
-            slopes[:, 1] += sign[1] * share[:, 0] * share[:, 2] * node
-            slopes[:, 2] += sign[2] * share[:, 0] * share[:, 1] * node
+            slopes[:, :2] += (2 * sides - 1) * share[:, ::-1] * node[:, None]
+            slopes[:, 2] += share.prod(axis=1) * (steepness * nodes).sum(axis=0)
         slopes *= np.array([1 / self.cell_m, 1 / self.cell_m, DIRECTIONS / (2 * np.pi)])
         slopes[~inside] = 0.0
         return np.where(inside, value, self.elsewhere), slopes[:, :2], slopes[:, 2]
@@ -99,6 +109,28 @@ class FlowMap:
         return first, at - first, inside
 
 
+def _cubic(part: Array) -> tuple[Array, Array]:
+    """Shares (4, M) of four directions in a row, a part of the way from the second to the third.
+
+    With their slopes (4, M). Between straight lines a path's direction would be where a node is.
+    Source: Catmull and Rom 1974, cubic splines through nodes.
+    """
+    squared, cubed = part**2, part**3
+    shares = [
+        -part + 2 * squared - cubed,
+        2 - 5 * squared + 3 * cubed,
+        part + 4 * squared - 3 * cubed,
+        cubed - squared,
+    ]
+    slopes = [
+        -1 + 4 * part - 3 * squared,
+        9 * squared - 10 * part,
+        1 + 8 * part - 9 * squared,
+        3 * squared - 2 * part,
+    ]
+    return np.stack(shares) / 2, np.stack(slopes) / 2
+
+
 def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
     """Which of so many equal parts of a UTC day each time (M,) is in."""
     return np.floor(time_s % 86_400 / 86_400 * slots).astype(np.int64) % slots
@@ -109,7 +141,7 @@ def learn_map(
     weight: Array,
     time_s: Array,
     seen_at: Callable[[Array], Array],
-    slots: int = 1,
+    grain: Grain,
 ) -> FlowMap:
     """The map of steps seen from a known pose, each counted by its weight (M,).
 
@@ -118,7 +150,7 @@ def learn_map(
         weight: those of a person add up to how much that person counts.
         time_s: when each step was (M,).
         seen_at: which part (N,) of the ground around places (N, 2) that pose sees.
-        slots: into how many parts the day falls.
+        grain: how fine the map is.
 
     Raises:
         ValueError: no step counts.
@@ -132,10 +164,11 @@ def learn_map(
     cell_m = max(_CELL_M, float((high - low).max()) / (_MOST_CELLS - 2))
     size = np.ceil((high - low) / cell_m).astype(np.int64) + 2
     at = (place - low) / cell_m
+    slots = grain.slots
     slot_idx = slot_of(time_s[used], slots)
     counts = np.stack(
         [
-            _smoothed(_binned(at[own], direction[own], weight[own], size), _SMOOTH_M / cell_m)
+            _smoothed(_binned(at[own], direction[own], weight[own], size), grain, cell_m)
             for own in (slot_idx == slot for slot in range(slots))
         ]
     )
@@ -155,7 +188,8 @@ def learn_map(
         elsewhere=float(np.log(_ANYWHERE / whole.size / node)),
         unseen=np.rint((1 - seen) * 255) / 255,
         log_level=float(-np.log(max(seen.sum(), 1.0) * DIRECTIONS * node)),
-        people=(whole.sum(axis=2) * 2 * np.pi * (_SMOOTH_M / cell_m) ** 2).astype(np.float32),
+        log_typical=float((share * np.log(share / node)).sum() / slots) - _UNKNOWN_COST,
+        people=(whole.sum(axis=2) * 2 * np.pi * (grain.smooth_m / cell_m) ** 2).astype(np.float32),
     )
 
 
@@ -173,12 +207,14 @@ def _binned(at: Array, direction: Array, weight: Array, size: npt.NDArray[np.int
     return counts
 
 
-def _smoothed(counts: Array, sd_cells: float) -> Array:
+def _smoothed(counts: Array, grain: Grain, cell_m: float) -> Array:
     """Counts (X, Y, 16) smoothed by a Gaussian over places and a von Mises over directions."""
     rates = [2 * np.pi * np.fft.fftfreq(length) for length in counts.shape[:2]]
-    places = np.exp(-0.5 * sd_cells**2 * (rates[0][:, None] ** 2 + rates[1] ** 2))
+    places = np.exp(
+        -0.5 * (grain.smooth_m / cell_m) ** 2 * (rates[0][:, None] ** 2 + rates[1] ** 2)
+    )
     angles = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
-    kernel = np.exp(_SMOOTH_KAPPA * (np.cos(angles) - 1))
+    kernel = np.exp(grain.smooth_kappa * (np.cos(angles) - 1))
     ways = np.fft.fft(kernel / kernel.sum())
     smooth = np.fft.ifftn(np.fft.fftn(counts) * places[:, :, None] * ways).real
     return np.asarray(np.clip(smooth, 0.0, None))

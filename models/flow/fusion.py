@@ -8,10 +8,10 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import NUMBERS
+from models.estimation.numbers import NUMBERS, WITH_HEADING
 from models.flow.evidence import Walkers, walkers_of
 from models.flow.fit_test import party_fits
-from models.flow.reference import FlowReference, precision_of
+from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -23,7 +23,6 @@ _FEWEST_PARTIES = 5
 _CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three numbers
 _TRUST = 25.0
 _TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
-_FUSED = (*NUMBERS, "heading")
 _RIVAL = 3.0  # by how much less likely, in the log, another pose may be that is still named
 
 
@@ -33,7 +32,8 @@ class FusedEstimate:
 
     `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` says in
     words what is to be said of the flow map. `registered` is whether it had a part; without, all
-    is the joint estimate's and the heading the prior pose's. `rivals` are headings (radians) of
+    is the joint estimate's and the heading the prior pose's. `raw` (4,) is before the map's bias
+    is taken off, None without the map. `rivals` are headings (radians) of
     other poses that explain the tracks about as well.
     """
 
@@ -42,6 +42,7 @@ class FusedEstimate:
     told: tuple[str, ...]
     reason: str
     registered: bool
+    raw: Array | None = None
     rivals: tuple[float, ...] = ()
 
 
@@ -55,11 +56,9 @@ def fused_estimate(
     """The pose by speeds and places together.
 
     A track's speeds, given where and which way it goes, and where it goes are two factors of one
-    likelihood. So what the joint estimate says is a belief that the map's likelihood multiplies,
-    and both offsets are taken off.
+    likelihood. So what the joint estimate says is a belief that the map's likelihood multiplies.
     """
-    # The map is looked at where registration would end were the joint estimate right.
-    mean = np.append(joint.values, prior.heading_rad) + reference.offset
+    mean = np.append(joint.values, prior.heading_rad)
     precision = np.zeros((4, 4))
     precision[:3, :3] = np.linalg.inv(joint.covariance)
     precision[3, 3] = _HEADING_SD**-2.0
@@ -79,30 +78,28 @@ def fused_estimate(
         belief = Belief(mean=mean, precision=firm)
         peaks = search(belief)
     best = peaks[0]
-    noise = reference.surprise * reference.map_noise(walkers.people)
-    known = precision_of(best, noise)
-    values, covariance = settled(walkers, site, belief, best, known)
+    move = best.candidate - candidate_of(prior)
+    known = reference.precision(best, walkers.people, move)
+    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
     if belief.precision is not precision:
         covariance = np.asarray(np.linalg.inv(known + precision))
-    share = covariance @ known
     covariance = covariance + _elsewhere(peaks)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
-    # Of the offset only as much is unsure as the map decides.
-    covariance = covariance + share @ reference.offset_covariance @ share.T
     if reference.fit.has_changed(party_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, "the paths have changed: the flow map is left out")
     rivals = tuple(
-        float(peak.candidate[3] - reference.offset[3])
-        for peak in peaks[1:]
-        if peak.value > best.value - _RIVAL
+        float(peak.candidate[3]) for peak in peaks[1:] if peak.value > best.value - _RIVAL
     )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
-        values=values - reference.offset,
+        values=values,
         covariance=covariance,
-        told=tuple(n for n, telling in zip(_FUSED, sd <= _TELLING_SD, strict=True) if telling),
-        reason=_words(float(values[3] - reference.offset[3]), rivals, float(sd[3]), prior),
+        told=tuple(
+            n for n, telling in zip(WITH_HEADING, sd <= _TELLING_SD, strict=True) if telling
+        ),
+        reason=_words(float(values[3]), rivals, float(sd[3]), prior),
         registered=True,
+        raw=best.candidate,
         rivals=rivals,
     )
 

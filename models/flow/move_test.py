@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtr, stdtrit
 
 from models.flow.evidence import Walkers
 from models.flow.registration import Site
+from models.flow.student import chance_below, value_below
 from models.geometry.rotation import Array
 
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.
-REACH = np.array([np.radians(2), np.radians(2), 0.05, np.radians(2)])
+REACH = np.array([np.radians(3), np.radians(3), 0.08, np.radians(4)])
 _FEWEST = 8  # parties that a move is told by
 _MOST = 300
 _BLOCK = 3  # parties after one another that the bootstrap keeps together
@@ -40,9 +40,13 @@ class StillScores:
     looks: float
     parties: float
 
+    def squares(self, scores: Array) -> Array:
+        """What is compared with `level`, (W, 4): of the newest 8, 9, ... of parties (P, 4)."""
+        return _squares(scores, self.mean, self.covariance, self.bent, self.parties)
+
     def level(self, rate: float) -> float:
         """What the statistic passes in a share `rate` of windows of a still camera."""
-        return float(stdtrit(self.parties - 1, rate / self.looks / 2)) ** 2
+        return value_below(rate / self.looks / 2, self.parties - 1) ** 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,14 +75,23 @@ def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.ND
         ],
         axis=1,
     )
-    people = np.unique(walkers.steps.rows.owner_idx)
-    _, party_of = np.unique(walkers.party_idx[people], return_inverse=True)
-    size = np.bincount(party_of)
-    sums, last = np.zeros((size.size, 4)), np.zeros(size.size, dtype=np.int64)
+    people, party_of, last = parties_in_time(walkers)
+    sums = np.zeros((last.size, 4))
     np.add.at(sums, party_of, scores[people] / 2)
+    return sums / np.bincount(party_of)[:, None], last
+
+
+def parties_in_time(
+    walkers: Walkers,
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Tracks with a step (N,), the party (N,) of each, and each party's last track (P,), rising."""
+    people = np.unique(walkers.steps.rows.owner_idx)
+    labels, party_of = np.unique(walkers.party_idx[people], return_inverse=True)
+    last = np.zeros(labels.size, dtype=np.int64)
     np.maximum.at(last, party_of, people)
-    order = np.argsort(last)
-    return (sums / size[:, None])[order], last[order]
+    rank = np.empty(labels.size, dtype=np.int64)
+    rank[np.argsort(last)] = np.arange(labels.size)
+    return people, rank[party_of], np.sort(last)
 
 
 def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
@@ -103,7 +116,7 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
         window = (starts[:, None] + np.arange(_BLOCK)).ravel() % count
         statistics[draw] = _squares(scores[window], drawn_mean, covariance, bent, count).max()
     passed = np.quantile(statistics, 1 - _BODY)
-    alone = 2 * float(stdtr(count - 1, -np.sqrt(passed)))
+    alone = 2 * chance_below(-float(np.sqrt(passed)), count - 1)
     return StillScores(
         mean=scores.mean(axis=0),
         covariance=covariance,
@@ -131,7 +144,7 @@ def has_moved(
     scores, tracks = scores[-_MOST:], tracks[-_MOST:]
     if len(scores) < _FEWEST:
         return None
-    squares = _squares(scores, still.mean, still.covariance, still.bent, still.parties)
+    squares = still.squares(scores)
     count, number = np.unravel_index(int(squares.argmax()), squares.shape)
     parties = int(count) + _FEWEST
     apart = (scores[-parties:] - still.mean).sum(axis=0)

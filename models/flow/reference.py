@@ -1,43 +1,47 @@
 """Learn a site's flow from tracks at a known pose, and how registration errs there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.numbers import numbers_of
-from models.flow.cross_fit import FOLDS, LOOSE_SD, CrossFit, cross_fit, dealt
+from models.flow.cross_fit import FOLDS, CrossFit, cross_fit, dealt
 from models.flow.evidence import walkers_of
 from models.flow.fit_test import UsualFit, usual_fit
 from models.flow.flow_map import FlowMap
 from models.flow.move_test import StillScores, learn_scores
 from models.flow.registration import Peak, Site
-from models.flow.site_map import mapped, slots_worth
+from models.flow.site_map import best_grain, mapped
 from models.flow.view import Coverage
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
 FEWEST_PARTIES = 12
-_PLAUSIBLE_OFFSET = np.array([np.radians(1.5), np.radians(1.5), 0.1, np.radians(1.5)])
-_SURPRISE, _SURPRISE_WEIGHT, _LARGEST_SURPRISE = 1.3, 3.0, 16.0
-_LEFT_NOISE = 0.5  # of an offset's, after what cancels
+_GROUP = 6  # parties after one another
+_SURPRISE, _SURPRISE_WEIGHT = 1.3, 5.0  # the usual one, and how many groups it is worth
+_LEFT_NOISE = 0.5  # of the bias's, after what cancels
+_ELSEWHERE = np.array([0.05, 0.05, 0.05, 0.15])  # of a person's scatter: how far off the bias is
+_FAR = np.array([np.radians(8), np.radians(8), 0.15, np.radians(8)])  # how far that pose is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlowReference:
-    """The flow at a site, and what registration says there beyond the truth.
+    """The flow at a site, and how registration errs there.
 
-    `offset` (4,) with covariance (4, 4), of tilt, roll, log height, heading; `temper` is how much
-    larger squared errors are than the curvature at a peak says, and `surprise` than curvature and
-    noise together say, for a map of endless people; this one is of `people`. `still` and `fit` are
-    what its two tests go by.
+    `bias` (4,) is a person's mean score at the truth, by tilt, roll, log height and heading,
+    `bias_covariance` (4, 4) how unsure that is, `spread` (4,) how much people's scores scatter.
+    `temper` is how much larger squared errors are than the curvature at a peak says, and `surprise`
+    than curvature and the scatter of parties together say, for a map of endless people; this one is
+    of `people`. `still` and `fit` are what its two tests go by.
     """
 
     flow: FlowMap
     coverage: Coverage
-    offset: Array
-    offset_covariance: Array
+    bias: Array
+    bias_covariance: Array
+    spread: Array
     temper: float
     surprise: float
     people: float
@@ -59,6 +63,20 @@ class FlowReference:
         """
         return 1 + people / self.people
 
+    def precision(self, peak: Peak, people: float, move: Array) -> Array:
+        """How much (4, 4) the map's part of a peak knows, some way (4,) from the prior pose.
+
+        Source: the inverse of the sandwich covariance (Godambe's information). On top of the
+        walkers' noise comes the map's, and what the bias is not known to be: at another pose, other
+        people walk at the edge of what is seen.
+        """
+        far = min(float(np.linalg.norm(move / _FAR)), 1.0)
+        elsewhere = np.diag((_ELSEWHERE * far * self.spread) ** 2)
+        scatter = self.surprise * self.map_noise(people) * peak.noise
+        scatter = scatter + people**2 * (self.bias_covariance + elsewhere)
+        scatter = scatter + 1e-9 * np.trace(scatter) * np.eye(4)
+        return np.asarray(peak.curvature @ np.linalg.solve(scatter, peak.curvature))
+
 
 def candidate_of(pose: CameraPose) -> Array:
     """Tilt, roll, log height, heading (4,) of a pose."""
@@ -74,9 +92,9 @@ def learn_flow(
 ) -> FlowReference | None:
     """The flow of tracks at the prior pose; None where fewer than 12 parties walk.
 
-    A map knows the tracks that it is made of too well. So each quarter of the parties is registered
-    against a map of the others: where the ends are on average is the offset, how far they scatter
-    around it, against what curvature and noise say, is the surprise.
+    A map knows the tracks that it is made of too well. So each quarter of the parties is held
+    against a map of the others: what their scores are on average is the bias, how much more they
+    scatter in groups of parties after one another than parties do is the surprise.
 
     Args:
         observations: of the tracks.
@@ -98,23 +116,27 @@ def learn_flow(
         if left_out.people:
             learned_of = walkers_of(of_tracks(observations, known), at)
             parts.append((learned_of, weights[known], left_out, asked))
-    slots = slots_worth([part[:3] for part in parts], intrinsics, at)
+    grain = best_grain([part[:3] for part in parts], intrinsics, at)
     folds = [
-        (mapped(known, own_weights, intrinsics, at, slots), left_out, asked)
+        (mapped(known, own_weights, intrinsics, at, grain), left_out, asked)
         for known, own_weights, left_out, asked in parts
     ]
     crossed = cross_fit(folds, at)
-    offset, noise, temper, surprise = _errors(crossed, at)
-    plausible = np.diag(_PLAUSIBLE_OFFSET**2)
-    kept = plausible @ np.linalg.inv(plausible + noise)
-    whole = mapped(walkers, weights, intrinsics, at, slots)
+    surprise, scatter = _scatter(crossed)
+    parts_bent = float(np.trace(np.linalg.solve(scatter, crossed.curvature)))
+    count = float(crossed.people.sum())
+    # Each in the others' map and they in its: to first order, what noise does to the mean cancels.
+    bias = crossed.slopes.sum(axis=0) / count
+    unsure = _LEFT_NOISE * surprise * scatter / count**2
+    whole = mapped(walkers, weights, intrinsics, at, grain)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
     return FlowReference(
         flow=whole.flow,
         coverage=whole.coverage,
-        offset=kept @ offset,
-        offset_covariance=kept @ noise,
-        temper=temper,
+        bias=bias,
+        bias_covariance=unsure,
+        spread=np.sqrt(np.diag(scatter) / count),
+        temper=surprise * max(1.0, 4 / max(parts_bent, 1e-9)),
         surprise=surprise,
         people=float(counted.sum() ** 2 / (counted**2).sum()),
         still=learn_scores(crossed.scores, crossed.bent, seed),
@@ -122,41 +144,13 @@ def learn_flow(
     )
 
 
-def precision_of(peak: Peak, noise: float) -> Array:
-    """How much (4, 4) the map's part of a peak knows, if its noise is so many times its walkers'.
-
-    Source: the inverse of the sandwich covariance (Godambe's information).
-    """
-    scatter = noise * peak.noise + 1e-9 * np.trace(peak.noise) * np.eye(4)
-    return np.asarray(peak.curvature @ np.linalg.solve(scatter, peak.curvature))
-
-
-def _errors(crossed: CrossFit, at: Array) -> tuple[Array, Array, float, float]:
-    """The offset (4,), its covariance (4, 4), the temper and the surprise of a cross fit."""
-    peaks, parties = crossed.peaks, crossed.parties
-    # A fold's own parties are too few to say how they scatter.
-    scatter = np.sum([peak.noise for peak in peaks], axis=0) / sum(parties)
-    bent = np.sum([peak.curvature for peak in peaks], axis=0) / sum(parties)
-    ends = np.array([peak.candidate - at for peak in peaks])
-    loose = np.diag(LOOSE_SD**-2.0)
-    own_covariances = [
-        np.linalg.inv(precision_of(replace(peak, noise=scatter * count), 1.0) + loose)
-        for peak, count in zip(peaks, parties, strict=True)
-    ]
-    # A fold's map is of three times its people, so that a third of the noise comes on top; and the
-    # ends are held against their own mean.
-    offset = ends.mean(axis=0)
-    expected = FOLDS / (FOLDS - 1) * (1 - 1 / len(ends))
-    surprises = [
-        min(
-            float((end - offset) @ np.linalg.solve(covariance, end - offset)) / 4 / expected,
-            _LARGEST_SURPRISE,
-        )
-        for end, covariance in zip(ends, own_covariances, strict=True)
-    ]
-    total = sum(surprises) + _SURPRISE * _SURPRISE_WEIGHT
-    surprise = max(1.0, total / (len(surprises) + _SURPRISE_WEIGHT))
-    # Each in the others' map and they in its: to first order, what noise does to the ends cancels.
-    noise = _LEFT_NOISE * surprise * np.mean(own_covariances, axis=0) / len(peaks)
-    temper = surprise * max(1.0, 4 / float(np.trace(np.linalg.solve(scatter, bent))))
-    return offset, noise, temper, surprise
+def _scatter(crossed: CrossFit) -> tuple[float, Array]:
+    """The surprise, and how the sum of the slopes scatters (4, 4) if parties are independent."""
+    centred = crossed.slopes - crossed.slopes.mean(axis=0)
+    scatter = centred.T @ centred + 1e-9 * np.trace(centred.T @ centred) * np.eye(4)
+    whitened = np.linalg.solve(np.linalg.cholesky(scatter / len(centred)), centred.T).T
+    groups = len(centred) // _GROUP
+    sums = whitened[: groups * _GROUP].reshape(groups, _GROUP, 4).sum(axis=1)
+    found = float((sums**2).mean() / _GROUP)
+    weight = groups / (groups + _SURPRISE_WEIGHT)
+    return max(1.0, weight * found + (1 - weight) * _SURPRISE), scatter

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.flow.evidence import Likelihood, Walkers, likelihood
+from models.flow.evidence import Likelihood, Walkers, anchored_scores, likelihood
 from models.flow.flow_map import FlowMap
 from models.flow.view import Coverage
 from models.geometry.intrinsics import Intrinsics
@@ -35,6 +35,12 @@ class Site:
     def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
         """How likely the walkers are, seen from a candidate (4,)."""
         return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
+
+    def scores(self, walkers: Walkers, candidate: Array, anchor: Array) -> Array:
+        """Scores (N, 4) at a candidate (4,) of who is on known ground, seen from an anchor (4,)."""
+        return anchored_scores(
+            walkers, self.flow, self.coverage, self.intrinsics, candidate, anchor
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,27 +101,35 @@ def register(
         Peak(
             candidate=candidate,
             value=value,
-            curvature=_curvature(walkers, site, candidate, found),
-            noise=_noise(walkers, found),
+            curvature=curvature_of(walkers, site, candidate),
+            noise=noise_of(walkers, site.scores(walkers, candidate, candidate)),
         )
-        for candidate, value, found in ends
+        for candidate, value, _ in ends
     ]
 
 
 def settled(
-    walkers: Walkers, site: Site, belief: Belief, peak: Peak, precision: Array
+    walkers: Walkers, site: Site, belief: Belief, peak: Peak, precision: Array, bias: Array
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
-    `precision` (4, 4) is what the map's part knows. A single `temper` lets directions in which the
-    map is noise drown a belief that is sure of them; so from the peak on, each of the map's slopes
-    is taken for as much as it is worth.
+    A single `temper` lets directions in which the map is noise drown a belief that is sure of
+    them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
+
+    Args:
+        walkers: who is registered.
+        site: to what.
+        belief: what else is known.
+        peak: where to begin.
+        precision: what the map's part knows (4, 4).
+        bias: a person's mean score at the truth (4,).
     """
     covariance = np.linalg.inv(precision + belief.precision)
     gain = precision @ np.linalg.inv(peak.curvature)
     candidate = peak.candidate
     for _ in range(_SETTLING_ROUNDS):
-        slope = site.likelihood(walkers, candidate).scores.sum(axis=0)
+        scores = site.scores(walkers, candidate, candidate)
+        slope = scores.sum(axis=0) - bias * scores.any(axis=1).sum()
         move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
         candidate = candidate + move * min(1.0, _LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
     return candidate, np.asarray(covariance)
@@ -146,32 +160,32 @@ def _climbed(
     return candidate, value, found
 
 
-def _curvature(walkers: Walkers, site: Site, candidate: Array, found: Likelihood) -> Array:
+def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
     """Minus the second derivative (4, 4) of the log likelihood, by differences of its slope.
 
-    Against the scatter of the scores, halfway between what is found in each direction and what is
-    found on average: a map of some hundred people is rough, and so is how it bends.
+    Where it bends less than the scores scatter, halfway between what is found in each direction
+    and what is found on average: a map of some hundred people is rough, and so is how it bends.
     """
     slopes = [
-        site.likelihood(walkers, candidate - step).scores.sum(axis=0)
-        - site.likelihood(walkers, candidate + step).scores.sum(axis=0)
+        site.scores(walkers, candidate - step, candidate).sum(axis=0)
+        - site.scores(walkers, candidate + step, candidate).sum(axis=0)
         for step in _DIFFERENCE * np.eye(4)
     ]
     bent = np.array(slopes) / (2 * _DIFFERENCE)
-    scatter = _scatter(found.scores) + 1e-6 * np.eye(4)
-    lower = np.linalg.cholesky(scatter)
+    scatter = _scatter(site.scores(walkers, candidate, candidate))
+    lower = np.linalg.cholesky(scatter + (1e-6 + 1e-6 * np.trace(scatter)) * np.eye(4))
     back = np.linalg.inv(lower)
     ratio, axes = np.linalg.eigh(back @ (bent + bent.T) / 2 @ back.T)
     ratio = np.maximum(ratio, 0.0)
-    usual = max(float(ratio.mean()), _LEAST_CURVATURE)
-    kept = (axes * ((1 - _EVEN) * ratio + _EVEN * usual)) @ axes.T
+    usual = min(max(float(ratio.mean()), _LEAST_CURVATURE), 1.0)
+    kept = (axes * np.maximum(ratio, (1 - _EVEN) * ratio + _EVEN * usual)) @ axes.T
     return np.asarray(lower @ kept @ lower.T)
 
 
-def _noise(walkers: Walkers, found: Likelihood) -> Array:
-    """How the sum of all scores scatters (4, 4): parties are independent, their people are not."""
+def noise_of(walkers: Walkers, scores: Array) -> Array:
+    """How the sum of scores (N, 4) scatters (4, 4): parties are independent, their people not."""
     parties = np.zeros((walkers.tracks, 4))
-    np.add.at(parties, walkers.party_idx, found.scores)
+    np.add.at(parties, walkers.party_idx, scores)
     used = int(parties.any(axis=1).sum())
     # Where scores add up to nothing, as at a peak, four of the parties are not free.
     return _scatter(parties) * used / max(used - 4, 1)

@@ -1,10 +1,12 @@
 """From walkers at a known pose to a map that others can be registered to."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from models.flow.evidence import Walkers
-from models.flow.flow_map import learn_map, slot_of
+from models.flow.flow_map import Grain, learn_map, slot_of
 from models.flow.placement import place_steps
 from models.flow.registration import Site
 from models.flow.view import coverage_of, in_view
@@ -12,45 +14,57 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
 _SHADE_M = 2.0  # over which the edge of what the reference saw is blurred, as the map is
+_GRAINS = (
+    Grain(),
+    Grain(smooth_m=0.7, smooth_kappa=10.0),
+    Grain(smooth_m=0.5, smooth_kappa=16.0),
+)
 _SLOTS = 4  # parts of a day: night, morning, afternoon, evening, wherever midnight UTC falls
 _FEWEST_A_SLOT = 80  # people that a part of the day is asked by
 _CLEAR = 3.0  # standard errors by which parts of the day must foretell better
 
 
-def mapped(walkers: Walkers, weights: Array, intrinsics: Intrinsics, at: Array, slots: int) -> Site:
+def mapped(
+    walkers: Walkers, weights: Array, intrinsics: Intrinsics, at: Array, grain: Grain
+) -> Site:
     """The map of walkers seen from a known pose (4,), each counted by its weight (tracks,)."""
     flow = learn_map(
         place_steps(walkers.steps, at),
         _evenly(walkers) * weights[walkers.steps.rows.owner_idx],
         walkers.steps.rows.time_s,
         lambda places: in_view(intrinsics, at, places, _SHADE_M),
-        slots,
+        grain,
     )
     return Site(flow=flow, coverage=coverage_of(flow), intrinsics=intrinsics)
 
 
-def slots_worth(
+def best_grain(
     folds: list[tuple[Walkers, Array, Walkers]], intrinsics: Intrinsics, at: Array
-) -> int:
-    """Into how many parts a day should fall: 4 where these foretell people better, else one.
+) -> Grain:
+    """The grain of map that foretells people best; parts of the day where it is clear that they do.
 
     Args:
         folds: walkers to learn of with their weights, and others to foretell.
         intrinsics: of the camera.
         at: the known pose (4,).
     """
-    everyone = np.concatenate([_slot_of_people(asked) for _, _, asked in folds])
+
+    def foretold(grain: Grain) -> Array:
+        return np.concatenate(
+            [
+                _foretold(asked, mapped(known, weights, intrinsics, at, grain), at)
+                for known, weights, asked in folds
+            ]
+        )
+
+    asked = {grain: foretold(grain) for grain in _GRAINS}
+    best = max(asked, key=lambda grain: float(asked[grain].mean()))
+    everyone = np.concatenate([_slot_of_people(walkers) for _, _, walkers in folds])
     if (np.bincount(everyone, minlength=_SLOTS) >= _FEWEST_A_SLOT).sum() < 2:
-        return 1
-    gains = np.concatenate(
-        [
-            _foretold(asked, mapped(known, weights, intrinsics, at, _SLOTS), at)
-            - _foretold(asked, mapped(known, weights, intrinsics, at, 1), at)
-            for known, weights, asked in folds
-        ]
-    )
-    clear = gains.mean() > _CLEAR * gains.std() / np.sqrt(gains.size)
-    return _SLOTS if clear else 1
+        return best
+    by_day = replace(best, slots=_SLOTS)
+    gains = foretold(by_day) - asked[best]
+    return by_day if gains.mean() > _CLEAR * gains.std() / np.sqrt(gains.size) else best
 
 
 def _foretold(walkers: Walkers, site: Site, at: Array) -> Array:

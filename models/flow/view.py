@@ -31,6 +31,24 @@ class Coverage:
         return self.shares @ seen, float(self.unknown @ seen)
 
 
+def known_shares(
+    coverage: Coverage, flow: FlowMap, intrinsics: Intrinsics, candidate: Array, anchor: Array
+) -> Array:
+    """Shares (S,) of people in those parts of the picture that see known ground from an anchor.
+
+    The parts of the picture stay as they are while the candidate (4,) moves: what people in them
+    say must not hang on where known ground ends.
+    """
+    seen = in_view(intrinsics, candidate, coverage.places, coverage.block_m)
+    rotation = rotation_from_angles(candidate[0], candidate[1], candidate[3])
+    height = np.full((len(coverage.places), 1), -np.exp(candidate[2]))
+    rays = np.concatenate([coverage.places, height], axis=1) @ rotation.T
+    there = rays @ rotation_from_angles(anchor[0], anchor[1], anchor[3])
+    down = np.where(there[:, 2] < -_NEAREST_M, -there[:, 2], np.inf)
+    unseen, _ = flow.look_unseen(there[:, :2] * (np.exp(anchor[2]) / down)[:, None])
+    return np.asarray(coverage.shares @ (seen * (1 - unseen)))
+
+
 def in_view(intrinsics: Intrinsics, candidate: Array, places: Array, size_m: float) -> Array:
     """Which part (B,) of pieces of ground around places (B, 2) a camera (4,) sees.
 

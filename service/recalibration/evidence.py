@@ -153,7 +153,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
             fused = by_speeds_alone(joint, prior)
         else:
             fused = fused_estimate(observations, lens, prior, joint, flow)
-            registered = fused.values + flow.offset if fused.registered else None
+            registered = fused.raw
             move = suspicion(observations, lens, prior, flow)
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])

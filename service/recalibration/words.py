@@ -3,6 +3,8 @@
 import math
 
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
+from models.estimation.numbers import WITH_HEADING
+from models.flow.move_test import Move
 
 # The numbers of a pose as fields of JSON.
 FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
@@ -25,6 +27,16 @@ def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> 
     if verdict.streak > 0:
         return f"{text}: beyond {limit}, {verdict.streak} of {limits.updates} updates"
     return f"{text}: not beyond {limit}"
+
+
+def describe_move(move: Move) -> str:
+    """Which way the score test says that a camera has moved."""
+    name = WITH_HEADING[move.number]
+    way = "up" if move.sign > 0 else "down"
+    return (
+        f"the last {move.parties} parties walk where they would if the {name} had gone {way} "
+        f"(score test: {move.statistic:.0f}, limit {move.level:.0f})"
+    )
 
 
 def shown(name: str, value: float) -> float:

@@ -58,7 +58,7 @@ def test_a_map_is_learned_with_its_reference(known):
     first = map_of(known)
     assert (first.tracks, first.weight) == (WANTED, WANTED)
     assert first.to_s == pytest.approx(ended(known, 0, WANTED)[-1])
-    assert flow_from_bytes(first.data).flow.log_density.shape[2] == 16
+    assert flow_from_bytes(first.data).flow.log_density.shape[3] == 16
 
 
 def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
