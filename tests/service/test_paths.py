@@ -1,0 +1,69 @@
+"""What is served where people walk elsewhere than they did: a turned camera, or other paths."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from service.store import flow_maps, references
+from tests.conftest import CAMERA
+from tests.service.street import PRIOR, Street
+
+WANTED = 120
+
+
+@pytest.fixture
+def street(http, settings):
+    """A street of lanes whose reference and map are learned."""
+    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+    street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
+    street.keep_to_lanes(PRIOR, WANTED)
+    assert street.look()["reference"]["state"] == "ready"
+    return street
+
+
+def turned(degrees: float):
+    return replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(degrees))
+
+
+def tracks_of_map(street):
+    with street.context.store.read() as session:
+        return flow_maps.find(session, references.newest(session, "corner").id).tracks
+
+
+def test_the_window_begins_where_the_camera_turned(street):
+    street.keep_to_lanes(PRIOR, 60)
+    assert street.look()["tracks"] == 60
+    street.keep_to_lanes(turned(6), 60)
+    body = street.look()
+    assert 45 <= body["tracks"] <= 72
+    assert body["drift"]["heading_deg"] == pytest.approx(6, abs=1.2)
+    street.keep_to_lanes(turned(6), 30)
+    assert street.look()["tracks"] >= body["tracks"] + 30
+
+
+def test_a_turn_is_said_before_it_is_an_alert_and_stops_the_map(street):
+    street.keep_to_lanes(turned(-6), 60)
+    body = street.look()
+    assert "if the heading had gone down (score test" in body["reason"]
+    assert street.alerts(state="firing") == []
+    assert tracks_of_map(street) == WANTED
+
+
+def test_a_still_camera_is_not_suspected_and_its_map_grows(street):
+    street.keep_to_lanes(PRIOR, 60)
+    body = street.look()
+    assert "score test" not in body["reason"]
+    assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
+    assert tracks_of_map(street) == WANTED + 60
+
+
+def test_new_paths_leave_the_map_out_and_say_so(street):
+    street.keep_to_lanes(PRIOR, 50)
+    street.cross(PRIOR, 80)
+    body = street.look()
+    assert "the paths have changed: the flow map is left out" in body["reason"]
+    assert "heading_deg" not in body["estimated"]
+    assert body["pose"]["heading_deg"] == pytest.approx(40)
+    assert "registered" not in body["estimates"]
+    assert tracks_of_map(street) == WANTED
