@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models.flow.evidence import Walkers
-from models.flow.fit_test import party_fits
-from models.flow.move_test import REACH, parties_in_time, party_scores
+from models.flow.fit import party_fits
+from models.flow.move import REACH, parties_in_time, party_scores
 from models.flow.registration import Site, curvature_of
 from models.geometry.rotation import Array
 

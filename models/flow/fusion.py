@@ -10,7 +10,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.numbers import NUMBERS, WITH_HEADING
 from models.flow.evidence import Walkers, walkers_of
-from models.flow.fit_test import party_fits
+from models.flow.fit import party_fits
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics

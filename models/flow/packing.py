@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from models.errors import CheckpointError
-from models.flow.fit_test import UsualFit
+from models.flow.fit import UsualFit
 from models.flow.flow_map import FlowMap
-from models.flow.move_test import StillScores
+from models.flow.move import StillScores
 from models.flow.reference import FlowReference
 from models.flow.rounding import of_levels, to_levels
 from models.flow.view import coverage_of

@@ -8,9 +8,9 @@ from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.numbers import numbers_of
 from models.flow.cross_fit import FOLDS, CrossFit, cross_fit, dealt
 from models.flow.evidence import walkers_of
-from models.flow.fit_test import UsualFit, usual_fit
+from models.flow.fit import UsualFit, usual_fit
 from models.flow.flow_map import FlowMap
-from models.flow.move_test import StillScores, learn_scores
+from models.flow.move import StillScores, learn_scores
 from models.flow.registration import Peak, Site
 from models.flow.site_map import best_grain, mapped
 from models.flow.view import Coverage

@@ -10,7 +10,7 @@ from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference
 from models.flow.evidence import walkers_of
-from models.flow.move_test import Move, has_moved, moved_within
+from models.flow.move import Move, has_moved, moved_within
 from models.flow.reference import FlowReference, candidate_of
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose

@@ -17,7 +17,7 @@ from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import assumed_reference
 from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
-from models.flow.move_test import Move
+from models.flow.move import Move
 from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose

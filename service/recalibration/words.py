@@ -4,7 +4,7 @@ import math
 
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
 from models.estimation.numbers import WITH_HEADING
-from models.flow.move_test import Move
+from models.flow.move import Move
 
 # The numbers of a pose as fields of JSON.
 FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}

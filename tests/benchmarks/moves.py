@@ -16,7 +16,7 @@ from models.estimation.joint.observations import observe
 from models.evaluation.protocol import KnockRange, draw_case
 from models.evaluation.scenes import Knock, knock_trajectory, load_scene
 from models.flow.evidence import walkers_of
-from models.flow.move_test import party_scores
+from models.flow.move import party_scores
 from models.flow.reference import candidate_of, learn_flow
 
 _RATE = 1e-4

@@ -10,9 +10,9 @@ from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import observe, of_tracks
 from models.estimation.joint.reference import learn_reference
 from models.flow.evidence import walkers_of
-from models.flow.fit_test import UsualFit
+from models.flow.fit import UsualFit
 from models.flow.fusion import fused_estimate
-from models.flow.move_test import StillScores, has_moved, learn_scores, moved_within
+from models.flow.move import StillScores, has_moved, learn_scores, moved_within
 from models.flow.reference import candidate_of, learn_flow
 from models.simulation.site import SiteConfig, draw_lanes, draw_new_lane, walk_changed, walk_site
 from models.simulation.walkers import WalkConfig
