@@ -15,12 +15,13 @@ from rich.console import Console
 from models.estimation.joint.observations import observe
 from models.evaluation.protocol import KnockRange, draw_case
 from models.evaluation.scenes import Knock, knock_trajectory, load_scene
+from models.evaluation.study_site import draw_place, seen_from
 from models.flow.evidence import walkers_of
 from models.flow.move import party_scores
 from models.flow.reference import candidate_of, learn_flow
 
 _RATE = 1e-4
-_RATES = (0.1, 0.03, 0.01, _RATE)
+_RATES = (0.1, 0.01, 0.001, _RATE)
 _PANS = (5.0, -5.0, 2.0, -2.0)
 _DRAWS, _BLOCK, _MOST = 20, 3, 300
 _STILL = KnockRange(angle_rad=0.0, log_height=0.0)
@@ -28,12 +29,16 @@ _STILL = KnockRange(angle_rad=0.0, log_height=0.0)
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("scenes", nargs="*", type=Path)
     parser.add_argument("--seeds", type=int, default=12)
+    parser.add_argument("--sites", type=int, default=0, help="simulated ones, for false alarms")
     asked = parser.parse_args()
     out = Console(highlight=False, soft_wrap=True).print
     rng = np.random.default_rng(0)
-    largest, medians = [], []
+    largest: list[list[bool]] = []
+    medians = []
+    for number in range(asked.sites):
+        _simulated(number, largest)
     for folder in asked.scenes:
         found: dict[float, list[float]] = {pan: [] for pan in _PANS}
         for seed in range(asked.seeds):
@@ -42,8 +47,9 @@ def main() -> None:
             row = [float(np.median(found[pan])) for pan in _PANS]
             medians.append(row)
             out(f"{folder.name:26s}", *(f"{n:7.0f}" for n in row))
-    out(f"{'median of the scenes':26s}", *(f"{n:7.0f}" for n in np.median(medians, axis=0)))
-    out(f"tracks until a pan of {', '.join(f'{pan:+g}' for pan in _PANS)} deg; inf: never")
+    if medians:
+        out(f"{'median of the scenes':26s}", *(f"{n:7.0f}" for n in np.median(medians, axis=0)))
+        out(f"tracks until a pan of {', '.join(f'{pan:+g}' for pan in _PANS)} deg; inf: never")
     for number, rate in enumerate(_RATES):
         share = np.mean([values[number] for values in largest])
         out(f"still: {share:.4f} of {len(largest)} windows fire where {rate:g} may")
@@ -75,6 +81,19 @@ def _one(folder, seed, rng, found, largest) -> None:
             starts = rng.integers(0, len(scores), -(-_MOST // _BLOCK))
             drawn = scores[(starts[:, None] + np.arange(_BLOCK)).ravel() % len(scores)]
             found[pan].append(_until(drawn, flow.still) * walkers.people / len(scores))
+
+
+def _simulated(number, largest) -> None:
+    """Windows of 100 people of a simulated site whose camera stands, after 200 for its map."""
+    rng = np.random.default_rng([7, number])
+    place = draw_place(rng)
+    known, still = (seen_from(place, place.prior, count, rng) for count in (200, 6000))
+    flow = learn_flow(known, place.intrinsics, place.prior, 0)
+    at = candidate_of(place.prior)
+    scores, _ = party_scores(walkers_of(still, at), flow.site(place.intrinsics), at)
+    for first in range(0, len(scores) - 99, 100):
+        top = flow.still.squares(scores[first : first + 100]).max()
+        largest.append([top > flow.still.level(rate) for rate in _RATES])
 
 
 def _until(scores, still) -> float:
