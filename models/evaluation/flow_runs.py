@@ -82,7 +82,9 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
 
     def chance(candidate: Array) -> float:
-        return site.likelihood(walkers, candidate).value / temper + belief.log_density(candidate)
+        return float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(
+            candidate
+        )
 
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {

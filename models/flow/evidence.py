@@ -74,39 +74,48 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
 
 
 def likelihood(
-    walkers: Walkers, flow: FlowMap, coverage: Coverage, intrinsics: Intrinsics, candidate: Array
+    walkers: Walkers,
+    flow: FlowMap,
+    coverage: Coverage,
+    intrinsics: Intrinsics,
+    candidate: Array,
+    *,
+    scored: bool = True,
 ) -> Likelihood:
     """How likely the walkers' places and directions in the image are, given that they are seen.
 
     How busy the ground is that the reference did not see is whatever suits the tracks best: a
     camera that has turned to a square must not be pulled back for it, nor sent to an empty one.
+    Unless it is `scored`, the scores are nothing, and it takes a quarter of the time.
     """
     steps = walkers.steps
     placed = place_steps(steps, candidate)
     slot_idx = flow.slot_of(steps.rows.time_s)
     known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     unseen, unseen_by_place = flow.look_unseen(placed.place)
-    (seen, d_seen), (beyond, d_beyond) = _seen(coverage, intrinsics, candidate)
+    shares, beyond = coverage.seen_from(intrinsics, candidate)
+    seen = np.maximum(shares, _LEAST_SEEN)
     busy = _busiest(walkers, known, unseen * np.exp(flow.log_typical), seen, beyond, slot_idx)
     extra = busy * np.exp(flow.log_typical)
     density = np.exp(known) + extra * unseen
     own = np.exp(known) / density
     in_all = seen + busy * beyond
     value = np.where(placed.valid, np.log(density) + placed.log_ratio, _NO_GROUND)
-    by_place = own[:, None] * by_place + (extra / density)[:, None] * unseen_by_place
-    score = (
-        np.einsum("mi,mik->mk", by_place, placed.d_place)
-        + (own * by_direction)[:, None] * placed.d_direction
-        + placed.d_log_ratio
-    )
-    score[~placed.valid] = 0.0
     value = value - np.log(in_all)[slot_idx]
-    score = score - ((d_seen + busy * d_beyond) / in_all[:, None])[slot_idx]
     owner, weight = steps.rows.owner_idx, walkers.weight
-    scores = np.zeros((walkers.tracks, 4))
-    np.add.at(scores, owner, weight[:, None] * score)
-    values = np.zeros(walkers.tracks)
+    values, scores = np.zeros(walkers.tracks), np.zeros((walkers.tracks, 4))
     np.add.at(values, owner, weight * value)
+    if scored:
+        by_place = own[:, None] * by_place + (extra / density)[:, None] * unseen_by_place
+        score = (
+            np.einsum("mi,mik->mk", by_place, placed.d_place)
+            + (own * by_direction)[:, None] * placed.d_direction
+            + placed.d_log_ratio
+        )
+        score[~placed.valid] = 0.0
+        d_seen, d_beyond = _slopes(coverage, intrinsics, candidate)
+        score = score - ((d_seen + busy * d_beyond) / in_all[:, None])[slot_idx]
+        np.add.at(scores, owner, weight[:, None] * score)
     return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
 
@@ -169,19 +178,16 @@ def _busiest(
     return float(busy[np.argmax(gain - cost - prior)])
 
 
-def _seen(
-    coverage: Coverage, intrinsics: Intrinsics, candidate: Array
-) -> tuple[tuple[Array, Array], tuple[float, Array]]:
-    """Shares that are seen (S,) and their slopes (S, 4); the unknown one and its (4,)."""
+def _slopes(coverage: Coverage, intrinsics: Intrinsics, candidate: Array) -> tuple[Array, Array]:
+    """How the shares that are seen (S, 4) and the unknown one (4,) change with a candidate."""
 
     def shares(at: Array) -> Array:
         known, unknown = coverage.seen_from(intrinsics, at)
         return np.append(known, unknown)
 
-    here = shares(candidate)
     slopes = [
         (shares(candidate + step) - shares(candidate - step)) / (2 * _DIFFERENCE)
         for step in _DIFFERENCE * np.eye(4)
     ]
     slope = np.stack(slopes, axis=1)
-    return (np.maximum(here[:-1], _LEAST_SEEN), slope[:-1]), (float(here[-1]), slope[-1])
+    return slope[:-1], slope[-1]

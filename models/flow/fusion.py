@@ -148,8 +148,8 @@ def _spread(
     values = []
     for turn in turns:
         candidate = best.candidate + turn * line
-        found = site.likelihood(walkers, candidate)
-        values.append(found.value / temper + belief.log_density(candidate))
+        chance = site.log_chances(walkers, candidate).sum()
+        values.append(chance / temper + belief.log_density(candidate))
     chances = np.exp(np.array(values) - max(values))
     variance = float(chances @ turns**2 / chances.sum())
     return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

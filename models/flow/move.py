@@ -70,7 +70,7 @@ def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.ND
     """The mean scores (P, 4) of each party, in the order of their last tracks (P,)."""
     scores = np.stack(
         [
-            site.likelihood(walkers, at + step).values - site.likelihood(walkers, at - step).values
+            site.log_chances(walkers, at + step) - site.log_chances(walkers, at - step)
             for step in np.diag(REACH)
         ],
         axis=1,

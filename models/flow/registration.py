@@ -13,6 +13,7 @@ from models.geometry.rotation import Array
 
 _STARTS = 3
 _APART_RAD = np.radians(5)
+_HOPELESS = 40.0  # of the log posterior: a start so far below another ends below it, too
 _LONGEST_MOVE = 0.05
 _MOST_ROUNDS = 25
 _SETTLING_ROUNDS = 4
@@ -35,6 +36,11 @@ class Site:
     def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
         """How likely the walkers are, seen from a candidate (4,)."""
         return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
+
+    def log_chances(self, walkers: Walkers, candidate: Array) -> Array:
+        """The log likelihood (N,) of each track alone."""
+        lens = self.intrinsics
+        return likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
 
     def scores(self, walkers: Walkers, candidate: Array, anchor: Array) -> Array:
         """Scores (N, 4) at a candidate (4,) of who is on known ground, seen from an anchor (4,)."""
@@ -84,13 +90,17 @@ def register(
         found = site.likelihood(walkers, candidate)
         return found.value / temper + belief.log_density(candidate), found
 
-    turns = np.array([0.0, 0.0, 0.0, 1.0])
-    tried = [belief.mean + heading * turns for heading in headings]
-    tried.sort(key=lambda candidate: -posterior(candidate)[0])
+    tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
+    chances = [
+        float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(candidate)
+        for candidate in tried
+    ]
     begin: list[Array] = []
-    for candidate in tried:
-        if len(begin) < _STARTS and all(abs(candidate[3] - b[3]) > _APART_RAD for b in begin):
-            begin.append(candidate)
+    for number in np.argsort(chances)[::-1]:
+        apart = [abs(tried[number][3] - other[3]) for other in begin]
+        hopeless = chances[number] < max(chances) - _HOPELESS
+        if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
+            begin.append(tried[number])
     ends: list[tuple[Array, float, Likelihood]] = []
     for candidate in begin:
         end = _climbed(candidate, posterior, belief, temper)
