@@ -17,6 +17,7 @@ from models.geometry.rotation import Array
 
 _RATE = 1e-4  # of windows with unchanged paths that are called changed
 _LEAST_DROP = 0.35  # of the mean log density: less moves no pose by much
+_FEWEST = 5
 _KNOWN = 0.5  # of a place's ground must have been seen for it to be asked
 
 
@@ -48,6 +49,25 @@ def party_fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
     The map's expectation is over what a camera at the candidate (4,) sees, so that a busy view and
     a quiet one compare. Parties on ground that the reference did not see are left out.
     """
+    fits = _fits(walkers, site, candidate)
+    return fits[np.isfinite(fits)]
+
+
+def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
+    """How much worse parties on known ground fit at another candidate, in standard errors.
+
+    Ground that the reference did not see tells one pose from another by guesses alone. Infinite
+    where hardly anybody is on known ground from both.
+    """
+    apart = _fits(walkers, site, candidate) - _fits(walkers, site, other)
+    apart = apart[np.isfinite(apart)]
+    if apart.size < _FEWEST:
+        return float("inf")
+    return float(apart.mean() / max(apart.std(ddof=1) / np.sqrt(apart.size), 1e-9))
+
+
+def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """The fit (tracks,) of each party at its own number; NaN of those on unknown ground."""
     flow = site.flow
     placed = place_steps(walkers.steps, candidate)
     rows = walkers.steps.rows
@@ -60,7 +80,7 @@ def party_fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
     weight = walkers.weight[asked]
     total = np.bincount(parties, weight, walkers.tracks)
     sums = np.bincount(parties, weight * fit[asked], walkers.tracks)
-    return sums[total > 0] / total[total > 0]
+    return np.asarray(np.where(total > 0, sums / np.where(total > 0, total, 1.0), np.nan))
 
 
 def _expected(site: Site, candidate: Array) -> Array:

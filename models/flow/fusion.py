@@ -10,7 +10,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.numbers import NUMBERS, WITH_HEADING
 from models.flow.evidence import Walkers, walkers_of
-from models.flow.fit import party_fits
+from models.flow.fit import loss, party_fits
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
@@ -23,7 +23,7 @@ _FEWEST_PARTIES = 5
 _CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three numbers
 _TRUST = 25.0
 _TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
-_RIVAL = 3.0  # by how much less likely, in the log, another pose may be that is still named
+_RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,12 +83,15 @@ def fused_estimate(
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
     if belief.precision is not precision:
         covariance = np.asarray(np.linalg.inv(known + precision))
-    covariance = covariance + _elsewhere(peaks)
+    chances = _chances(walkers, site, belief, peaks)
+    covariance = covariance + _elsewhere(peaks, chances)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
     if reference.fit.has_changed(party_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, "the paths have changed: the flow map is left out")
     rivals = tuple(
-        float(peak.candidate[3]) for peak in peaks[1:] if peak.value > best.value - _RIVAL
+        float(peak.candidate[3])
+        for peak, chance in zip(peaks, chances, strict=True)
+        if peak is not best and chance > _RIVAL
     )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
@@ -128,9 +131,20 @@ def _words(heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPo
     return ""
 
 
-def _elsewhere(peaks: list[Peak]) -> Array:
+def _chances(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) -> Array:
+    """How likely each peak is against the first, by all it says or by known ground alone."""
+    best = peaks[0]
+    chances = [1.0]
+    for peak in peaks[1:]:
+        worse = max(loss(walkers, site, best.candidate, peak.candidate), 0.0)
+        believed = belief.log_density(peak.candidate) - belief.log_density(best.candidate)
+        by_known = math.exp(-0.5 * worse**2 + min(believed, 0.0))
+        chances.append(max(math.exp(peak.value - best.value), by_known))
+    return np.array(chances)
+
+
+def _elsewhere(peaks: list[Peak], chances: Array) -> Array:
     """What other peaks add to the covariance (4, 4)."""
-    chances = np.exp([peak.value - peaks[0].value for peak in peaks])
     apart = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
     return np.asarray((apart * (chances / chances.sum())[:, None]).T @ apart)
 

@@ -14,7 +14,14 @@ from models.flow.fit import UsualFit
 from models.flow.fusion import fused_estimate
 from models.flow.move import StillScores, has_moved, learn_scores, moved_within
 from models.flow.reference import candidate_of, learn_flow
-from models.simulation.site import SiteConfig, draw_lanes, draw_new_lane, walk_changed, walk_site
+from models.simulation.site import (
+    Lane,
+    SiteConfig,
+    draw_lanes,
+    draw_new_lane,
+    walk_changed,
+    walk_site,
+)
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import LENS, PRIOR
 
@@ -166,3 +173,28 @@ def test_older_tracks_count_less(lanes, known):
     assert evenly.people == pytest.approx(200, abs=2)
     assert counted.people == pytest.approx(150, abs=6)  # (sum w)^2 / sum w^2 of weights 0..1
     assert counted.flow.people.sum() == pytest.approx(evenly.flow.people.sum() / 2, rel=0.05)
+
+
+def test_a_site_that_looks_alike_after_a_turn_says_so():
+    """Lanes like spokes, 12 deg apart, away from the camera: 12 deg on, all is as it was."""
+    angles = PRIOR.heading_rad + np.radians(np.arange(-72, 73, 12))
+    spokes = [
+        Lane(point=PRIOR.centre_m[:2] + 15 * way, direction=way)
+        for way in np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    ]
+    walked = SiteConfig(aside_m=0.3, standing_share=0.0)
+    visible = spokes[4:9]
+    rng = np.random.default_rng(13)
+    known = feet(walk_site(LENS, PRIOR, visible, walked, 200, rng))
+    flow = learn_flow(known, LENS, PRIOR, 0)
+    assert flow is not None
+    speeds = learn_reference(known, PRIOR, WalkConfig(), 0)
+    turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
+    after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
+    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
+    assert "heading" not in fused.told
+    assert "explain where people walk about as well" in fused.reason
+    turns_deg = [math.degrees(heading - PRIOR.heading_rad) for heading in fused.rivals]
+    turns_deg.append(math.degrees(fused.values[3] - PRIOR.heading_rad))
+    assert min(abs(turn - 12) for turn in turns_deg) < 1.5
+    assert math.degrees(math.sqrt(fused.covariance[3, 3])) > 5
