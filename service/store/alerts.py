@@ -1,6 +1,7 @@
 """Statements on alerts."""
 
 from collections.abc import Sequence
+from datetime import datetime
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -35,6 +36,20 @@ def ended(session: Session, camera_id: str) -> Sequence[AlertRecord]:
             AlertRecord.resolved_at.is_not(None),
         )
     ).all()
+
+
+def answered_at(session: Session, camera_id: str) -> datetime | None:
+    """When a person last said of an alert that the camera is where it should be."""
+    return session.scalar(
+        select(AlertRecord.resolved_at)
+        .where(
+            AlertRecord.camera_id == camera_id,
+            AlertRecord.kind.in_(POSE_KINDS),
+            AlertRecord.outcome.in_(("put_back", "false_alarm")),
+        )
+        .order_by(AlertRecord.resolved_at.desc())
+        .limit(1)
+    )
 
 
 def listed(
