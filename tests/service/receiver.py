@@ -1,6 +1,7 @@
 """A real HTTP server that takes messages, answers as it is told, and remembers everything."""
 
 import json
+import ssl
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -58,8 +59,8 @@ class Receiver:
 
 
 @contextmanager
-def receiver(port: int = 0) -> Iterator[Receiver]:
-    """A receiver on a port of the loopback address."""
+def receiver(tls: ssl.SSLContext | None = None) -> Iterator[Receiver]:
+    """A receiver on a free port of the loopback address."""
     state = Receiver()
 
     class Handler(BaseHTTPRequestHandler):
@@ -79,8 +80,11 @@ def receiver(port: int = 0) -> Iterator[Receiver]:
         def log_message(self, *args: Any) -> None:
             pass
 
-    server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     server.daemon_threads = True
+    server.handle_error = lambda *_: None  # a client that hangs up is part of the test
+    if tls is not None:
+        server.socket = tls.wrap_socket(server.socket, server_side=True)
     state.url = f"http://127.0.0.1:{server.server_port}/hook"
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()

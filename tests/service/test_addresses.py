@@ -1,11 +1,14 @@
 """Where webhooks may lead: by resolved addresses, at creation and at each connection."""
 
+import shutil
 import socket
+import ssl
+import subprocess
 from ipaddress import ip_network
 
 import pytest
 
-from service.delivery import addresses
+from service.delivery import addresses, send
 from service.delivery.addresses import AddressError, check_url, may_reach
 from service.delivery.send import post
 from tests.service.conftest import problem
@@ -55,8 +58,11 @@ def test_the_spelling_of_a_host_hides_nothing(host):
 def resolves_to(monkeypatch, *answers):
     """Have names resolve to one list of addresses after the other; the last one stays."""
     left = list(answers)
+    real = socket.getaddrinfo
 
-    def getaddrinfo(host, port, **_):
+    def getaddrinfo(host, port, *args, **more):
+        if host == "127.0.0.1":  # as the connection itself asks
+            return real(host, port, *args, **more)
         found = left.pop(0) if len(left) > 1 else left[0]
         family = {True: socket.AF_INET6, False: socket.AF_INET}
         return [(family[":" in a], socket.SOCK_STREAM, 6, "", (a, port)) for a in found]
@@ -139,3 +145,48 @@ def test_a_connection_goes_to_the_address_that_was_checked_under_the_name_that_w
         (message,) = inner.received
         assert message.headers["host"] == f"hooks.example.com:{port}"
         assert message.path == "/hook?a=b"
+
+
+@pytest.fixture
+def certified(tmp_path, monkeypatch):
+    """A TLS server on the loopback address, with a certificate of hooks.example.com."""
+    if shutil.which("openssl") is None:
+        pytest.skip("no openssl to make a certificate with")
+    key, certificate = tmp_path / "key.pem", tmp_path / "cert.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-keyout", key,
+         "-out", certificate, "-subj", "/CN=hooks.example.com", "-addext",
+         "subjectAltName=DNS:hooks.example.com"],
+        check=True,
+        capture_output=True,
+    )  # fmt: skip
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    send._tls.cache_clear()
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificate, key)
+    asked = []
+    context.sni_callback = lambda _, name, __: asked.append(name)
+    with receiver(tls=context) as inner:
+        yield inner.url.split(":")[2].split("/")[0], inner, asked
+    send._tls.cache_clear()
+
+
+def test_tls_is_of_the_name_though_the_connection_is_to_an_address(certified, monkeypatch):
+    port, inner, asked = certified
+    resolves_to(monkeypatch, ["127.0.0.1"])
+    assert post(f"https://hooks.example.com:{port}/hook", {}, "{}", LOOPBACK).status_code == 204
+    assert asked == ["hooks.example.com"]
+    assert len(inner.received) == 1
+    outcome = post(f"https://other.example.com:{port}/hook", {}, "{}", LOOPBACK)
+    assert outcome.status_code is None
+    assert "certificate" in outcome.error.lower()
+    assert len(inner.received) == 1
+
+
+def test_a_proxy_of_the_environment_is_not_asked(monkeypatch):
+    """It would connect for us, to wherever the name leads it."""
+    with receiver() as inner, receiver() as proxy:
+        for name in ("http_proxy", "HTTP_PROXY", "ALL_PROXY"):
+            monkeypatch.setenv(name, proxy.url.removesuffix("/hook"))
+        assert post(inner.url, {}, "{}", LOOPBACK).ok
+        assert proxy.received == []
