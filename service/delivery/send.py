@@ -53,7 +53,7 @@ def post(
         error = f"url: {refused}"
     except httpcore.TimeoutException:
         error = f"no answer within {timeout_s:g} s"
-    except (httpcore.NetworkError, httpcore.ProtocolError, ssl.SSLError) as failed:
+    except (httpcore.NetworkError, httpcore.ProtocolError, OSError) as failed:
         error = f"{type(failed).__name__}: {failed}"
     return Outcome(
         started_at=started_at,
@@ -171,7 +171,7 @@ def _left(left_s: Callable[[], float]) -> float:
 
 def _seconds(text: str) -> float | None:
     """`Retry-After`: seconds, or a date."""
-    if text.strip().isdigit():
+    if text.strip().isdecimal():
         return float(text)
     try:
         at = email.utils.parsedate_to_datetime(text)

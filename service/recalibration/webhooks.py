@@ -18,6 +18,7 @@ from service.store import webhooks
 from service.store.delivery_tables import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 OLD_SECRET_STAYS = timedelta(hours=24)
+_BY_A_PERSON = "disabled by a person"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +71,7 @@ def create_webhook(session: Session, spec: WebhookSpec) -> WebhookRecord:
         format=spec.format,
         kinds=None if spec.kinds is None else list(spec.kinds),
         enabled=spec.enabled,
+        disabled_reason=None if spec.enabled else _BY_A_PERSON,
         secret=new_secret() if spec.format == "webhook" else None,
         created_at=now,
         updated_at=now,
@@ -112,7 +114,7 @@ def change_webhook(
         setattr(record, name, value)
     record.updated_at = now
     if changes.get("enabled") is False:
-        record.disabled_reason = "disabled by a person"
+        record.disabled_reason = _BY_A_PERSON
     elif changes.get("enabled") or "url" in changes:
         if record.enabled:
             record.disabled_reason = None

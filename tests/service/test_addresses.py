@@ -190,3 +190,12 @@ def test_a_proxy_of_the_environment_is_not_asked(monkeypatch):
             monkeypatch.setenv(name, proxy.url.removesuffix("/hook"))
         assert post(inner.url, {}, "{}", LOOPBACK).ok
         assert proxy.received == []
+
+
+def test_authorities_that_cannot_be_read_fail_an_attempt_and_no_job(monkeypatch):
+    monkeypatch.setenv("SSL_CERT_FILE", "/nowhere/at/all.pem")
+    send._tls.cache_clear()
+    outcome = post("https://127.0.0.1:9/", {}, "{}", LOOPBACK)
+    send._tls.cache_clear()
+    assert outcome.status_code is None
+    assert "FileNotFoundError" in outcome.error

@@ -8,6 +8,7 @@ from ipaddress import ip_network
 
 import pytest
 
+from service.delivery import send
 from service.delivery.send import post
 from service.jobs.deliver import run_deliver
 from service.jobs.housekeeping import run_reconcile, run_retention
@@ -144,6 +145,11 @@ def test_retry_after_is_heeded_within_limits(post_room, inbox, form):
     post_room.send_now(hook)
     (delivery,) = post_room.log(hook)
     assert 6 * 3600 <= until_next_s(delivery) < 6 * 3600 + 60
+
+
+@pytest.mark.parametrize("nonsense", ["soon", "-5", "\u00b2", "", "Fri, 99 Nov 2026 25:00:00 GMT"])
+def test_a_retry_after_that_says_nothing_is_passed_over(nonsense):
+    assert send._seconds(nonsense) is None
 
 
 def test_a_redirect_is_a_failure_and_is_not_followed(post_room, inbox):

@@ -15,7 +15,12 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def service(settings):
-    changes = {"port": free_port(), "webhook_allow": "127.0.0.1/32", "webhook_retry_s": "1"}
+    changes = {
+        "port": free_port(),
+        "webhook_allow": "127.0.0.1/32",
+        "webhook_retry_s": "1",
+        "alertmanager_refresh_s": 1,
+    }
     running = RunningService(settings.model_copy(update=changes))
     running.start()
     wait_for(running.ready)
@@ -105,3 +110,13 @@ def test_the_test_button_reaches_a_receiver(service, inbox):
     service.http.post(f"/webhooks/{made['id']}/test").raise_for_status()
     wait_for(lambda: all_delivered(service, made, 1))
     assert inbox.received[0].verified(made["secret"])["type"] == "test"
+
+
+def test_an_alertmanager_is_told_again_and_again_with_one_row_in_the_log(service, inbox):
+    inbox.answer(200)
+    body = {"url": inbox.url, "format": "alertmanager"}
+    made = service.http.post("/webhooks", json=body).json()
+    open_alert(service, "drift")
+    wait_for(lambda: len(inbox.received) >= 4)
+    assert all_delivered(service, made, 1)
+    assert {m.json[0]["labels"]["alertname"] for m in inbox.received} == {"SurefootCameraDrift"}

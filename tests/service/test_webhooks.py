@@ -115,6 +115,7 @@ def test_only_kinds_that_are_wanted_and_enabled_webhooks_are_told(post_room, inb
     assert [d["payload"]["data"]["kind"] for d in post_room.log(drift)] == ["drift"]
     assert [d["payload"]["data"]["kind"] for d in post_room.log(every)] == ["drift", "no_data"]
     assert post_room.log(off) == []
+    assert post_room.show(off)["disabled_reason"] == "disabled by a person"
 
 
 def test_a_silenced_alert_is_quiet_until_it_ends(post_room, inbox):
