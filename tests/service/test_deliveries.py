@@ -10,6 +10,7 @@ import pytest
 
 from service.delivery import send
 from service.delivery.send import post
+from service.jobs import deliver
 from service.jobs.deliver import run_deliver
 from service.jobs.housekeeping import run_reconcile, run_retention
 from service.recalibration.deliveries import next_attempt, record_attempt
@@ -348,3 +349,16 @@ def test_the_allow_setting_is_checked():
     assert Settings(webhook_allow="10.0.0.0/8, fd00::/8").webhook_networks == (
         ip_network("10.0.0.0/8"), ip_network("fd00::/8")
     )  # fmt: skip
+
+
+def test_a_run_that_takes_too_long_leaves_the_rest_to_another(post_room, inbox, monkeypatch):
+    hook = post_room.hook(inbox.url)
+    post_room.open()
+    monkeypatch.setattr(deliver, "_LONGEST_RUN_S", 0.0)
+    post_room.send(hook)
+    assert inbox.received == []
+    assert post_room.jobs() == [hook["id"]] * 2
+    monkeypatch.undo()
+    post_room.send(hook)
+    assert len(inbox.received) == 1
+    assert post_room.jobs() == [hook["id"]] * 2  # nothing is left, no third one
