@@ -1,10 +1,11 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
 import os
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -54,8 +55,49 @@ class Settings(BaseSettings):
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
+    webhook_allow: str = Field(
+        "", description="CIDRs, with commas, of private addresses that webhooks may go to"
+    )
+    webhook_retry_s: str = Field(
+        "5,30,120,600,3600,10800,21600,43200",
+        description="seconds from a failed delivery to its next attempt; the last one repeats",
+    )
+    webhook_patience_h: float = Field(
+        72.0, gt=0, description="hours of failing that end a delivery, and disable its webhook"
+    )
+    alertmanager_refresh_s: float = Field(
+        60.0, ge=1, description="seconds between tellings of all that fires; it forgets"
+    )
+    keep_deliveries_days: float = Field(
+        30.0, gt=0, description="age at which ended deliveries are deleted"
+    )
+    public_url: str | None = Field(None, description="where people reach this service, for links")
+
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
+
+    @field_validator("webhook_allow")
+    @classmethod
+    def _networks(cls, value: str) -> str:
+        _read_networks(value)
+        return value
+
+    @field_validator("webhook_retry_s")
+    @classmethod
+    def _delays(cls, value: str) -> str:
+        if not all(delay > 0 for delay in _read_numbers(value)):
+            raise ValueError(f"numbers above 0, with commas, are needed, got {value!r}")
+        return value
+
+    @property
+    def webhook_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
+        """Private networks that webhooks may go to."""
+        return _read_networks(self.webhook_allow)
+
+    @property
+    def webhook_delays_s(self) -> tuple[float, ...]:
+        """Seconds from each failed attempt to the next; the last one repeats."""
+        return _read_numbers(self.webhook_retry_s)
 
     @property
     def database_path(self) -> Path:
@@ -77,3 +119,11 @@ class Settings(BaseSettings):
         values = self.model_dump(mode="json", exclude_none=True)
         ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
+
+
+def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
+    return tuple(ip_network(part.strip()) for part in text.split(",") if part.strip())
+
+
+def _read_numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))

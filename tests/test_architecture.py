@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue"},
+    {"formats", "store", "job_queue", "delivery"},
     {"migrate", "recalibration"},
     {"schemas", "jobs"},
     {"routes"},

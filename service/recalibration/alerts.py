@@ -8,6 +8,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
+from service.recalibration.outbox import queue_alert
 from service.store import alerts, events
 from service.store.tables import AlertRecord
 
@@ -145,7 +146,8 @@ def _end(
     _tell(session, record)
 
 
-def _tell(session: Session, record: AlertRecord) -> None:
+def _tell(session: Session, record: AlertRecord, change: str | None = None) -> None:
+    """Tell of a change: opened, updated, acknowledged, silenced, resolved; None: by its times."""
     payload = {
         "id": record.id,
         "camera_id": record.camera_id,
@@ -158,3 +160,4 @@ def _tell(session: Session, record: AlertRecord) -> None:
         "acknowledged_by": record.acknowledged_by,
     }
     events.add(session, "alert", payload, datetime.now(UTC))
+    queue_alert(session, record, change)

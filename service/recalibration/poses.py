@@ -180,3 +180,14 @@ def _state(
         "out_of_range": "out_of_range",
     }
     return states.get(estimate.state, "ok"), estimate.reason
+
+
+def state_of(
+    session: Session,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    estimate: EstimateRecord | None,
+) -> PoseState:
+    """A camera's state alone, of its newest reference and estimate: for who asks about many."""
+    counts = estimate is not None and estimate.reference_id == reference.id
+    return _state(session, settings, reference, estimate if counts else None, 0)[0]
