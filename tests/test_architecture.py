@@ -16,8 +16,8 @@ SERVICE_ROOMS = [
     {"migrate", "recalibration"},
     {"schemas", "jobs"},
     {"routes"},
-    {"app", "protocol_plots", "protocol_tables"},
-    {"serve", "replay", "evaluate", "flow_study", "centred"},
+    {"app", "protocol_plots", "protocol_tables", "alarm_tables"},
+    {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},
 ]

@@ -31,6 +31,8 @@ _BLOCK = 3  # parties after one another that the bootstrap keeps together
 _MOST_ALARMS = 50
 _LONGEST = 1200  # parties that a knock is waited for
 _DRAWS = 10
+_REDRAWN = 4000
+_NONE_SEEN = 3.689  # of a Poisson variable that was 0, the 97.5 % limit of its mean
 _SEED = 0
 
 
@@ -184,6 +186,19 @@ def by_knock(results: Sequence[AlarmResults]) -> Mapping[tuple[float, bool], lis
         for delay in result.delays:
             found.setdefault((delay.angle_deg, delay.pan), []).append(delay)
     return found
+
+
+def rate_interval(results: Sequence[AlarmResults]) -> tuple[float, float]:
+    """False alarms a camera-year, low and high (95 %): cases drawn anew, for cameras differ.
+
+    No alarm in so many years is no proof of none: the high end is at least Poisson's.
+    """
+    alarms = np.array([result.false_alarms for result in results], dtype=np.float64)
+    years = np.array([result.years for result in results])
+    drawn = np.random.default_rng(_SEED).integers(0, len(results), (_REDRAWN, len(results)))
+    rates = alarms[drawn].sum(axis=1) / years[drawn].sum(axis=1)
+    low, high = np.quantile(rates, [0.025, 0.975])
+    return float(low), max(float(high), _NONE_SEEN / float(years.sum()))
 
 
 def first_alarm(watch: Watch, apart: Array, tracks_a_party: float) -> float:
