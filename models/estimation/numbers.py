@@ -13,6 +13,8 @@ from models.geometry.rotation import Array
 NUMBERS = ("tilt", "roll", "height")
 WITH_HEADING = (*NUMBERS, "heading")
 ANGLES = ("tilt", "roll", "heading")
+# A number whose standard deviation is larger is not told; in the order of WITH_HEADING.
+TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
 # How far an estimator is usually off on a site for good: foot points, places of other speed.
 SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 

@@ -7,12 +7,12 @@ import numpy as np
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.site import SiteReference
-from models.estimation.numbers import NUMBERS
+from models.estimation.numbers import NUMBERS, TELLING_SD
 from models.evaluation.joint_runs import joint_answer
 from models.evaluation.learned import Learned
 from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
 from models.flow.evidence import Walkers, walkers_of
-from models.flow.fusion import fused_estimate
+from models.flow.fusion import elsewhere, fused_estimate
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.rotation import Array
@@ -24,7 +24,6 @@ _CLIMBED = 2
 _SAME_END = np.radians(0.3)
 _BROAD = np.diag(np.array([np.radians(8), np.radians(8), 0.2, np.radians(15)]) ** -2.0)
 _FEWEST = 5
-_WEAK_SD = np.array([np.radians(2), np.radians(2), 0.12])  # as in the joint estimate
 
 
 def fused(learned: Learned) -> Answer:
@@ -67,13 +66,10 @@ def registration(learned: Learned) -> Answer:
     best = peaks[0]
     known = reference.precision(best, walkers.people, best.candidate - mean)
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    # Other poses that explain the tracks, each by its chance, are a part of what is unsure.
     chances = np.exp([peak.value - best.value for peak in peaks])
-    apart = np.array([peak.candidate - best.candidate for peak in peaks])
-    elsewhere = (apart * (chances / chances.sum())[:, None]).T @ apart
-    covariance = covariance + elsewhere
+    covariance = covariance + elsewhere(peaks, chances)
     sd = np.sqrt(np.diag(covariance))[:3]
-    weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _WEAK_SD, strict=True) if is_weak)
+    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
     answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
     return _with_heading(answer, values, covariance)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import Observations, of_tracks
-from models.evaluation.protocol import Z90, pose_of_numbers
+from models.evaluation.protocol import Z90, angle_deg, pose_of_numbers
 from models.evaluation.scenes import Knock
 from models.evaluation.study_site import (
     LearnedPlace,
@@ -25,7 +25,7 @@ from models.evaluation.study_site import (
 )
 from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, angle_between
+from models.geometry.rotation import Array
 from models.simulation.site import draw_new_lane, walk_changed
 
 REFERENCE_TRACKS = 2000
@@ -163,7 +163,7 @@ def _judge_knock(learned: LearnedPlace, truth: CameraPose, tracks: Observations)
         tracks=tracks.tracks,
         errors=_printed(errors),
         covered=_covered(errors, found.covariance),
-        angle_error_deg=_angle_deg(_pose(found.values, truth), truth),
+        angle_error_deg=angle_deg(_pose(found.values, truth), truth),
     )
 
 
@@ -176,9 +176,9 @@ def _judge_change(
     errors = _errors(found.values, truth)
     return ChangedResult(
         tracks=changed.tracks,
-        off_truth_deg=_angle_deg(pose, truth),
-        off_unchanged_deg=_angle_deg(pose, old),
-        unchanged_off_truth_deg=_angle_deg(old, truth),
+        off_truth_deg=angle_deg(pose, truth),
+        off_unchanged_deg=angle_deg(pose, old),
+        unchanged_off_truth_deg=angle_deg(old, truth),
         off_truth_log_height=float(errors[2]),
         covered=_covered(errors, found.covariance),
         reason=found.reason,
@@ -205,7 +205,3 @@ def _printed(errors: Array) -> tuple[float, ...]:
 
 def _pose(values: Array, like: CameraPose) -> CameraPose:
     return replace(pose_of_numbers(values[:3], like), heading_rad=float(values[3]))
-
-
-def _angle_deg(one: CameraPose, other: CameraPose) -> float:
-    return math.degrees(float(angle_between(one.quaternion_wxyz, other.quaternion_wxyz)))

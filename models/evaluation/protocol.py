@@ -163,8 +163,8 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         true_drift=_printed(true - prior),
         drift=_printed(true + error - prior),
         sd=_printed(sd),
-        angle_error_deg=_angle_deg(pose, case.true_pose),
-        tilt_roll_error_deg=_angle_deg(level, case.true_pose),
+        angle_error_deg=angle_deg(pose, case.true_pose),
+        tilt_roll_error_deg=angle_deg(level, case.true_pose),
         true_heading_drift_deg=math.degrees(
             case.true_pose.heading_rad - case.prior_pose.heading_rad
         ),
@@ -206,7 +206,8 @@ def _taken(trajectories: list[Trajectory]) -> tuple[Trajectory, ...]:
     return tuple(sorted(taken, key=lambda trajectory: float(trajectory.time_s[-1])))
 
 
-def _angle_deg(one: CameraPose, other: CameraPose) -> float:
+def angle_deg(one: CameraPose, other: CameraPose) -> float:
+    """The whole rotation between two poses, in degrees."""
     return math.degrees(float(angle_between(one.quaternion_wxyz, other.quaternion_wxyz)))
 
 

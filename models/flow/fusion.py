@@ -8,7 +8,7 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import NUMBERS, WITH_HEADING
+from models.estimation.numbers import NUMBERS, TELLING_SD, WITH_HEADING
 from models.flow.evidence import Walkers, walkers_of
 from models.flow.fit import loss, party_fits
 from models.flow.reference import FlowReference, candidate_of
@@ -22,7 +22,6 @@ _HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
 _FEWEST_PARTIES = 5
 _CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three numbers
 _TRUST = 25.0
-_TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 
 
@@ -31,19 +30,22 @@ class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
     `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` says in
-    words what is to be said of the flow map. `registered` is whether it had a part; without, all
-    is the joint estimate's and the heading the prior pose's. `raw` (4,) is before the map's bias
-    is taken off, None without the map. `rivals` are headings (radians) of
-    other poses that explain the tracks about as well.
+    words what is to be said of the flow map. `raw` (4,) is before the map's bias is taken off; None
+    where the map had no part: then all is the joint estimate's and the heading the prior pose's.
+    `rivals` are headings (radians) of other poses that explain the tracks about as well.
     """
 
     values: Array
     covariance: Array
     told: tuple[str, ...]
     reason: str
-    registered: bool
     raw: Array | None = None
     rivals: tuple[float, ...] = ()
+
+    @property
+    def registered(self) -> bool:
+        """Whether the flow map had a part."""
+        return self.raw is not None
 
 
 def fused_estimate(
@@ -84,7 +86,7 @@ def fused_estimate(
     if belief.precision is not precision:
         covariance = np.asarray(np.linalg.inv(known + precision))
     chances = _chances(walkers, site, belief, peaks)
-    covariance = covariance + _elsewhere(peaks, chances)
+    covariance = covariance + elsewhere(peaks, chances)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
     if reference.fit.has_changed(party_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, "the paths have changed: the flow map is left out")
@@ -97,11 +99,8 @@ def fused_estimate(
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        told=tuple(
-            n for n, telling in zip(WITH_HEADING, sd <= _TELLING_SD, strict=True) if telling
-        ),
+        told=tuple(n for n, telling in zip(WITH_HEADING, sd <= TELLING_SD, strict=True) if telling),
         reason=_words(float(values[3]), rivals, float(sd[3]), prior),
-        registered=True,
         raw=best.candidate,
         rivals=rivals,
     )
@@ -117,7 +116,6 @@ def by_speeds_alone(joint: JointEstimate, prior: CameraPose, reason: str = "") -
         covariance=covariance,
         told=tuple(name for name in NUMBERS if name not in joint.weak),
         reason=reason,
-        registered=False,
     )
 
 
@@ -126,7 +124,7 @@ def _words(heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPo
         turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
         said = " and ".join(f"{math.degrees(turn):+.1f} deg" for turn in turns)
         return f"turns of {said} explain where people walk about as well"
-    if sd > _TELLING_SD[3]:
+    if sd > TELLING_SD[3]:
         return f"where people walk does not tell the heading (sd {math.degrees(sd):.1f} deg)"
     return ""
 
@@ -143,8 +141,8 @@ def _chances(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) ->
     return np.array(chances)
 
 
-def _elsewhere(peaks: list[Peak], chances: Array) -> Array:
-    """What other peaks add to the covariance (4, 4)."""
+def elsewhere(peaks: list[Peak], chances: Array) -> Array:
+    """What other peaks add to the covariance (4, 4), each by its chance (P,); the first is best."""
     apart = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
     return np.asarray((apart * (chances / chances.sum())[:, None]).T @ apart)
 

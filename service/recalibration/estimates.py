@@ -222,12 +222,12 @@ def _record(
 
 
 def _raw(finding: Finding) -> dict[str, Any]:
-    joint, averaged = finding.joint, finding.averaged
+    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw
     raw = {"joint": {**_raw_numbers(joint.raw), "tracks": joint.walkers}}
-    if finding.registered is not None:
+    if registered is not None:
         raw["registered"] = {
-            **_raw_numbers(finding.registered),
-            "heading_deg": math.degrees(finding.registered[3]),
+            **_raw_numbers(registered),
+            "heading_deg": math.degrees(registered[3]),
             "tracks": joint.walkers,
         }
     if averaged is not None:

@@ -24,7 +24,6 @@ from models.flow.packing import flow_from_bytes
 from models.flow.reference import FlowReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.changes import change_among
@@ -80,14 +79,12 @@ class Evidence:
 class Finding:
     """What the evidence comes to. `tracks` are those after the `change`, where one was found.
 
-    `fused` is to be served; `registered` (4,) is that before the map's offset is taken off, None
-    where no map had a part. `reading` is what the drift chart says of all the tracks, those before
+    `fused` is to be served. `reading` is what the drift chart says of all the tracks, those before
     the change too, long before a pose can say how far; None where there is no chart.
     """
 
     joint: JointEstimate
     fused: FusedEstimate
-    registered: Array | None
     averaged: PoseEstimate | None
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
@@ -148,7 +145,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     if observations.walkers < FEWEST_WALKERS:
         return None
     lens, prior = evidence.intrinsics, evidence.prior
-    seen, change, registered = evidence.tracks, None, None
+    seen, change = evidence.tracks, None
     reading = None
     if evidence.site is None:
         joint = joint_estimate(
@@ -169,7 +166,6 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
             fused = by_speeds_alone(joint, prior)
         else:
             fused = fused_estimate(observations, lens, prior, joint, flow)
-            registered = fused.raw
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
@@ -178,7 +174,6 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     return Finding(
         joint=joint,
         fused=fused,
-        registered=registered,
         averaged=averaged,
         reading=reading,
         tracks=seen,

@@ -35,8 +35,8 @@ def _measure(form: str) -> float:
     started = time.perf_counter()
     reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
     learned_s = time.perf_counter() - started
-    estimate_s = _median_s(lambda: joint_estimate(seen(after), PRIOR, reference))
-    change_s = _median_s(lambda: find_change(seen(after), PRIOR, reference))
+    estimate_s = median_s(lambda: joint_estimate(seen(after), PRIOR, reference))
+    change_s = median_s(lambda: find_change(seen(after), PRIOR, reference))
     Console().print(
         f"{form}: estimate {estimate_s:.2f} s, {estimate_s / LIMIT_S:.2f} of the limit of "
         f"{LIMIT_S:g} s; looking for a change {change_s:.2f} s; reference {learned_s:.2f} s"
@@ -44,7 +44,8 @@ def _measure(form: str) -> float:
     return estimate_s
 
 
-def _median_s(work: Callable[[], object]) -> float:
+def median_s(work: Callable[[], object]) -> float:
+    """How long some work takes, of several runs."""
     took_s = []
     for _ in range(RUNS):
         started = time.perf_counter()

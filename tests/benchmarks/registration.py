@@ -8,9 +8,6 @@ differ between machines, so each is also told as a multiple of one joint estimat
 
 import os
 import platform
-import statistics
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,9 +18,10 @@ from models.estimation.joint.reference import learn_reference
 from models.flow.fusion import fused_estimate
 from models.flow.reference import learn_flow
 from models.simulation.walkers import WalkConfig
+from tests.benchmarks.joint import RUNS, median_s
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
-MAPS, TRACKS, RUNS = (200, 2000), 400, 5
+MAPS, TRACKS = (200, 2000), 400
 PANNED = replace(KNOCKED, heading_rad=PRIOR.heading_rad + 0.1)
 LIMIT_S = 1.0
 
@@ -37,15 +35,15 @@ def main() -> None:
     tracks = seen(after)
     speeds = learn_reference(seen(known[: min(MAPS)]), PRIOR, WalkConfig(), 0)
     joint = joint_estimate(tracks, PRIOR, speeds)
-    joint_s = _median_s(lambda: joint_estimate(tracks, PRIOR, speeds))
+    joint_s = median_s(lambda: joint_estimate(tracks, PRIOR, speeds))
     console.print(f"joint estimate of {TRACKS} tracks: {joint_s:.2f} s")
     slowest_s = 0.0
     for size in MAPS:
         reference_tracks = seen(known[:size])
         flow = learn_flow(reference_tracks, LENS, PRIOR, 0)
         assert flow is not None
-        learned_s = _median_s(lambda of=reference_tracks: learn_flow(of, LENS, PRIOR, 0))
-        fused_s = _median_s(
+        learned_s = median_s(lambda of=reference_tracks: learn_flow(of, LENS, PRIOR, 0))
+        fused_s = median_s(
             lambda flow=flow: fused_estimate(tracks, LENS, PRIOR, joint, flow)
         )  # fmt: skip
         console.print(
@@ -62,15 +60,6 @@ def _processor() -> str:
         if line.startswith("model name"):
             return line.partition(":")[2].strip()
     return platform.machine()
-
-
-def _median_s(work: Callable[[], object]) -> float:
-    took_s = []
-    for _ in range(RUNS):
-        started = time.perf_counter()
-        work()
-        took_s.append(time.perf_counter() - started)
-    return statistics.median(took_s)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ class Bench:
                 weak=tuple(weak),
                 reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
             )
-            fused, registered = by_speeds_alone(joint, PRIOR), None
+            fused = by_speeds_alone(joint, PRIOR)
             if paths:
                 sds = np.append(sd, math.radians(sd_deg))
                 fused = FusedEstimate(
@@ -93,13 +93,11 @@ class Bench:
                     covariance=np.diag(sds**2),
                     told=(*fused.told, "heading"),
                     reason="",
-                    registered=True,
+                    raw=np.append(values, pose.heading_rad) + 0.01,
                 )
-                registered = fused.values + 0.01
             finding = Finding(
                 joint=joint,
                 fused=fused,
-                registered=registered,
                 averaged=None,
                 reading=None,
                 tracks=evidence.tracks,

@@ -10,14 +10,13 @@ from models.estimation.joint.groups import count_parties
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
-from models.estimation.numbers import NUMBERS, numbers_of
+from models.estimation.numbers import NUMBERS, TELLING_SD, numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
 _STARTS = 2
 _START_TRACKS = 80
 # Beyond these standard deviations tracks do not tell a number: angles in radians, log height.
-_TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12])
 _FEWEST_PARTIES = 5
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
@@ -59,7 +58,7 @@ def joint_estimate(
     covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
-    weak = tuple(name for name, is_weak in zip(NUMBERS, sd > _TELLING_SD, strict=True) if is_weak)
+    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
     reason = _words(weak, sd, covariance)
     if parties < _FEWEST_PARTIES:
         weak = NUMBERS
