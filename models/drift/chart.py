@@ -3,7 +3,7 @@
 For each of a grid of knocks, of tilt, roll, log height and heading, both ways and in three sizes,
 and for times that are too long or too short, the chart knows how the mean score of parties would
 change: it has seen the reference's people as a camera knocked so would. The statistic is the
-largest log likelihood ratio of any knock against none, over the newest 8 to 400 parties: a
+largest log likelihood ratio of any knock against none, over the newest 16 to 400 parties: a
 two-sided CUSUM for each number and size (Page 1954) in Lorden's and Lai's window-limited form,
 which is the same for one size and keeps its meaning where the reference is itself unsure: its noise
 is in the ratio, so that no number of new people makes a reference's own error a drift.
@@ -18,13 +18,15 @@ from models.drift.party_scores import PartyScores
 from models.estimation.joint.site import SiteReference
 from models.geometry.rotation import Array
 
-FEWEST = 8  # parties that a move is told by
+FEWEST = 16  # parties that a move is told by
 LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
 CLOCK = 4  # the number of times that are too long
 # What a site's people may do of themselves for hours on end, as moves of the camera, and of its
 # clock: by day and night, in rain and crowds they walk elsewhere, and a few percent faster.
 HABITS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
 RUN = 1000  # parties; levels are of so many in a row
+# The reference's noise counts for so much: whoever walks by on other days is another sample, too.
+_OTHER_PEOPLE = 1.5
 _STRONGEST = 2.0  # times a knock of the grid, that it stands for
 _SUSPICION = 100.0  # times as many alarms
 _LEAST_LEVEL = 5.4  # of a run of endless normal parties that is wrong once in e runs
@@ -124,7 +126,7 @@ class Reading:
 
 
 def read_chart(chart: DriftChart, scores: PartyScores, alarms_a_run: float) -> Reading | None:
-    """What the chart says now; None of fewer than 8 parties."""
+    """What the chart says now; None of fewer than 16 parties."""
     if len(scores.values) < FEWEST:
         return None
     newest = chart.bounded(scores.values[-int(LENGTHS[-1]) :])
@@ -165,7 +167,7 @@ def ratios_of(chart: DriftChart) -> Ratios:
     habits = (slopes * HABITS) @ (slopes * HABITS).T
     weights, strengths = [], []
     for length in LENGTHS:
-        noise = chart.covariance * (1 / length + 1 / chart.parties) + habits
+        noise = chart.covariance * (1 / length + _OTHER_PEOPLE / chart.parties) + habits
         weights.append(np.linalg.solve(noise, chart.responses))
         strengths.append(np.einsum("fk,fk->k", chart.responses, weights[-1]))
     return Ratios(weights=np.array(weights), strengths=np.maximum(strengths, 1e-12))

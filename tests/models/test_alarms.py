@@ -50,10 +50,10 @@ def watch():
 
 
 def test_alarms_are_renewed_after_each(watch):
-    apart = np.zeros((30, SCORES))
-    apart[:, -1] = 2.0  # eight parties come to 8 * 2 = 16, and fewer are not asked
-    assert watch.alarms(apart) == [8, 16, 24]
-    assert first_alarm(watch, apart, 2.5) == 20.0
+    apart = np.zeros((60, SCORES))
+    apart[:, -1] = 2.0  # sixteen parties come to 16 * 2 = 32, and fewer are not asked
+    assert watch.alarms(apart) == [16, 32, 48]
+    assert first_alarm(watch, apart, 2.5) == 40.0
     assert watch.alarms(np.zeros((300, SCORES))) == []
     assert first_alarm(watch, np.zeros((300, SCORES)), 2.5) == math.inf
 

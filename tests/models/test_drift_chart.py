@@ -90,15 +90,15 @@ def far_heading():
 
 
 def test_the_ratio_is_that_of_a_shift_by_hand():
-    """Eight parties, 1.5 each of noise 1: n (1.5 x 1.5 - 1.5^2 / 2) = 9 at a strength of 1.5."""
-    apart = np.zeros((8, SCORES))
+    """Sixteen parties, 1.5 each of noise 1: n (1.5 x 1.5 - 1.5^2 / 2) = 18 at a strength of 1.5."""
+    apart = np.zeros((16, SCORES))
     apart[:, -1] = 1.5
     path = trace(ratios_of(plain(responses=far_heading())), apart)
-    assert path.statistic[-1] == pytest.approx(9.0)
+    assert path.statistic[-1] == pytest.approx(18.0)
     assert KNOCKS[path.knock_idx[-1]].number == 3
-    # A reference of 8 parties is as unsure as they are: half of it.
-    path = trace(ratios_of(plain(parties=8.0, responses=far_heading())), apart)
-    assert path.statistic[-1] == pytest.approx(4.5)
+    # A reference of 16 parties, counted one and a half times, is more unsure than they are.
+    path = trace(ratios_of(plain(parties=16.0, responses=far_heading())), apart)
+    assert path.statistic[-1] == pytest.approx(18.0 / 2.5)
 
 
 def test_less_than_half_a_knock_never_adds_up():
@@ -127,7 +127,7 @@ def test_the_newest_parties_count_and_say_since_when():
     assert (reading.number, reading.sign, reading.moved) == (3, 1, True)
     assert reading.parties in LENGTHS
     assert reading.track_idx == pytest.approx(210, abs=15)
-    few = PartyScores(values=values[:7], last=np.arange(7))
+    few = PartyScores(values=values[:15], last=np.arange(15))
     assert read_chart(chart, few, ONE_A_YEAR) is None
 
 
@@ -205,5 +205,5 @@ def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
     assert reading.moved
     assert (reading.number, reading.sign) == (CLOCK, 1)
     assert not may_be_clock(reading)  # by now a pose can tell
-    early = read_chart(chart, score_parties(of_tracks(slow, np.arange(15)), usual), ONE_A_YEAR)
+    early = read_chart(chart, score_parties(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
     assert may_be_clock(early)
