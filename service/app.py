@@ -14,7 +14,16 @@ from starlette.exceptions import HTTPException
 from models.errors import CalibrationError
 from service.errors import FieldError, ServiceError
 from service.job_queue import JobQueue
-from service.routes import alerts, cameras, events, operation, poses, tracks, trainings
+from service.routes import (
+    alerts,
+    cameras,
+    events,
+    maintenance,
+    operation,
+    poses,
+    tracks,
+    trainings,
+)
 from service.routes.state import AppState
 from service.settings import Settings
 from service.store.database import Store
@@ -44,7 +53,7 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Tells when a fixed camera has moved, from the paths of people walking.",
         lifespan=lifespan,
     )
-    for module in (cameras, tracks, poses, trainings, alerts, events, operation):
+    for module in (cameras, tracks, poses, trainings, alerts, maintenance, events, operation):
         app.include_router(module.router)
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(CalibrationError, _calibration_error)

@@ -38,6 +38,12 @@ class Settings(BaseSettings):
     drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 
+    silence_max_days: float = Field(30.0, gt=0, description="longest silence of an alert")
+    maintenance_max_days: float = Field(30.0, gt=0, description="longest maintenance window")
+    group_cameras: int = Field(3, ge=2, description="cameras of a tracker that make one alert")
+    group_share: float = Field(0.5, gt=0, le=1, description="and this share of its cameras")
+    group_within_s: float = Field(3600.0, gt=0, description="that began to move within this time")
+
     flow_tracks: int = Field(2_000, ge=50, description="newest tracks that a flow map is made of")
     flow_half_life_days: float = Field(
         30.0, gt=0, description="age at which a track counts half in it"

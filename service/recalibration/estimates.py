@@ -115,11 +115,12 @@ def _judge(
         words.append(finding.joint.reason)
     words.append(reference.doubt)
     record.reason = "; ".join(word for word in words if word)
-    _alert(session, record, drift, verdict, clock=clock, edge=edge)
+    _alert(session, settings, record, drift, verdict, clock=clock, edge=edge)
 
 
 def _alert(
     session: Session,
+    settings: Settings,
     record: EstimateRecord,
     drift: Drift,
     verdict: DriftVerdict,
@@ -134,7 +135,7 @@ def _alert(
     severity = "critical" if verdict.excess >= 2 else "warning"
     since = record.drift_since
     if edge is not None:
-        open_alert(session, camera_id, "out_of_range", severity, body, since, reason=edge)
+        open_alert(session, settings, camera_id, "out_of_range", severity, body, since, reason=edge)
     elif "out_of_range" in firing:
         end_alert(session, camera_id, "out_of_range", "cleared")
     if not verdict.drifting:
@@ -147,7 +148,8 @@ def _alert(
     if other in firing:
         end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
     if drift.told:
-        open_alert(session, camera_id, kind, severity, body, since, reason=clock or record.reason)
+        reason = clock or record.reason
+        open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)
 
 
 def _since(

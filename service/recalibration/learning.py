@@ -26,6 +26,7 @@ from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import open_alert
+from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
@@ -65,7 +66,8 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
     if camera is None or reference is None or reference.ready_at is not None:
         return None
     wanted = wanted_tracks(reference, settings)
-    records = tracks.first(session, camera_id, reference.from_s, wanted)
+    attended = attendance_of(session, camera_id, datetime.now(UTC))
+    records = tracks.first(session, camera_id, reference.from_s, wanted, without=attended.spans)
     if len(records) < wanted:
         return None
     intrinsics = intrinsics_of(camera)
@@ -102,7 +104,11 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
 
 
 def keep_reference(
-    session: Session, camera_id: str, period: ReferencePeriod, learned: LearnedReference | None
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    period: ReferencePeriod,
+    learned: LearnedReference | None,
 ) -> None:
     """Make a learned reference the one that counts, unless another has begun meanwhile.
 
@@ -135,6 +141,7 @@ def keep_reference(
     if site.doubt:
         open_alert(
             session,
+            settings,
             camera_id,
             _DOUBT_KINDS[site.doubt_about],
             "warning",

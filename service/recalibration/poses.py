@@ -4,7 +4,7 @@ import time
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Literal
 
 from sqlalchemy.orm import Session
@@ -17,15 +17,18 @@ from service.recalibration.cameras import renew_prior_pose, require_camera
 from service.recalibration.references import (
     FEWEST_WALKERS,
     begin_reference,
+    is_outdated,
     tracks_so_far,
     wanted_tracks,
     window_of,
 )
 from service.recalibration.trainings import request_estimate
 from service.settings import Settings
-from service.store import cameras, estimates, references, tracks, trainings
+from service.store import cameras, estimates, maintenance, references, tracks, trainings
+from service.store.alert_tables import MaintenanceRecord
 from service.store.packing import pose_of_prior
 from service.store.tables import EstimateRecord, SiteReferenceRecord
+from service.store.tracks import WindowBounds
 
 PoseState = Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
 
@@ -73,7 +76,17 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     if estimate is not None and estimate.reference_id != reference.id:
         estimate = None  # it was measured against a pose or a reference that no longer counts
     so_far = tracks_so_far(session, settings, reference)
+    window = maintenance.under_way(session, camera_id, datetime.now(UTC))
+    if (
+        estimate is not None
+        and window is None
+        and reference.ready_at is not None
+        and is_outdated(estimate, window_of(session, reference, settings))
+    ):
+        estimate = None  # it was put back, or somebody was at it: it may stand elsewhere
     state, reason = _state(session, settings, reference, estimate, so_far)
+    if window is not None:
+        reason = f"{_describe_window(window)}; {reason}"
     pose = pose_of_prior(prior_record)
     if estimate is not None:
         pose = replace(
@@ -153,6 +166,19 @@ def reset_reference(
     return view_pose(session, settings, camera_id)
 
 
+def _describe_window(window: MaintenanceRecord) -> str:
+    until = f"maintenance is under way until {window.to_at:%Y-%m-%d %H:%M}Z"
+    return f"{until} ({window.reason})" if window.reason else until
+
+
+def _what_was_last(reference: SiteReferenceRecord, bounds: WindowBounds) -> str:
+    put_back_s = (reference.window_from_s or 0.0) if reference.changed_s is None else 0.0
+    began_s = bounds.started_from_s or 0.0
+    if began_s > max(reference.from_s or 0.0, reference.to_s or 0.0, put_back_s):
+        return "maintenance"
+    return "camera was put back" if put_back_s else "reference"
+
+
 def _state(
     session: Session,
     settings: Settings,
@@ -164,9 +190,10 @@ def _state(
         wanted = wanted_tracks(reference, settings)
         return "learning", f"{so_far} of {wanted} reference tracks"
     if estimate is None or estimate.created_at < reference.ready_at:
-        since = tracks.count_window(session, window_of(reference, settings))
-        text = f"{since} tracks since the reference; at least {FEWEST_WALKERS} of people who walk "
-        text += "for a few seconds inside the image are needed"
+        bounds = window_of(session, reference, settings)
+        since = tracks.count_window(session, bounds)
+        text = f"{since} tracks since the {_what_was_last(reference, bounds)}; at least "
+        text += f"{FEWEST_WALKERS} of people who walk for a few seconds inside the image are needed"
         return "learning", "; ".join(part for part in (text, reference.doubt) if part)
     silent_h = (time.time() - (tracks.newest_end_s(session, reference.camera_id) or 0.0)) / 3600
     if silent_h > settings.no_data_after_h:
