@@ -1,10 +1,12 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
 import os
+from datetime import UTC, tzinfo
 from pathlib import Path
 from typing import Literal
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -30,7 +32,15 @@ class Settings(BaseSettings):
     window_days: float = Field(
         7.0, gt=0, description="age of the oldest of them, before the newest"
     )
-    no_data_after_h: float = Field(24.0, gt=0, description="hours without a track until no_data")
+    no_data_after_h: float = Field(
+        24.0, gt=0, description="hours without a track until no_data, whatever the rhythm"
+    )
+    no_data_min_s: float = Field(600.0, ge=0, description="shortest silence that is no_data")
+    false_no_data_per_year: float = Field(
+        1.0, gt=0, description="false no_data alerts of a camera in a year"
+    )
+    rhythm_days: int = Field(7, ge=1, description="days that a camera's rhythm is learned of first")
+    timezone: str = Field("UTC", description="IANA zone of the cameras: their hours and weekends")
 
     drift_sigmas: float = Field(4.0, gt=0, description="drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
@@ -59,6 +69,23 @@ class Settings(BaseSettings):
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
+
+    @field_validator("timezone")
+    @classmethod
+    def _zone_exists(cls, value: str) -> str:
+        if value != "UTC":
+            try:
+                ZoneInfo(value)
+            except (ZoneInfoNotFoundError, ValueError) as error:
+                raise ValueError(
+                    f"a zone such as Europe/Berlin is needed, got {value!r}"
+                ) from error
+        return value
+
+    @property
+    def zone(self) -> tzinfo:
+        """The cameras' zone; UTC needs no zone database."""
+        return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
 
     @property
     def database_path(self) -> Path:

@@ -29,7 +29,8 @@ MODEL_ROOMS = [
     {"estimation"},
     {"regression"},
     {"flow"},
-    {"drift", "evaluation"},
+    {"drift"},
+    {"evaluation"},
 ]
 TORCH_ROOMS = {"models/regression", "service/jobs", "service/centred.py"}
 

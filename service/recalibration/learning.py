@@ -30,7 +30,7 @@ from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
-from service.store import cameras, references, tracks, trainings
+from service.store import cameras, maintenance, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import FlowMapRecord, PredictionRecord
 
@@ -65,8 +65,11 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is not None:
         return None
+    now = datetime.now(UTC)
+    if maintenance.under_way(session, camera_id, now) is not None:
+        return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
-    attended = attendance_of(session, camera_id, datetime.now(UTC))
+    attended = attendance_of(session, camera_id, now)
     records = tracks.first(session, camera_id, reference.from_s, wanted, without=attended.spans)
     if len(records) < wanted:
         return None

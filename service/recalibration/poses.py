@@ -1,6 +1,5 @@
 """The served pose, from the store alone; its history; accepting it; going back to the prior."""
 
-import time
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from service.errors import ConflictError
 from service.job_queue import JobQueue
 from service.recalibration.alerts import close_pose_alerts
 from service.recalibration.cameras import renew_prior_pose, require_camera
+from service.recalibration.presence import silence_of
 from service.recalibration.references import (
     FEWEST_WALKERS,
     begin_reference,
@@ -195,12 +195,9 @@ def _state(
         text = f"{since} tracks since the {_what_was_last(reference, bounds)}; at least "
         text += f"{FEWEST_WALKERS} of people who walk for a few seconds inside the image are needed"
         return "learning", "; ".join(part for part in (text, reference.doubt) if part)
-    silent_h = (time.time() - (tracks.newest_end_s(session, reference.camera_id) or 0.0)) / 3600
-    if silent_h > settings.no_data_after_h:
-        return "no_data", (
-            f"the newest track ended {silent_h:.1f} h ago; "
-            f"up to {settings.no_data_after_h:g} h are waited for"
-        )
+    silence = silence_of(session, settings, reference.camera_id, datetime.now(UTC))
+    if silence is not None and silence.no_data:
+        return "no_data", silence.reason
     states: dict[str, PoseState] = {
         "learning": "learning",
         "drifting": "drifting",

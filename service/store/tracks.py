@@ -78,6 +78,28 @@ def newest_received_at(session: Session, camera_id: str) -> datetime | None:
     )
 
 
+def arrivals(
+    session: Session, camera_id: str, received_after: datetime
+) -> Sequence[tuple[datetime, float]]:
+    """When tracks were stored and when they had ended, of those stored after a time."""
+    rows = session.execute(
+        select(TrackRecord.received_at, TrackRecord.ended_s).where(
+            TrackRecord.camera_id == camera_id, TrackRecord.received_at > received_after
+        )
+    )
+    return [(received_at, ended_s) for received_at, ended_s in rows]
+
+
+def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
+    """How many tracks ended from one time to another."""
+    query = select(func.count()).where(
+        TrackRecord.camera_id == camera_id,
+        TrackRecord.ended_s >= from_s,
+        TrackRecord.ended_s <= to_s,
+    )
+    return session.scalar(query) or 0
+
+
 def newest_source(session: Session, camera_id: str) -> str | None:
     """The source of the newest track."""
     return session.scalar(_newest_source(camera_id))

@@ -235,3 +235,14 @@ def test_cameras_that_alarm_at_the_same_moment_make_one_group(town):
     assert len(town.alerts(state="firing")) == 9
     assert town.group()["camera_ids"] == [f"c{n}" for n in range(8)]
     assert sum(camera is None for camera, _ in town.told()) == 1
+
+
+def test_cameras_that_fall_silent_together_are_one_alert_of_their_own_kind(town):
+    town.build(4)
+    town.moves(3)
+    for n in range(3):
+        town.moves(n, kind="no_data")
+    group = town.group()
+    assert (group["kind"], group["camera_ids"]) == ("no_data", ["c0", "c1", "c2"])
+    assert "fell silent together" in group["reason"]
+    assert town.alerts(camera_id="c3")[0]["group_id"] is None

@@ -150,6 +150,10 @@ def test_nor_in_a_reference_that_is_being_learned(corner, settings, bench):
     with bench.store.read() as session:
         assert take_period(session, few, "corner") is None
     put(bench.http, 12, 4, ago_h=0.3)
+    now = begin(bench.http)
+    with bench.store.read() as session:
+        assert take_period(session, few, "corner") is None  # not while somebody is there
+    bench.http.patch(f"{URL}/{now['id']}", json={"from": at(0.1), "to": at(0.05)})
     with bench.store.read() as session:
         period = take_period(session, few, "corner")
         assert len(period.trajectories) == 10
