@@ -61,7 +61,8 @@ def open_window(
     )
     session.add(record)
     session.flush()
-    if not any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS):
+    open_ = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
+    if from_at <= now and not open_:
         forget_streak(session, camera_id)  # an open alert ends by its own rules
     request_estimate(session, queue, camera_id)
     return record

@@ -93,6 +93,15 @@ def test_no_alert_opens_while_it_lasts_and_the_pose_says_why(bench):
     assert body["state"] == "ok"  # as the last estimate had it
 
 
+def test_a_window_that_is_planned_changes_nothing_yet(bench):
+    for _ in range(2):
+        bench.see(moved(tilt_deg=5.0))
+    begin(bench.http, from_h=-1, to_h=-2)
+    assert bench.pose()["reason"].startswith("tilt")
+    assert bench.see(moved(tilt_deg=5.0)).state == "drifting"
+    assert len(bench.alerts(state="firing")) == 1
+
+
 def test_an_open_alert_is_told_neither_anew_nor_as_grown_until_it_is_over(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=1.5))
