@@ -19,11 +19,14 @@ from service.routes import (
     cameras,
     events,
     maintenance,
+    metrics,
     operation,
     poses,
     tracks,
     trainings,
+    webhooks,
 )
+from service.routes.instruments import InstrumentMiddleware, Instruments
 from service.routes.state import AppState
 from service.settings import Settings
 from service.store.database import Store
@@ -37,11 +40,17 @@ class LifespanState(TypedDict):
 
 def create_app(settings: Settings) -> FastAPI:
     """The application over a migrated data directory; nothing connects before it starts."""
+    instruments = Instruments()
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[LifespanState]:
         store = Store(settings)
-        state = AppState(settings=settings, store=store, queue=JobQueue(store.engine))
+        state = AppState(
+            settings=settings,
+            store=store,
+            queue=JobQueue(store.engine),
+            instruments=instruments,
+        )
         yield {"app": state}
         state.stopping.set()
         state.queue.close()
@@ -53,8 +62,20 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Tells when a fixed camera has moved, from the paths of people walking.",
         lifespan=lifespan,
     )
-    for module in (cameras, tracks, poses, trainings, alerts, maintenance, events, operation):
+    for module in (
+        cameras,
+        tracks,
+        poses,
+        trainings,
+        alerts,
+        maintenance,
+        webhooks,
+        events,
+        operation,
+        metrics,
+    ):
         app.include_router(module.router)
+    app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(CalibrationError, _calibration_error)
     app.add_exception_handler(RequestValidationError, _validation_error)

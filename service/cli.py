@@ -1,4 +1,4 @@
-"""The command line: serve, worker, migrate, replay, demo, evaluate, flow-study, centred."""
+"""The command line: serve, worker, migrate, replay, demo, evaluate and the other studies."""
 
 import math
 import sys
@@ -151,12 +151,31 @@ def evaluate(
     processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
     output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("evaluation.json"),
     plots: Annotated[Path | None, typer.Option(help="Folder for PNG plots.")] = None,
+    alarms: Annotated[
+        bool, typer.Option("--alarms", help="Still and delay instead: the drift chart's alarms.")
+    ] = False,
+    tracks_a_day: Annotated[
+        float, typer.Option(min=1, help="With --alarms: how many people a camera sees.")
+    ] = 200.0,
+    alarms_a_year: Annotated[
+        float, typer.Option(min=0.001, help="With --alarms: false ones allowed.")
+    ] = 1.0,
 ) -> None:
     """Knock the cameras of recorded scenes and measure every estimator: the protocol."""
     from models.errors import CalibrationError
+    from service.alarm_study import AlarmPlan, run_scene_alarms
     from service.evaluate import run_protocol
 
     try:
+        if alarms:
+            plan = AlarmPlan(
+                alarms_a_year=alarms_a_year,
+                tracks_a_day=tracks_a_day,
+                reference_tracks=0,
+                days=365,
+            )
+            run_scene_alarms(scenes, seeds=seeds, plan=plan, processes=processes, output=output)
+            return
         run_protocol(
             scenes,
             seeds=seeds,
@@ -182,6 +201,29 @@ def flow_study(
     from service.flow_study import run_flow_study
 
     run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
+
+
+@app.command()
+def alarm_study(
+    sites: Annotated[int, typer.Option(min=1, help="How many simulated cameras.")] = 60,
+    days: Annotated[int, typer.Option(min=7, help="How long each lives.")] = 365,
+    tracks_a_day: Annotated[float, typer.Option(min=1, help="People it sees.")] = 60.0,
+    reference_tracks: Annotated[int, typer.Option(min=20, help="Of its reference.")] = 200,
+    alarms_a_year: Annotated[float, typer.Option(min=0.001, help="False ones allowed.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
+    processes: Annotated[int, typer.Option(min=1, help="Cameras at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("alarm-study.json"),
+) -> None:
+    """Simulated camera-years of people's habits: false alarms, and tracks until true ones."""
+    from service.alarm_study import AlarmPlan, run_alarm_study
+
+    plan = AlarmPlan(
+        alarms_a_year=alarms_a_year,
+        tracks_a_day=tracks_a_day,
+        reference_tracks=reference_tracks,
+        days=days,
+    )
+    run_alarm_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
 
 
 @app.command()

@@ -17,7 +17,8 @@ APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, HOUSEKEEPING_QUEUE = "train", "estimate", "housekeeping"
-TRAIN_JOB, ESTIMATE_JOB = "train", "estimate"
+DELIVER_QUEUE = "deliver"
+TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 
 class JobQueue:
@@ -53,6 +54,18 @@ class JobQueue:
             camera_id,
         )
 
+    def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
+        """Queue the sending of what a webhook is due; at most one of a webhook runs at once."""
+        self._enqueue(
+            session,
+            {
+                "workflow_name": DELIVER_JOB,
+                "queue_name": DELIVER_QUEUE,
+                "queue_partition_key": webhook_id,
+            },
+            webhook_id,
+        )
+
     def close(self) -> None:
         """Let go of the engine's connections."""
         self._client.destroy()
@@ -60,6 +73,12 @@ class JobQueue:
     def _enqueue(self, session: Session, options: EnqueueOptions, *args: Any) -> None:
         options["app_version"] = JOBS_VERSION
         self._client.enqueue_in_transaction(session, options, *args)
+
+
+def queue_of(session: Session) -> JobQueue:
+    """The queue in a session's own database, where nobody handed one down."""
+    bind = session.get_bind()
+    return JobQueue(bind if isinstance(bind, Engine) else bind.engine)
 
 
 def migrate_engine_tables(settings: Settings) -> None:

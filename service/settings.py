@@ -2,6 +2,7 @@
 
 import os
 from datetime import UTC, tzinfo
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
@@ -42,7 +43,10 @@ class Settings(BaseSettings):
     rhythm_days: int = Field(7, ge=1, description="days that a camera's rhythm is learned of first")
     timezone: str = Field("UTC", description="IANA zone of the cameras: their hours and weekends")
 
-    drift_sigmas: float = Field(4.0, gt=0, description="drift must exceed so many sd")
+    false_alarms_per_year: float = Field(
+        1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
+    )
+    drift_sigmas: float = Field(6.0, gt=0, description="a told drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
     drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
@@ -67,6 +71,24 @@ class Settings(BaseSettings):
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
+    webhook_allow: str = Field(
+        "", description="CIDRs, with commas, of private addresses that webhooks may go to"
+    )
+    webhook_retry_s: str = Field(
+        "5,30,120,600,3600,10800,21600,43200",
+        description="seconds from a failed delivery to its next attempt; the last one repeats",
+    )
+    webhook_patience_h: float = Field(
+        72.0, gt=0, description="hours of failing that end a delivery, and disable its webhook"
+    )
+    alertmanager_refresh_s: float = Field(
+        60.0, ge=1, description="seconds between tellings of all that fires; it forgets"
+    )
+    keep_deliveries_days: float = Field(
+        30.0, gt=0, description="age at which ended deliveries are deleted"
+    )
+    public_url: str | None = Field(None, description="where people reach this service, for links")
+
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
@@ -86,6 +108,29 @@ class Settings(BaseSettings):
     def zone(self) -> tzinfo:
         """The cameras' zone; UTC needs no zone database."""
         return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
+
+    @field_validator("webhook_allow")
+    @classmethod
+    def _networks(cls, value: str) -> str:
+        _read_networks(value)
+        return value
+
+    @field_validator("webhook_retry_s")
+    @classmethod
+    def _delays(cls, value: str) -> str:
+        if not all(delay > 0 for delay in _read_numbers(value)):
+            raise ValueError(f"numbers above 0, with commas, are needed, got {value!r}")
+        return value
+
+    @property
+    def webhook_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
+        """Private networks that webhooks may go to."""
+        return _read_networks(self.webhook_allow)
+
+    @property
+    def webhook_delays_s(self) -> tuple[float, ...]:
+        """Seconds from each failed attempt to the next; the last one repeats."""
+        return _read_numbers(self.webhook_retry_s)
 
     @property
     def database_path(self) -> Path:
@@ -107,3 +152,11 @@ class Settings(BaseSettings):
         values = self.model_dump(mode="json", exclude_none=True)
         ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
+
+
+def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
+    return tuple(ip_network(part.strip()) for part in text.split(",") if part.strip())
+
+
+def _read_numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))

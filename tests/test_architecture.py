@@ -12,12 +12,12 @@ ROOT = Path(__file__).parent.parent
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue"},
+    {"formats", "store", "job_queue", "delivery"},
     {"migrate", "recalibration"},
     {"schemas", "jobs"},
     {"routes"},
-    {"app", "protocol_plots", "protocol_tables"},
-    {"serve", "replay", "evaluate", "flow_study", "centred"},
+    {"app", "protocol_plots", "protocol_tables", "alarm_tables"},
+    {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},
 ]

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "2026_11_21_alert_life"
-down_revision = "2026_11_21_flow_maps"
+down_revision = "2026_11_21_webhooks"
 branch_labels = None
 depends_on = None
 

@@ -2,6 +2,7 @@
 
 import math
 
+from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift
 from models.estimation.numbers import ANGLES, NUMBERS
 
@@ -10,6 +11,16 @@ _LEAST_LOG = math.log(1.08)
 _STILL_SIGMAS = 2.0
 _STILL_RAD = math.radians(1.0)
 _USUAL_RATE_HZ = 25.0
+_HEIGHT = 2
+_PARTIES_FOR_POSE = 24
+
+
+def may_be_clock(reading: Reading) -> bool:
+    """Whether what a chart says may be of the clock, and too few have said it for a pose to tell.
+
+    An alarm about a scale that waits for a few more people can be called what it is.
+    """
+    return reading.number in (_HEIGHT, CLOCK) and reading.parties < _PARTIES_FOR_POSE
 
 
 def clock_fault(drift: Drift, frame_rate_hz: float | None) -> str | None:

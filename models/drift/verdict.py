@@ -1,13 +1,17 @@
-"""A first drift test: estimate against prior pose, with a floor, a hold and hysteresis."""
+"""The verdict: by the chart at once, by the told pose after a hold; with hysteresis."""
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.drift.chart import Reading
 from models.estimation.numbers import WITH_HEADING
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
+
+# What a clock that is wrong looks like in a pose is a height.
+_CHARTED = (*WITH_HEADING, "height")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,8 +65,8 @@ class DriftLimits:
 class DriftVerdict:
     """`streak` is how many updates in a row were beyond the limits, negative how many below them.
 
-    `excess` is the largest drift in units of its limit: 1 and more is beyond. `drifted` names the
-    numbers that have been beyond since the drift began; empty where there is none.
+    `excess` is the largest told drift in units of its limit: 1 and more is beyond. `drifted` names
+    the numbers that have been beyond since the drift began; empty where there is none.
     """
 
     streak: int
@@ -124,31 +128,42 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
     )
 
 
-def judge(drift: Drift, limits: DriftLimits, streak: int, drifted: tuple[str, ...]) -> DriftVerdict:
+def judge(
+    drift: Drift,
+    limits: DriftLimits,
+    streak: int,
+    drifted: tuple[str, ...],
+    reading: Reading | None = None,
+) -> DriftVerdict:
     """The verdict of one more update, given the streak so far and what had drifted before.
 
-    Drifting begins after `updates` in a row beyond the limits and ends after as many below
-    `clear_ratio` of them; what lies between ends either streak. A number that the tracks cannot
-    tell is never beyond, and its drift does not end until it is told again. Where nothing is
-    told, nothing changes.
+    Drifting begins at once where the chart is beyond its level, and after `updates` in a row where
+    a told number is beyond its limit: the chart's level is of a rate of false alarms already, and
+    far moves, which the chart is not made for, are told by the pose. It ends after `updates` in
+    a row with both below `clear_ratio`; what lies between ends either streak. A number that the
+    tracks cannot tell is never beyond, and its drift does not end until it is told again or the
+    chart, which asks for all four, is calm. Where nothing is told, nothing changes.
     """
     ratios = {}
     for name in drift.told:
         value, sd = drift.of(name)
         ratios[name] = abs(value) / limits.of(name, sd)
-    if not ratios:
+    if not ratios and reading is None:
         return DriftVerdict(streak=streak, excess=0.0, drifted=drifted)
-    excess = max(ratios.values())
+    excess = max(ratios.values(), default=0.0)
     beyond = tuple(name for name, ratio in ratios.items() if ratio >= 1)
-    if beyond:
+    charted = (_CHARTED[reading.number],) if reading is not None and reading.moved else ()
+    calm = reading is None or reading.excess < limits.clear_ratio
+    told = set(drift.told) if reading is None else set(WITH_HEADING)
+    if beyond or charted:
         streak = max(streak, 0) + 1
-    elif excess < limits.clear_ratio and set(drifted) <= set(drift.told):
+    elif excess < limits.clear_ratio and calm and set(drifted) <= told:
         streak = min(streak, 0) - 1
     else:
         streak = 0
     if drifted:
         drifted = tuple(n for n in WITH_HEADING if n in drifted or n in beyond)
         drifted = () if streak <= -limits.updates else drifted
-    elif streak >= limits.updates:
-        drifted = beyond
+    elif charted or streak >= limits.updates:
+        drifted = beyond or charted
     return DriftVerdict(streak=streak, excess=excess, drifted=drifted)

@@ -1,17 +1,16 @@
 """How a map errs about people whom it does not know: each quarter of them against the others."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.flow.evidence import Walkers
 from models.flow.fit import party_fits
+from models.flow.folds import Fold
 from models.flow.move import REACH, parties_in_time, party_scores
-from models.flow.registration import Site, curvature_of
+from models.flow.registration import curvature_of
 from models.geometry.rotation import Array
-
-FOLDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,20 +31,15 @@ class CrossFit:
     fits: Array
 
 
-def cross_fit(folds: list[tuple[Site, Walkers, npt.NDArray[np.int64]]], at: Array) -> CrossFit:
-    """Ask each fold's walkers of the map of the others.
-
-    Args:
-        folds: the map, the walkers left out of it, and which tracks of all these are.
-        at: the known pose (4,).
-    """
-    scored = [party_scores(walkers, site, at) for site, walkers, _ in folds]
+def cross_fit(folds: Sequence[Fold], at: Array) -> CrossFit:
+    """Ask each fold's walkers of the map of the others, at the known pose (4,)."""
+    scored = [party_scores(fold.walkers, fold.site, at) for fold in folds]
     scores = np.concatenate([scores for scores, _ in scored])
     times = np.concatenate(
-        [tracks[last] for (_, last), (_, _, tracks) in zip(scored, folds, strict=True)]
+        [fold.asked[last] for (_, last), fold in zip(scored, folds, strict=True)]
     )
     order = np.argsort(times)
-    sums = [_party_sums(walkers, site.scores(walkers, at, at)) for site, walkers, _ in folds]
+    sums = [_party_sums(fold.walkers, fold.site.scores(fold.walkers, at, at)) for fold in folds]
     # A camera that has moved on sees people as one that stays would from a little back.
     bent = [
         (_mean_score(folds, at - step) - _mean_score(folds, at + step)) / (2 * reach)
@@ -54,18 +48,11 @@ def cross_fit(folds: list[tuple[Site, Walkers, npt.NDArray[np.int64]]], at: Arra
     return CrossFit(
         slopes=np.concatenate([own for own, _ in sums])[order],
         people=np.concatenate([people for _, people in sums])[order],
-        curvature=np.sum([curvature_of(walkers, site, at) for site, walkers, _ in folds], axis=0),
+        curvature=np.sum([curvature_of(fold.walkers, fold.site, at) for fold in folds], axis=0),
         scores=scores[order],
         bent=np.stack(bent, axis=1),
-        fits=np.concatenate([party_fits(walkers, site, at) for site, walkers, _ in folds]),
+        fits=np.concatenate([party_fits(fold.walkers, fold.site, at) for fold in folds]),
     )
-
-
-def dealt(walkers: Walkers, seed: int) -> npt.NDArray[np.int64]:
-    """The fold of each track: parties stay together, and are dealt out by chance."""
-    parties = np.unique(walkers.party_idx)
-    fold_of = np.random.default_rng(seed).permutation(parties.size) % FOLDS
-    return np.asarray(fold_of[np.searchsorted(parties, walkers.party_idx)])
 
 
 def _party_sums(walkers: Walkers, scores: Array) -> tuple[Array, Array]:
@@ -77,6 +64,6 @@ def _party_sums(walkers: Walkers, scores: Array) -> tuple[Array, Array]:
     return sums, size.astype(np.float64)
 
 
-def _mean_score(folds: list[tuple[Site, Walkers, npt.NDArray[np.int64]]], at: Array) -> Array:
-    found: list[Array] = [party_scores(walkers, site, at)[0] for site, walkers, _ in folds]
+def _mean_score(folds: Sequence[Fold], at: Array) -> Array:
+    found: list[Array] = [party_scores(fold.walkers, fold.site, at)[0] for fold in folds]
     return np.asarray(np.concatenate(found).mean(axis=0))

@@ -1,4 +1,4 @@
-"""The score test: whether, and which way, a camera has moved, long before a pose can say how far.
+"""Scores of parties by where they walk, and the first of them after a move within a window.
 
 At the pose where a camera is taken to be, each person's places and directions have a signed score
 along tilt, roll, log height and heading: how much likelier they were from a little further on. Of
@@ -47,23 +47,6 @@ class StillScores:
     def level(self, rate: float) -> float:
         """What the statistic passes in a share `rate` of windows of a still camera."""
         return value_below(rate / self.looks / 2, self.parties - 1) ** 2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Move:
-    """What the test says of a window: whether the camera has moved since a track, and which way.
-
-    `number` is 0 to 3 for tilt, roll, log height and heading, `sign` the way it went, and `parties`
-    how many say it; `statistic` is compared with `level`.
-    """
-
-    moved: bool
-    track_idx: int
-    number: int
-    sign: int
-    parties: int
-    statistic: float
-    level: float
 
 
 def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.NDArray[np.int64]]:
@@ -123,42 +106,6 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
         bent=bent,
         looks=max(_BODY / alone, 4.0),
         parties=float(count),
-    )
-
-
-def has_moved(
-    walkers: Walkers, site: Site, at: Array, still: StillScores, rate: float
-) -> Move | None:
-    """Whether a camera that was at a pose (4,) has left it; None of fewer than 8 parties.
-
-    Every number of newest parties is asked, from 8 to 300.
-
-    Args:
-        walkers: the people, their tracks in the order of time.
-        site: the map.
-        at: where registration ends while the camera is still: the prior pose and the offset.
-        still: what is usual.
-        rate: the share of windows of a still camera that may be called moved.
-    """
-    scores, tracks = party_scores(walkers, site, at)
-    scores, tracks = scores[-_MOST:], tracks[-_MOST:]
-    if len(scores) < _FEWEST:
-        return None
-    squares = still.squares(scores)
-    count, number = np.unravel_index(int(squares.argmax()), squares.shape)
-    parties = int(count) + _FEWEST
-    apart = (scores[-parties:] - still.mean).sum(axis=0)
-    toward = _directions(still.covariance, still.bent)[0][number] @ apart
-    level = still.level(rate)
-    statistic = float(squares.max())
-    return Move(
-        moved=statistic > level,
-        track_idx=int(tracks[-parties]),
-        number=int(number),
-        sign=1 if toward > 0 else -1,
-        parties=parties,
-        statistic=statistic,
-        level=level,
     )
 
 

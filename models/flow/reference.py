@@ -4,21 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.observations import Observations
 from models.estimation.numbers import numbers_of
-from models.flow.cross_fit import FOLDS, CrossFit, cross_fit, dealt
+from models.flow.cross_fit import CrossFit, cross_fit
 from models.flow.evidence import walkers_of
 from models.flow.fit import UsualFit, usual_fit
 from models.flow.flow_map import FlowMap
+from models.flow.folds import Folds, fold_maps
 from models.flow.move import StillScores, learn_scores
 from models.flow.registration import Peak, Site
-from models.flow.site_map import best_grain, mapped
+from models.flow.site_map import mapped
 from models.flow.view import Coverage
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-FEWEST_PARTIES = 12
 _GROUP = 6  # parties after one another
 _SURPRISE, _SURPRISE_WEIGHT = 1.3, 5.0  # the usual one, and how many groups it is worth
 _LEFT_NOISE = 0.5  # of the bias's, after what cancels
@@ -89,6 +89,7 @@ def learn_flow(
     prior: CameraPose,
     seed: int,
     weights: Array | None = None,
+    folds: Folds | None = None,
 ) -> FlowReference | None:
     """The flow of tracks at the prior pose; None where fewer than 12 parties walk.
 
@@ -102,33 +103,23 @@ def learn_flow(
         prior: where it stood.
         seed: of the quarters and of the bootstrap.
         weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
+        folds: of the same tracks and seed, where they have been made already.
     """
     at = candidate_of(prior)
-    walkers = walkers_of(observations, at)
-    if walkers.parties < FEWEST_PARTIES:
+    if folds is None:
+        folds = fold_maps(observations, intrinsics, at, seed, weights)
+    if folds is None:
         return None
-    weights = np.ones(observations.tracks) if weights is None else weights
-    fold_of = dealt(walkers, seed)
-    parts = []
-    for fold in range(FOLDS):
-        known, asked = (np.flatnonzero((fold_of == fold) == own) for own in (False, True))
-        left_out = walkers_of(of_tracks(observations, asked), at)
-        if left_out.people:
-            learned_of = walkers_of(of_tracks(observations, known), at)
-            parts.append((learned_of, weights[known], left_out, asked))
-    grain = best_grain([part[:3] for part in parts], intrinsics, at)
-    folds = [
-        (mapped(known, own_weights, intrinsics, at, grain), left_out, asked)
-        for known, own_weights, left_out, asked in parts
-    ]
-    crossed = cross_fit(folds, at)
+    crossed = cross_fit(folds.each, at)
     surprise, scatter = _scatter(crossed)
     parts_bent = float(np.trace(np.linalg.solve(scatter, crossed.curvature)))
     count = float(crossed.people.sum())
     # Each in the others' map and they in its: to first order, what noise does to the mean cancels.
     bias = crossed.slopes.sum(axis=0) / count
     unsure = _LEFT_NOISE * surprise * scatter / count**2
-    whole = mapped(walkers, weights, intrinsics, at, grain)
+    walkers = walkers_of(observations, at)
+    weights = np.ones(observations.tracks) if weights is None else weights
+    whole = mapped(walkers, weights, intrinsics, at, folds.grain)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
     return FlowReference(
         flow=whole.flow,

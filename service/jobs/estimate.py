@@ -61,9 +61,9 @@ def grow_if_due(context: JobContext, camera_id: str) -> None:
         period = take_growth(session, context.settings, camera_id)
     if period is None:
         return
-    data = grow(period, context.settings.seed)
+    learned = grow(period, context.settings.seed)
     with context.store.write() as session:
-        grown = keep_growth(session, camera_id, period, data)
+        grown = keep_growth(session, camera_id, period, learned)
     if grown:
         fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
         log.info("flow_map_grown", extra=fields)

@@ -3,7 +3,7 @@
 import logging
 
 from service.jobs.context import JobContext
-from service.recalibration import upkeep
+from service.recalibration import deliveries, upkeep
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -12,6 +12,10 @@ def run_reconcile(context: JobContext) -> None:
     """Enqueue what the store says should be under way; a lost nudge costs seconds."""
     with context.store.read() as session:
         ids = upkeep.camera_ids(session)
+        webhook_ids = deliveries.awaited(session, context.settings)
+    for webhook_id in webhook_ids:
+        with context.store.write() as session:
+            deliveries.reconcile_webhook(session, context.queue, webhook_id)
     for camera_id in ids:
         # One transaction a camera, so that posts never wait long for the write lock.
         with context.store.write() as session:
@@ -33,5 +37,6 @@ def run_retention(context: JobContext) -> None:
             log.info("tracks_deleted", extra={"camera_id": camera_id, "tracks": deleted})
     with context.store.write() as session:
         upkeep.forget_events(session, context.settings)
+        deliveries.forget_deliveries(session, context.settings)
         for path in upkeep.unused_weights(session, context.settings.weights_dir):
             path.unlink(missing_ok=True)

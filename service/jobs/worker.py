@@ -14,6 +14,8 @@ from dbos import DBOS
 from dbos._recovery import recover_pending_workflows  # private; pinned, see take_over
 
 from service.job_queue import (
+    DELIVER_JOB,
+    DELIVER_QUEUE,
     ESTIMATE_JOB,
     ESTIMATE_QUEUE,
     HOUSEKEEPING_QUEUE,
@@ -23,6 +25,7 @@ from service.job_queue import (
     engine_config,
 )
 from service.jobs.context import JobContext
+from service.jobs.deliver import run_deliver
 from service.jobs.estimate import run_estimate
 from service.jobs.housekeeping import run_reconcile, run_retention
 from service.jobs.rhythms import run_rhythms
@@ -37,6 +40,7 @@ _HEARTBEAT_S = 2.0
 _POLL_S = 0.2
 _KEEP_FINISHED = timedelta(hours=1)
 _ESTIMATES_AT_ONCE = 2
+_DELIVERIES_AT_ONCE = 16  # they wait for other machines most of the time
 
 
 class WorkerRunningError(RuntimeError):
@@ -90,6 +94,10 @@ def _launch(context: JobContext, name: str) -> None:
     def estimate(camera_id: str) -> None:
         _guarded(run_estimate, context, camera_id)
 
+    @DBOS.workflow(name=DELIVER_JOB)
+    def deliver(webhook_id: str) -> None:
+        _guarded(run_deliver, context, webhook_id)
+
     @DBOS.workflow(name="reconcile")
     def reconcile(at: datetime, _: Any) -> None:
         _guarded(run_reconcile, context)
@@ -114,6 +122,13 @@ def _launch(context: JobContext, name: str) -> None:
         ESTIMATE_QUEUE,
         partition_concurrency=1,
         worker_concurrency=_ESTIMATES_AT_ONCE,
+        polling_interval_sec=_POLL_S,
+        on_conflict="always_update",
+    )
+    DBOS.register_queue(
+        DELIVER_QUEUE,
+        partition_concurrency=1,
+        worker_concurrency=_DELIVERIES_AT_ONCE,
         polling_interval_sec=_POLL_S,
         on_conflict="always_update",
     )

@@ -9,12 +9,16 @@ from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
 from service.recalibration.groups import group_with
+from service.recalibration.outbox import json_time, queue_alert
 from service.recalibration.references import begin_window_anew
 from service.settings import Settings
 from service.store import acts, alerts, events, maintenance, tracks
 from service.store.alert_tables import AlertActRecord
 from service.store.alerts import AlertFilter
 from service.store.tables import AlertRecord
+
+# What an act of a person is told as.
+_CHANGES = {"acknowledged": "acknowledged", "silenced": "silenced", "silence_ended": "updated"}
 
 
 def open_alert(
@@ -40,14 +44,16 @@ def open_alert(
     if record is not None:
         if source == "reference":
             return record
-        told_anew = record.severity != severity or record.source != source
+        change = None
+        if record.severity != severity or record.source != source:
+            change = "updated"
         if (record.severity, severity) == ("warning", "critical"):
             _keep_act(session, record, "escalated", None)
         record.drift, record.severity, record.updated_at = drift, severity, now
         record.reason, record.source = reason, source
         record.changed_at = changed_at or record.changed_at
     else:
-        told_anew = True
+        change = "opened"
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
@@ -67,9 +73,9 @@ def open_alert(
         session.flush()
     group = group_with(session, settings, record)
     if group is not None:
-        _tell(session, group)
-    if told_anew:
-        _tell(session, record)
+        _tell(session, group, "opened")
+    if change is not None:
+        _tell(session, record, change)
     return record
 
 
@@ -185,7 +191,7 @@ def note_act(
     """Keep what was done with an open alert, and tell of it."""
     record.updated_at = datetime.now(UTC)
     _keep_act(session, record, act, by, until=until, note=note)
-    _tell(session, record)
+    _tell(session, record, _CHANGES[act])
 
 
 def _resolve(
@@ -207,7 +213,7 @@ def _end(
     record.resolved_at = record.updated_at = now
     _keep_act(session, record, "resolved", by, outcome=outcome, note=note)
     session.flush()
-    _tell(session, record)
+    _tell(session, record, "resolved")
     group = None if record.group_id is None else alerts.find(session, record.group_id)
     over = group is not None and not alerts.firing_members(session, group.id)
     if group is not None and group.state == "firing" and over:
@@ -236,7 +242,8 @@ def _keep_act(
     acts.add(session, kept)
 
 
-def _tell(session: Session, record: AlertRecord) -> None:
+def _tell(session: Session, record: AlertRecord, change: str) -> None:
+    """Tell of a change: opened, updated, acknowledged, silenced, resolved."""
     # A group speaks for its members; the end of one that was told by itself is told so, too.
     if record.group_id is not None and not (record.told and record.state == "resolved"):
         return
@@ -251,7 +258,7 @@ def _tell(session: Session, record: AlertRecord) -> None:
         "drift": record.drift,
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,
-        "silenced_until": _in_json(record.silenced_until),
+        "silenced_until": record.silenced_until and json_time(record.silenced_until),
         "silence_reason": record.silence_reason,
         "silenced_by": record.silenced_by,
         "track_source": record.track_source,
@@ -259,7 +266,4 @@ def _tell(session: Session, record: AlertRecord) -> None:
         "group_id": record.group_id,
     }
     events.add(session, "alert", payload, datetime.now(UTC))
-
-
-def _in_json(at: datetime | None) -> str | None:
-    return None if at is None else at.isoformat().replace("+00:00", "Z")
+    queue_alert(session, record, change)

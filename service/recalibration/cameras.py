@@ -10,13 +10,16 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError, NotFoundError, PreconditionFailedError
 from service.job_queue import JobQueue
-from service.recalibration.alerts import close_pose_alerts
+from service.recalibration.alerts import close_pose_alerts, end_alert, list_alerts
 from service.recalibration.references import begin_reference
 from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
+from service.store.alerts import AlertFilter
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import CameraRecord, PriorPoseRecord
+
+_MANY = 1000  # more alerts than a camera has kinds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +163,7 @@ def change_camera(
 
 
 def remove_camera(session: Session, camera_id: str, etag: str) -> None:
-    """Delete a camera with all that is stored of it.
+    """Delete a camera with all that is stored of it; who was told of its alerts is told their end.
 
     Raises:
         NotFoundError: there is none of that id.
@@ -168,6 +171,8 @@ def remove_camera(session: Session, camera_id: str, etag: str) -> None:
     """
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
+    for alert in list_alerts(session, AlertFilter(state="firing", camera_id=camera_id), _MANY):
+        end_alert(session, camera_id, alert.kind, "camera_removed")
     session.delete(view.record)
 
 

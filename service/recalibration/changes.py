@@ -10,16 +10,14 @@ from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference
 from models.flow.evidence import walkers_of
-from models.flow.move import Move, has_moved, moved_within
+from models.flow.move import moved_within
 from models.flow.reference import FlowReference, candidate_of
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.recalibration.references import FEWEST_WALKERS
 
-# Of windows of a still camera: so many are cut where nothing happened, so many called moved.
-_CUT_RATE = 1e-6
-_SUSPICION_RATE = 1e-4
+_CUT_RATE = 1e-6  # of windows of a still camera are cut where nothing happened
 
 
 def change_among(
@@ -55,16 +53,6 @@ def change_among(
         if parts is not None:
             return turned, parts[1], joint_estimate(parts[1], prior, site)
     return None, observations, joint_estimate(observations, prior, site)
-
-
-def suspicion(
-    observations: Observations, intrinsics: Intrinsics, prior: CameraPose, flow: FlowReference
-) -> Move | None:
-    """What the newest people say by where they walk, if they say that the camera has moved."""
-    at = candidate_of(prior)
-    walkers = walkers_of(observations, at)
-    move = has_moved(walkers, flow.site(intrinsics), at, flow.still, _SUSPICION_RATE)
-    return move if move is not None and move.moved else None
 
 
 def _parted(

@@ -6,7 +6,8 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.drift.clock import clock_fault
+from models.drift.chart import CLOCK
+from models.drift.clock import clock_fault, may_be_clock
 from models.drift.verdict import (
     Drift,
     DriftLimits,
@@ -22,7 +23,7 @@ from service.recalibration.alerts import end_alert, fired_by_estimate, open_aler
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import made_against
-from service.recalibration.words import FIELDS, describe_drift, describe_move, shown
+from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
 from service.store.tables import EstimateRecord, SiteReferenceRecord
@@ -89,12 +90,15 @@ def _judge(
     if drifted and not firing & {"drift", "clock"}:
         streak, drifted = 0, ()  # a person resolved the alert: it has to earn its updates anew
     limits = drift_limits(settings)
-    verdict = judge(drift, limits, streak, drifted)
-    record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
-    record.drift_since = _since(reference, verdict, since, finding, first=last is None)
     camera = cameras.find(session, camera_id)
     assert camera is not None
     clock = clock_fault(drift, camera.frame_rate_hz)
+    reading = finding.reading
+    if reading is not None and clock is None and not drifted and may_be_clock(reading):
+        reading = None
+    verdict = judge(drift, limits, streak, drifted, reading)
+    record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
+    record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
     edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
     record.state = "ok" if drift.told else "learning"
     if verdict.drifting:
@@ -108,14 +112,17 @@ def _judge(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
         words.append(f"{edge}; a training around the new estimate {training}")
-    if finding.move is not None:
-        words.append(describe_move(finding.move))
+    if finding.reading is not None:
+        words.append(describe_reading(finding.reading))
     words.append(finding.fused.reason)
     if not set(NUMBERS) <= set(drift.told):
         words.append(finding.joint.reason)
     words.append(reference.doubt)
     record.reason = "; ".join(word for word in words if word)
-    _alert(session, settings, record, drift, verdict, clock=clock, edge=edge)
+    charted = reading is not None and reading.moved
+    if charted and clock is None and reading is not None and reading.number == CLOCK:
+        clock = describe_reading(reading)
+    _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 
 
 def _alert(
@@ -125,6 +132,7 @@ def _alert(
     drift: Drift,
     verdict: DriftVerdict,
     *,
+    charted: bool,
     clock: str | None,
     edge: str | None,
 ) -> None:
@@ -147,7 +155,7 @@ def _alert(
     kind, other = ("clock", "drift") if is_clock else ("drift", "clock")
     if other in firing:
         end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
-    if drift.told:
+    if drift.told or charted:
         reason = clock or record.reason
         open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)
 
@@ -156,6 +164,7 @@ def _since(
     reference: SiteReferenceRecord,
     verdict: DriftVerdict,
     since: datetime | None,
+    evidence: Evidence,
     finding: Finding,
     *,
     first: bool,
@@ -164,6 +173,9 @@ def _since(
     if verdict.streak > 0:
         if reference.changed_s is not None:
             return datetime.fromtimestamp(reference.changed_s, UTC)
+        reading = finding.reading
+        if since is None and reading is not None and reading.moved:
+            return datetime.fromtimestamp(evidence.tracks[reading.track_idx].started_s, UTC)
         # One pose since the reference, and never another one: it had moved before all of them.
         ended_s = finding.tracks[0 if first else -1].ended_s
         return since or datetime.fromtimestamp(ended_s, UTC)
@@ -198,7 +210,7 @@ def _record(
         drift_roll_rad=drift.roll_rad,
         drift_heading_rad=drift.heading_rad,
         drift_angle_rad=drift.angle_rad,
-        suspected=finding.move is not None,
+        suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=0,
         drifted=[],
         drift_since=None,

@@ -1,11 +1,14 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from sqlalchemy.orm import Session
 
+from models.drift.chart import RUN, DriftChart, Reading, read_chart
+from models.drift.chart_packing import chart_from_bytes
+from models.drift.party_scores import Usual, score_parties
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -13,21 +16,21 @@ from models.estimation.averaged import (
     averaged_estimate,
 )
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
-from models.estimation.joint.observations import observe
+from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import assumed_reference
 from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
-from models.flow.move import Move
 from models.flow.packing import flow_from_bytes
+from models.flow.reference import FlowReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
-from service.recalibration.changes import change_among, suspicion
+from service.recalibration.changes import change_among
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.settings import Settings
-from service.store import cameras, estimates, flow_maps, references, tracks, trainings
+from service.store import alerts, cameras, estimates, flow_maps, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import (
     CameraRecord,
@@ -40,9 +43,10 @@ from service.store.tables import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenTrack:
-    """A track of the window."""
+    """A track of the window. `unanswered`: it came after the last alert was put right."""
 
     pk: int
+    unanswered: bool
     started_s: float
     ended_s: float
     trajectory: Trajectory
@@ -52,18 +56,22 @@ class SeenTrack:
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
-    `site` is the learned reference as bytes; None while it is being learned. So is `flow`; None
-    where there is no map. `predictions` has what the model in use says of the tracks.
+    `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
+    `chart`; None where there is none. `predictions` has what the model in use says of the tracks.
+    `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     """
 
     camera_id: str
     reference_id: int
     site: bytes | None
     flow: bytes | None
+    chart: bytes | None
     intrinsics: Intrinsics
     prior: CameraPose
     walk: WalkConfig
     tracks: tuple[SeenTrack, ...]
+    tracks_a_year: float
+    alarms_a_year: float
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
 
@@ -73,15 +81,15 @@ class Finding:
     """What the evidence comes to. `tracks` are those after the `change`, where one was found.
 
     `fused` is to be served; `registered` (4,) is that before the map's offset is taken off, None
-    where no map had a part. `move` is what the newest tracks say by where people walk, long before
-    a pose can say how far, if that is that the camera has moved.
+    where no map had a part. `reading` is what the drift chart says of all the tracks, those before
+    the change too, long before a pose can say how far; None where there is no chart.
     """
 
     joint: JointEstimate
     fused: FusedEstimate
     registered: Array | None
     averaged: PoseEstimate | None
-    move: Move | None
+    reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
 
@@ -102,6 +110,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
     intrinsics = intrinsics_of(camera)
+    answered_at = alerts.answered_at(session, camera_id)
     kept = flow_maps.find(session, reference.id)
     predictions: Sequence[PredictionRecord] = []
     if model is not None:
@@ -112,18 +121,22 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
         reference_id=reference.id,
         site=reference.data,
         flow=None if kept is None else kept.data,
+        chart=None if kept is None else kept.chart,
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         walk=walk_of(camera),
         tracks=tuple(
             SeenTrack(
                 pk=record.id,
+                unanswered=answered_at is None or record.received_at > answered_at,
                 started_s=record.started_s,
                 ended_s=record.ended_s,
                 trajectory=seen_of(record, intrinsics),
             )
             for record in records
         ),
+        tracks_a_year=tracks.a_year(session, camera_id),
+        alarms_a_year=settings.false_alarms_per_year,
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
     )
@@ -135,7 +148,8 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     if observations.walkers < FEWEST_WALKERS:
         return None
     lens, prior = evidence.intrinsics, evidence.prior
-    seen, change, registered, move = evidence.tracks, None, None, None
+    seen, change, registered = evidence.tracks, None, None
+    reading = None
     if evidence.site is None:
         joint = joint_estimate(
             observations, prior, assumed_reference(observations, prior, evidence.walk)
@@ -144,6 +158,8 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     else:
         site = reference_from_bytes(evidence.site)
         flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
+        if flow is not None and evidence.chart is not None:
+            reading = _read(evidence, observations, flow, chart_from_bytes(evidence.chart))
         ends_s = np.array([track.ended_s for track in seen])
         found, observations, joint = change_among(observations, ends_s, lens, prior, site, flow)
         if found is not None:
@@ -154,7 +170,6 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         else:
             fused = fused_estimate(observations, lens, prior, joint, flow)
             registered = fused.raw
-            move = suspicion(observations, lens, prior, flow)
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
@@ -165,10 +180,27 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         fused=fused,
         registered=registered,
         averaged=averaged,
-        move=move,
+        reading=reading,
         tracks=seen,
         change=change,
     )
+
+
+def _read(
+    evidence: Evidence, observations: Observations, flow: FlowReference, chart: DriftChart
+) -> Reading | None:
+    """What the chart says, at the level that the allowed alarms come to.
+
+    Once a person has said that the camera is where it should be, it begins anew.
+    """
+    asked = np.flatnonzero([track.unanswered for track in evidence.tracks])
+    if not asked.size:
+        return None
+    usual = Usual(prior=evidence.prior, paces=chart.paces, paths=flow.site(evidence.intrinsics))
+    scores = score_parties(of_tracks(observations, asked), usual)
+    parties_a_year = evidence.tracks_a_year * max(scores.last.size, 1) / asked.size
+    reading = read_chart(chart, scores, RUN * evidence.alarms_a_year / parties_a_year)
+    return reading and replace(reading, track_idx=int(asked[reading.track_idx]))
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

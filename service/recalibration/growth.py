@@ -8,13 +8,13 @@ from sqlalchemy.orm import Session
 
 from models.drift.change_point import FEWEST_BESIDE
 from models.estimation.joint.observations import observe
-from models.flow.packing import flow_to_bytes
-from models.flow.reference import learn_flow
+from models.estimation.joint.packing import reference_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.trajectory import Trajectory
 from service.recalibration.attendance import Attendance, attendance_of
+from service.recalibration.paths import LearnedPaths, learn_paths
 from service.recalibration.references import is_outdated, made_against, window_of
 from service.recalibration.stillness import Doubt, doubts, still_bounds
 from service.settings import Settings
@@ -36,6 +36,7 @@ class GrowthPeriod:
     """
 
     reference_id: int
+    site: bytes
     intrinsics: Intrinsics
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
@@ -57,6 +58,7 @@ def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthP
     if _in_doubt(session, settings, reference, kept, past):
         return None
     assert reference.to_s is not None
+    assert reference.data is not None
     attended = attendance_of(session, camera_id, datetime.now(UTC))
     bounds = still_bounds(settings, reference, past, attended)
     spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
@@ -76,6 +78,7 @@ def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthP
     intrinsics = intrinsics_of(camera)
     return GrowthPeriod(
         reference_id=reference.id,
+        site=reference.data,
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         trajectories=tuple(seen_of(record, intrinsics) for record in records),
@@ -87,16 +90,27 @@ def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthP
     )
 
 
-def grow(period: GrowthPeriod, seed: int) -> bytes | None:
-    """The map of a period; None where too few of its tracks walk. Seconds of a core at the most."""
+def grow(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
+    """The map and the chart of a period; None where too few of its tracks walk.
+
+    Some 10 seconds of a core at the most.
+    """
     if not period.trajectories:
         return None
     observations = observe(period.trajectories, period.intrinsics)
-    flow = learn_flow(observations, period.intrinsics, period.prior, seed, period.weights)
-    return None if flow is None else flow_to_bytes(flow)
+    return learn_paths(
+        observations,
+        period.intrinsics,
+        period.prior,
+        reference_from_bytes(period.site),
+        seed,
+        period.weights,
+    )
 
 
-def keep_growth(session: Session, camera_id: str, period: GrowthPeriod, data: bytes | None) -> bool:
+def keep_growth(
+    session: Session, camera_id: str, period: GrowthPeriod, learned: LearnedPaths | None
+) -> bool:
     """Put a grown map in its predecessor's place, unless either has been replaced meanwhile."""
     reference = references.newest_if_any(session, camera_id)
     if reference is None or reference.id != period.reference_id:
@@ -104,11 +118,12 @@ def keep_growth(session: Session, camera_id: str, period: GrowthPeriod, data: by
     kept = flow_maps.find(session, reference.id)
     if (None if kept is None else kept.learned_at) != period.replaces:
         return False
-    if data is None and kept is not None and kept.data is not None and not period.spoilt:
+    if learned is None and kept is not None and kept.data is not None and not period.spoilt:
         return False
     grown = FlowMapRecord(
         reference_id=reference.id,
-        data=data,
+        data=None if learned is None else learned.flow,
+        chart=None if learned is None else learned.chart,
         tracks=len(period.trajectories),
         weight=float(period.weights.sum()),
         to_s=period.to_s,

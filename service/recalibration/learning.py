@@ -19,8 +19,6 @@ from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_to_bytes
 from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
-from models.flow.packing import flow_to_bytes
-from models.flow.reference import learn_flow
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
@@ -28,6 +26,7 @@ from models.trajectory import Trajectory
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
+from service.recalibration.paths import LearnedPaths, learn_paths
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
 from service.store import cameras, maintenance, references, tracks, trainings
@@ -52,10 +51,10 @@ class ReferencePeriod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedReference:
-    """What a reference has come to; `flow` is its map as bytes, None where too few people walk."""
+    """What a reference has come to; `paths` are None where too few people walk."""
 
     site: SiteReference
-    flow: bytes | None
+    paths: LearnedPaths | None
     offsets: dict[str, Any]
 
 
@@ -100,10 +99,8 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
     if len(period.predictions) >= FEWEST_TRACKS:
         estimate = averaged_estimate(period.predictions, seed)
         offsets["averaged"] = _averaged_offset(estimate, period.prior)
-    flow = learn_flow(observations, period.intrinsics, period.prior, seed)
-    return LearnedReference(
-        site=site, flow=None if flow is None else flow_to_bytes(flow), offsets=offsets
-    )
+    paths = learn_paths(observations, period.intrinsics, period.prior, site, seed)
+    return LearnedReference(site=site, paths=paths, offsets=offsets)
 
 
 def keep_reference(
@@ -134,7 +131,8 @@ def keep_reference(
     session.add(
         FlowMapRecord(
             reference_id=record.id,
-            data=learned.flow,
+            data=None if learned.paths is None else learned.paths.flow,
+            chart=None if learned.paths is None else learned.paths.chart,
             tracks=record.tracks,
             weight=float(record.tracks),
             to_s=period.to_s,

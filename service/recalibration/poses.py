@@ -73,17 +73,9 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     reference = references.newest(session, camera_id)
     model = trainings.newest_model(session, camera_id)
     estimate = estimates.newest(session, camera_id)
-    if estimate is not None and estimate.reference_id != reference.id:
-        estimate = None  # it was measured against a pose or a reference that no longer counts
+    estimate = counting_estimate(session, settings, reference, estimate)
     so_far = tracks_so_far(session, settings, reference)
     window = maintenance.under_way(session, camera_id, datetime.now(UTC))
-    if (
-        estimate is not None
-        and window is None
-        and reference.ready_at is not None
-        and is_outdated(estimate, window_of(session, reference, settings))
-    ):
-        estimate = None  # it was put back, or somebody was at it: it may stand elsewhere
     state, reason = _state(session, settings, reference, estimate, so_far)
     if window is not None:
         reason = f"{_describe_window(window)}; {reason}"
@@ -204,3 +196,32 @@ def _state(
         "out_of_range": "out_of_range",
     }
     return states.get(estimate.state, "ok"), estimate.reason
+
+
+def state_of(
+    session: Session,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    estimate: EstimateRecord | None,
+) -> PoseState:
+    """A camera's state alone, of its newest reference and estimate: for who asks about many."""
+    counting = counting_estimate(session, settings, reference, estimate)
+    return _state(session, settings, reference, counting, 0)[0]
+
+
+def counting_estimate(
+    session: Session,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    estimate: EstimateRecord | None,
+) -> EstimateRecord | None:
+    """The newest estimate of a camera; None where it says nothing of how the camera stands now."""
+    if estimate is None or estimate.reference_id != reference.id:
+        return None  # it was measured against a pose or a reference that no longer counts
+    if reference.ready_at is None or not is_outdated(
+        estimate, window_of(session, reference, settings)
+    ):
+        return estimate
+    # It was put back, or somebody was at it and has gone: it may stand elsewhere.
+    attended = maintenance.under_way(session, reference.camera_id, datetime.now(UTC))
+    return None if attended is None else estimate

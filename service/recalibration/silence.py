@@ -41,11 +41,6 @@ def silence_alert(
     return record
 
 
-def is_silenced(record: AlertRecord, now: datetime) -> bool:
-    """Whether an alert is silenced at a time."""
-    return record.silenced_until is not None and record.silenced_until > now
-
-
 def end_silences(session: Session) -> None:
     """End silences that have come to their time; what is still open is told anew."""
     for record in alerts.silences_over(session, datetime.now(UTC)):

@@ -2,9 +2,9 @@
 
 import math
 
+from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
 from models.estimation.numbers import WITH_HEADING
-from models.flow.move import Move
 
 # The numbers of a pose as fields of JSON.
 FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
@@ -29,13 +29,18 @@ def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> 
     return f"{text}: not beyond {limit}"
 
 
-def describe_move(move: Move) -> str:
-    """Which way the score test says that a camera has moved."""
-    name = WITH_HEADING[move.number]
-    way = "up" if move.sign > 0 else "down"
+def describe_reading(reading: Reading) -> str:
+    """Which way the drift chart says that a camera has moved; empty where it says nothing."""
+    if not reading.suspicious:
+        return ""
+    if reading.number == CLOCK:
+        what = f"all times were too {'long' if reading.sign > 0 else 'short'}"
+    else:
+        way = "up" if reading.sign > 0 else "down"
+        what = f"the {WITH_HEADING[reading.number]} had gone {way}"
     return (
-        f"the last {move.parties} parties walk where they would if the {name} had gone {way} "
-        f"(score test: {move.statistic:.0f}, limit {move.level:.0f})"
+        f"the last {reading.parties} parties walk as they would if {what} "
+        f"(drift chart: {reading.statistic:.0f}, alarm at {reading.level:.0f})"
     )
 
 

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from service.errors import PreconditionRequiredError, TooLargeError
 from service.formats.track import MAX_BODY_BYTES
 from service.job_queue import JobQueue
+from service.routes.instruments import Instruments
 from service.settings import Settings
 from service.store.database import Store
 
@@ -22,6 +23,7 @@ class AppState:
     settings: Settings
     store: Store
     queue: JobQueue
+    instruments: Instruments = field(default_factory=Instruments)
     stopping: threading.Event = field(default_factory=threading.Event)
 
 

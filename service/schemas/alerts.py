@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from service.recalibration.silence import is_silenced
+from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Who
 from service.store.alert_tables import AlertActRecord
 from service.store.tables import AlertRecord

@@ -116,6 +116,20 @@ def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     ).all()
 
 
+def answered_at(session: Session, camera_id: str) -> datetime | None:
+    """When a person last said of an alert that the camera is where it should be."""
+    return session.scalar(
+        select(AlertRecord.resolved_at)
+        .where(
+            AlertRecord.camera_id == camera_id,
+            AlertRecord.kind.in_(POSE_KINDS),
+            AlertRecord.outcome.in_(("put_back", "false_alarm")),
+        )
+        .order_by(AlertRecord.resolved_at.desc())
+        .limit(1)
+    )
+
+
 def listed(
     session: Session, wanted: AlertFilter, now: datetime, limit: int
 ) -> Sequence[AlertRecord]:

@@ -145,8 +145,9 @@ class SiteReferenceRecord(Record):
 class FlowMapRecord(Record):
     """Where people walk at a reference's site (`models.flow`), learned of `tracks` tracks.
 
-    `data` is None where too few of them walk. `to_s` is when the last of them ended, `weight` what
-    they count for together, of whom older ones count less.
+    `data` is None where too few of them walk. `chart` is the drift chart (`models.drift`) that goes
+    with it. `to_s` is when the last of them ended, `weight` what they count for together, of whom
+    older ones count less.
     """
 
     __tablename__ = "flow_maps"
@@ -155,6 +156,7 @@ class FlowMapRecord(Record):
         ForeignKey("site_references.id", ondelete="CASCADE"), primary_key=True
     )
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    chart: Mapped[bytes | None] = mapped_column(LargeBinary)
     tracks: Mapped[int]
     weight: Mapped[float]
     to_s: Mapped[float]

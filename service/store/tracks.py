@@ -13,6 +13,8 @@ from service.store.tables import CameraRecord, PredictionRecord, TrackRecord
 
 Spans = tuple[tuple[float, float], ...]  # times, from and to
 
+_DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindowBounds:
@@ -195,6 +197,18 @@ def count_between(session: Session, camera_id: str, from_s: float, to_s: float) 
         TrackRecord.started_s < to_s,
     )
     return session.scalar(query) or 0
+
+
+def a_year(session: Session, camera_id: str) -> float:
+    """How many tracks a year come, by those of the newest four weeks; of a day at the least."""
+    newest = newest_end_s(session, camera_id) or 0.0
+    count, first = session.execute(
+        select(func.count(), func.min(TrackRecord.ended_s)).where(
+            TrackRecord.camera_id == camera_id, TrackRecord.ended_s >= newest - _RECENT_S
+        )
+    ).one()
+    span_s = max(newest - (first or newest), _DAY_S)
+    return max(float(count), 1.0) * _YEAR_S / span_s
 
 
 def newest(session: Session, camera_id: str, limit: int) -> Sequence[TrackRecord]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.drift.chart import Reading
 from models.drift.clock import clock_fault
 from models.drift.verdict import DriftLimits, drift_between, judge, pose_after
 from models.geometry.pose import CameraPose
@@ -119,6 +120,33 @@ def test_an_update_that_tells_nothing_changes_nothing():
     nothing = drift(5, weak=("tilt", "roll", "height"))
     assert verdicts([drift(5), nothing, drift(5), nothing, drift(5)]) == [False] * 4 + [True]
     assert verdicts([nothing] * 5, ("tilt",)) == [True] * 5
+
+
+def reading(statistic, number=3):
+    return Reading(
+        statistic=statistic,
+        level=10.0,
+        number=number,
+        sign=1,
+        parties=20,
+        track_idx=0,
+        suspicious=statistic > 5,
+    )
+
+
+def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
+    alarmed = judge(drift(), LIMITS, 0, (), reading(10.5))
+    assert (alarmed.drifted, alarmed.streak) == (("heading",), 1)
+    told = judge(drift(5), LIMITS, 0, (), reading(10.5))
+    assert told.drifted == ("tilt",)  # the pose says better which
+    assert not judge(drift(), LIMITS, 0, (), reading(9.5)).drifting
+    streak, drifted = alarmed.streak, alarmed.drifted
+    for statistic, drifting in ((7.5, True), (6.5, True), (6.5, True), (6.5, False)):
+        verdict = judge(drift(), LIMITS, streak, drifted, reading(statistic))
+        streak, drifted = verdict.streak, verdict.drifted
+        assert verdict.drifting == drifting
+    untold = drift(weak=THREE)
+    assert judge(untold, LIMITS, 0, (), reading(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():

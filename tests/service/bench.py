@@ -101,7 +101,7 @@ class Bench:
                 fused=fused,
                 registered=registered,
                 averaged=None,
-                move=None,
+                reading=None,
                 tracks=evidence.tracks,
                 change=None if change is None else evidence.tracks[change],
             )

@@ -9,6 +9,7 @@ from service.app import create_app
 from service.settings import Settings
 from tests.conftest import CAMERA
 from tests.service.bench import Bench
+from tests.service.post_room import PostRoom
 
 
 @pytest.fixture
@@ -38,3 +39,11 @@ def problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:
     document: dict[str, Any] = answer.json()
     assert (document["status"], document["code"]) == (status, code)
     return document
+
+
+@pytest.fixture
+def post_room(settings: Settings) -> Iterator[PostRoom]:
+    """The application with a camera, which may send to this machine itself."""
+    changed = settings.model_copy(update={"webhook_allow": "127.0.0.0/8"})
+    with TestClient(create_app(changed)) as client:
+        yield PostRoom(client, changed)

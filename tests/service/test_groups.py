@@ -4,14 +4,14 @@ import threading
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
 from service.recalibration import upkeep
 from service.recalibration.alerts import end_alert, open_alert
-from service.store import alerts, events
+from service.store import alerts, events, webhooks
 from service.store.database import Store
-from service.store.tables import AlertRecord, TrackRecord
+from service.store.tables import AlertRecord, CameraRecord, TrackRecord
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 
@@ -130,6 +130,22 @@ def test_another_incident_of_another_time_stays_by_itself_until_it_is_one(town):
     assert town.group()["camera_ids"] == [f"c{n}" for n in range(6)]  # one is open for a source
 
 
+def test_webhooks_hear_of_the_group_instead_of_its_members(town):
+    town.build(5)
+    hook = town.http.post("/webhooks", json={"url": "http://198.51.100.7/hook"}).json()
+    for n in range(5):
+        town.moves(n)
+    log = town.http.get(f"/webhooks/{hook['id']}/deliveries").json()["items"]
+    told = [town.http.get(f"/deliveries/{item['id']}").json() for item in log[::-1]]
+    bodies = [delivery["payload"]["data"] for delivery in told]
+    assert [body["camera_id"] for body in bodies] == ["c0", "c1", None]
+    assert bodies[2]["camera_ids"] == ["c0", "c1", "c2"]
+    with town.store.read() as session:
+        # What an Alertmanager is told again and again while it fires.
+        (audible,) = webhooks.audible(session, None, datetime.now(UTC))
+        assert audible.id == town.group()["id"]
+
+
 def test_it_ends_when_its_last_member_has(town):
     town.build(3)
     for n in range(3):
@@ -195,6 +211,16 @@ def test_one_whose_cameras_are_gone_ends(town):
         town.moves(n)
     for n in range(3):
         town.http.delete(f"/cameras/c{n}", headers={"If-Match": "*"}).raise_for_status()
+    (group,) = town.alerts()
+    assert (group["state"], group["outcome"]) == ("resolved", "camera_removed")
+
+
+def test_one_that_lost_its_members_is_ended_by_the_reconcile(town):
+    town.build(3)
+    for n in range(3):
+        town.moves(n)
+    with town.store.write() as session:
+        session.execute(delete(CameraRecord))  # as nobody does over HTTP
     with town.store.write() as session:
         upkeep.reconcile_alerts(session)
     (group,) = town.alerts()

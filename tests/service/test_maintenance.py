@@ -8,6 +8,7 @@ from service.recalibration import upkeep
 from service.recalibration.alerts import open_alert
 from service.recalibration.growth import keep_growth, take_growth
 from service.recalibration.learning import take_period
+from service.recalibration.paths import LearnedPaths
 from service.recalibration.references import window_of
 from service.store import maintenance, references, tracks
 from tests.conftest import track
@@ -192,7 +193,7 @@ def test_a_window_told_of_late_has_the_map_learned_without_it(bench):
     bench.see(PRIOR, people=20)
     with bench.store.write() as session:
         period = take_growth(session, grows, "corner")
-        assert keep_growth(session, "corner", period, b"a map")
+        assert keep_growth(session, "corner", period, LearnedPaths(flow=b"a map", chart=None))
         assert take_growth(session, grows, "corner") is None
     begin(bench.http, from_h=0.95, to_h=0.85)
     bench.clock_s = datetime.now(UTC).timestamp() - 600

@@ -42,7 +42,10 @@ def test_the_description_names_every_path(http):
         "/cameras/{camera_id}/pose/accept", "/cameras/{camera_id}/trainings",
         "/trainings/{training_id}", "/alerts", "/alerts/{alert_id}",
         "/alerts/{alert_id}/acknowledge", "/alerts/{alert_id}/resolve", "/events", "/healthz",
-        "/readyz",
+        "/readyz", "/metrics", "/webhooks", "/webhooks/{webhook_id}",
+        "/webhooks/{webhook_id}/secret", "/webhooks/{webhook_id}/test",
+        "/webhooks/{webhook_id}/deliveries", "/deliveries/{delivery_id}",
+        "/deliveries/{delivery_id}/replay",
     } <= set(paths)  # fmt: skip
     assert http.get("/docs").status_code == 200
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from datetime import datetime
 
 import pytest
 
@@ -42,18 +43,28 @@ def test_the_window_begins_where_the_camera_turned(street):
     assert street.look()["tracks"] >= body["tracks"] + 30
 
 
-def test_a_turn_is_said_before_it_is_an_alert_and_stops_the_map(street):
+def test_a_turn_is_an_alert_within_sixty_tracks_that_says_since_when_and_stops_the_map(street):
+    street.keep_to_lanes(PRIOR, 60)
+    assert (street.look()["state"], street.alerts()) == ("ok", [])
+    before_s = street.clock_s
     street.keep_to_lanes(turned(-6), 60)
     body = street.look()
-    assert "if the heading had gone down (score test" in body["reason"]
-    assert street.alerts(state="firing") == []
-    assert tracks_of_map(street) == WANTED
+    assert body["state"] == "drifting"
+    assert "if the heading had gone down (drift chart" in body["reason"]
+    (alert,) = street.alerts(state="firing")
+    assert alert["kind"] == "drift"
+    changed_s = datetime.fromisoformat(alert["changed_at"]).timestamp()
+    assert changed_s == pytest.approx(before_s, abs=12 * 5.0)  # a dozen people
+    street.keep_to_lanes(turned(-6), 30)
+    street.look()
+    assert [one["id"] for one in street.alerts()] == [alert["id"]]
+    assert tracks_of_map(street) == WANTED + 60
 
 
 def test_a_still_camera_is_not_suspected_and_its_map_grows(street):
     street.keep_to_lanes(PRIOR, 60)
     body = street.look()
-    assert "score test" not in body["reason"]
+    assert "drift chart" not in body["reason"]
     assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
     assert tracks_of_map(street) == WANTED + 60
 

@@ -131,6 +131,18 @@ def learn_reference(
     return replace(site, doubt=_doubt(observations, prior, blank, site))
 
 
+def relearned(observations: Observations, prior: CameraPose, site: SiteReference) -> SiteReference:
+    """A site whose fields are learned of other tracks at the prior pose, by the spread it has."""
+    blank = replace(
+        site,
+        speeds=assumed(site.speeds.field, site.speeds.spread),
+        statures=None
+        if site.statures is None
+        else assumed(site.statures.field, site.statures.spread),
+    )
+    return _learned(observations, prior, blank, 0)
+
+
 def _doubt(
     observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
 ) -> str:

@@ -1,0 +1,206 @@
+"""The control chart: a CUSUM over parties of people, held against what a knock would make of them.
+
+For each of a grid of knocks, of tilt, roll, log height and heading, both ways and in three sizes,
+and for times that are too long or too short, the chart knows how the mean score of parties would
+change: it has seen the reference's people as a camera knocked so would. The statistic is the
+largest log likelihood ratio of any knock against none, over the newest 8 to 400 parties: a
+two-sided CUSUM for each number and size (Page 1954) in Lorden's and Lai's window-limited form,
+which is the same for one size and keeps its meaning where the reference is itself unsure: its noise
+is in the ratio, so that no number of new people makes a reference's own error a drift.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.drift.party_scores import PartyScores
+from models.estimation.joint.site import SiteReference
+from models.geometry.rotation import Array
+
+FEWEST = 8  # parties that a move is told by
+LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
+CLOCK = 4  # the number of times that are too long
+# What a site's people may do of themselves for hours on end, as moves of the camera, and of its
+# clock: by day and night, in rain and crowds they walk elsewhere, and a few percent faster.
+HABITS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
+RUN = 1000  # parties; levels are of so many in a row
+_STRONGEST = 2.0  # times a knock of the grid, that it stands for
+_SUSPICION = 100.0  # times as many alarms
+_LEAST_LEVEL = 5.4  # of a run of endless normal parties that is wrong once in e runs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knocked:
+    """A knock of the grid: of tilt, roll, log height, heading or clock (0 to 4), and how far."""
+
+    number: int
+    size: float
+
+    @property
+    def step(self) -> Array:
+        """As a move (4,) of the camera."""
+        step = np.zeros(5)
+        step[self.number] = self.size
+        return step[:4]
+
+    @property
+    def stretch(self) -> float:
+        """By what times are too long."""
+        return float(np.exp(self.size)) if self.number == CLOCK else 1.0
+
+
+_ANGLES = tuple(float(np.radians(angle)) for angle in (1.0, 2.5, 6.0))
+# Of each number, the smallest first. 0.18 is 30 frames a second taken for 25.
+_SIZES = (_ANGLES, _ANGLES, (0.05, 0.12, 0.3), _ANGLES, (0.08, 0.18))
+KNOCKS = tuple(
+    Knocked(number=number, size=sign * size)
+    for number, sizes in enumerate(_SIZES)
+    for sign in (1, -1)
+    for size in sizes
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftChart:
+    """What parties' scores are like while a camera stands, and what each knock makes of them.
+
+    Scores are bounded around `middle` (14,) by five times their `width` (14,); of these, `mean`
+    (14,) and `covariance` (14, 14) are of the `parties` of the reference and `responses` (14, K)
+    are what is added to the mean by each knock of the grid. `typical` and `tail` say how high the
+    statistic gets in runs of 1000 parties: its median, and its mean excess over that. `paces` is
+    how people walk by the same tracks; a flow map of these goes with a chart.
+    """
+
+    paces: SiteReference
+    middle: Array
+    width: Array
+    mean: Array
+    covariance: Array
+    responses: Array
+    parties: float
+    typical: float
+    tail: float
+
+    def level(self, alarms_a_run: float) -> float:
+        """What the statistic passes so many times in a run of 1000 parties of a still camera."""
+        share = -np.expm1(-alarms_a_run)
+        learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
+        return max(learned, _LEAST_LEVEL - float(np.log(share))) * _unsure(
+            self.parties, len(self.mean)
+        )
+
+    def bounded(self, scores: Array) -> Array:
+        """Scores (..., 14) in units of their width, none farther from the middle than 5."""
+        return np.clip((scores - self.middle) / self.width, -5.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What a chart says of the newest parties.
+
+    `statistic` is compared with `level`. `number` is 0 to 4 as for a knock of the grid,
+    `sign` the way it seems to have gone, `parties` how many say so and `track_idx` the first track
+    of theirs. What is `suspicious` would be an alarm were a hundred times as many allowed.
+    """
+
+    statistic: float
+    level: float
+    number: int
+    sign: int
+    parties: int
+    track_idx: int
+    suspicious: bool
+
+    @property
+    def moved(self) -> bool:
+        """Whether it is beyond its level."""
+        return self.statistic > self.level
+
+    @property
+    def excess(self) -> float:
+        """The statistic in units of its level."""
+        return self.statistic / self.level
+
+
+def read_chart(chart: DriftChart, scores: PartyScores, alarms_a_run: float) -> Reading | None:
+    """What the chart says now; None of fewer than 8 parties."""
+    if len(scores.values) < FEWEST:
+        return None
+    newest = chart.bounded(scores.values[-int(LENGTHS[-1]) :])
+    path = trace(ratios_of(chart), newest - chart.mean)
+    knock = KNOCKS[int(path.knock_idx[-1])]
+    parties, statistic = int(path.parties[-1]), float(path.statistic[-1])
+    return Reading(
+        statistic=statistic,
+        level=chart.level(alarms_a_run),
+        number=knock.number,
+        sign=1 if knock.size > 0 else -1,
+        parties=parties,
+        track_idx=int(scores.last[-parties]),
+        suspicious=statistic > chart.level(_SUSPICION * alarms_a_run),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ratios:
+    """How means of parties are held against knocks: weights (L, 14, K) and strengths (L, K)."""
+
+    weights: Array
+    strengths: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """The statistic (T,) after each of parties, the knock and the parties that it is of (T,)."""
+
+    statistic: Array
+    knock_idx: npt.NDArray[np.int64]
+    parties: npt.NDArray[np.int64]
+
+
+def ratios_of(chart: DriftChart) -> Ratios:
+    """The weights of a chart for each number of newest parties."""
+    slopes = np.stack([_slope(chart, number) for number in range(len(_SIZES))], axis=1)
+    habits = (slopes * HABITS) @ (slopes * HABITS).T
+    weights, strengths = [], []
+    for length in LENGTHS:
+        noise = chart.covariance * (1 / length + 1 / chart.parties) + habits
+        weights.append(np.linalg.solve(noise, chart.responses))
+        strengths.append(np.einsum("fk,fk->k", chart.responses, weights[-1]))
+    return Ratios(weights=np.array(weights), strengths=np.maximum(strengths, 1e-12))
+
+
+def trace(ratios: Ratios, apart: Array) -> Trace:
+    """The statistic after each of parties, whose scores less the mean are `apart` (T, 14)."""
+    count = len(apart)
+    sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
+    statistic = np.full(count, -np.inf)
+    knock_idx, parties = np.zeros((2, count), dtype=np.int64)
+    for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
+        if length > count:
+            break
+        shown = (sums[length:] - sums[:-length]) @ weights / length
+        times = np.clip(shown / strengths, 1.0, _STRONGEST)
+        ratio = times * shown - times**2 * strengths / 2
+        best = ratio.argmax(axis=1)
+        value = ratio[np.arange(len(best)), best]
+        own = slice(length - 1, count)
+        higher = value > statistic[own]
+        statistic[own] = np.where(higher, value, statistic[own])
+        knock_idx[own] = np.where(higher, best, knock_idx[own])
+        parties[own] = np.where(higher, length, parties[own])
+    return Trace(statistic=statistic, knock_idx=knock_idx, parties=parties)
+
+
+def _slope(chart: DriftChart, number: int) -> Array:
+    """The response (14,) to a unit of a number, by its smallest knocks both ways."""
+    size = _SIZES[number][0]
+    on, back = (KNOCKS.index(Knocked(number=number, size=sign * size)) for sign in (1, -1))
+    return np.asarray((chart.responses[:, on] - chart.responses[:, back]) / (2 * size))
+
+
+def _unsure(parties: float, scores: int) -> float:
+    """By how much a covariance of so few parties makes ratios too large, on average."""
+    freedom = parties - 1
+    return float(min(freedom / max(freedom - scores - 1, freedom / 3), 3.0))

@@ -1,0 +1,162 @@
+"""Learn a camera's drift chart of tracks at its prior pose."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.drift.chart import (
+    FEWEST,
+    KNOCKS,
+    RUN,
+    DriftChart,
+    ratios_of,
+    trace,
+)
+from models.drift.party_scores import SCORES, Usual, scores_at
+from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.reference import relearned
+from models.estimation.joint.site import SiteReference
+from models.flow.folds import Fold, Folds
+from models.flow.move import parties_in_time
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+_ENOUGH = 400  # parties that the answers to knocks are learned of
+_RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
+_BLOCK = 3  # parties after one another that the bootstrap keeps together
+_RUNS = 100
+_LEAST_SHRUNK = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """Scores (P, 14) of parties left out, when each was last seen (P,), and seen after knocks."""
+
+    still: Array
+    times: npt.NDArray[np.int64]
+    knocked: Array | None
+
+
+def learn_chart(
+    observations: Observations,
+    prior: CameraPose,
+    site: SiteReference,
+    folds: Folds,
+    seed: int,
+) -> DriftChart | None:
+    """The chart of a site; None where fewer than 12 parties have scores.
+
+    Each quarter of the parties is scored by what the others say is usual, and again as a camera
+    that has been knocked would see them. How high the statistic gets by chance is learned by
+    bootstrap: what is taken for usual, the people that there really are, and runs of these in
+    blocks are all drawn anew.
+
+    Args:
+        observations: of the tracks, in the order of time.
+        prior: where the camera stood.
+        site: how people walk, learned of these or of other tracks.
+        folds: the quarters and the maps of the others.
+        seed: of the bootstrap.
+    """
+    asked: list[_Asked] = []
+    known = 0
+    for fold in folds.each:
+        asked.append(_asked(observations, prior, site, fold, answers=known < _ENOUGH))
+        known += len(asked[-1].still)
+    if known < FEWEST:
+        return None
+    order = np.argsort(np.concatenate([part.times for part in asked]), kind="stable")
+    scores = np.concatenate([part.still for part in asked])[order]
+    middle = np.median(scores, axis=0)
+    width = 1.4826 * np.median(np.abs(scores - middle), axis=0) + 1e-9
+    chart = DriftChart(
+        paces=relearned(observations, prior, site),
+        middle=middle,
+        width=width,
+        mean=np.zeros(SCORES),
+        covariance=np.eye(SCORES),
+        responses=np.zeros((SCORES, len(KNOCKS))),
+        parties=float(known),
+        typical=0.0,
+        tail=1.0,
+    )
+    bounded = chart.bounded(scores)
+    answered = [part for part in asked if part.knocked is not None]
+    before = chart.bounded(np.concatenate([part.still for part in answered]))
+    after = chart.bounded(
+        np.concatenate([part.knocked for part in answered if part.knocked is not None], axis=1)
+    )
+    chart = replace(
+        chart,
+        mean=bounded.mean(axis=0),
+        covariance=_covariance(bounded),
+        responses=(after.mean(axis=1) - before.mean(axis=0)).T,
+    )
+    highest = _highest(chart, bounded, np.random.default_rng(seed))
+    typical = float(np.median(highest))
+    return replace(
+        chart, typical=typical, tail=max(float(highest[highest > typical].mean() - typical), 1.0)
+    )
+
+
+def _asked(
+    observations: Observations,
+    prior: CameraPose,
+    site: SiteReference,
+    fold: Fold,
+    *,
+    answers: bool,
+) -> _Asked:
+    seen = of_tracks(observations, fold.asked)
+    paces = relearned(of_tracks(observations, fold.known), prior, site)
+    usual = Usual(prior=prior, paces=paces, paths=fold.site)
+    _, _, last = parties_in_time(fold.walkers)
+    knocked = None
+    if answers:
+        # A camera that has moved on sees people as one that stays would from a little back.
+        knocked = np.stack(
+            [scores_at(seen, fold.walkers, usual, -knock.step, knock.stretch) for knock in KNOCKS]
+        )
+    return _Asked(
+        still=scores_at(seen, fold.walkers, usual, np.zeros(4)),
+        times=fold.asked[last],
+        knocked=knocked,
+    )
+
+
+def _covariance(scores: Array) -> Array:
+    """The covariance (14, 14) of scores (P, 14), its correlations shrunk as few parties demand.
+
+    Source: Schäfer and Strimmer 2005, target "diagonal, unequal variance".
+    """
+    count = len(scores)
+    sd = scores.std(axis=0, ddof=1) + 1e-9
+    unit = (scores - scores.mean(axis=0)) / sd
+    products = np.einsum("pi,pj->pij", unit, unit)
+    correlation = products.sum(axis=0) / (count - 1)
+    variance = products.var(axis=0) * count**2 / (count - 1) ** 3
+    beside = ~np.eye(len(sd), dtype=bool)
+    shrunk = variance[beside].sum() / max(float((correlation[beside] ** 2).sum()), 1e-9)
+    shrunk = float(np.clip(shrunk, _LEAST_SHRUNK, 1.0))
+    own = (1 + _RIDGE) * np.eye(len(sd))
+    return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
+
+
+def _highest(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Array:
+    """The highest statistic of each of so many runs of a still camera."""
+    ratios = ratios_of(chart)
+    count = len(scores)
+    highest = np.empty(_RUNS)
+    for run in range(_RUNS):
+        taken_for_usual = scores[_blocks(rng, count, count)].mean(axis=0)
+        people = scores[_blocks(rng, count, count)]
+        walked = people[_blocks(rng, count, RUN)]
+        highest[run] = trace(ratios, walked - taken_for_usual).statistic.max()
+    return highest
+
+
+def _blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
+    """Indices (wanted,) of parties, some after one another at a time."""
+    starts = rng.integers(0, count, -(-wanted // _BLOCK))
+    return np.asarray(((starts[:, None] + np.arange(_BLOCK)).ravel() % count)[:wanted])

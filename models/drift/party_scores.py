@@ -1,0 +1,129 @@
+"""What a party of people says of small moves of a camera: by how they walk, and where.
+
+Each party has fourteen scores. Three are slopes of the joint estimator's likelihood along tilt,
+roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that it
+says little after a large move. Three more are the same without that: how far off a pace is, held
+within bounds. Eight are how much likelier their places and ways were a little further on than a
+little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
+these tells a move, and how well, is learned of the site (`chart_learning`). Source: `estimation.md`
+3.4 and 3.6.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.estimation.joint.fit import Learned, per_track
+from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
+from models.estimation.joint.observations import Observations, Steps
+from models.estimation.joint.site import SiteReference, channels_of
+from models.estimation.numbers import numbers_of
+from models.flow.evidence import Walkers, walkers_of
+from models.flow.move import REACH, parties_in_time
+from models.flow.reference import candidate_of
+from models.flow.registration import Site
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+SCORES = 14
+_STEPS = (1.0, 0.35)  # of the reach: a map smoothed by a metre, and its finer lines
+_FARTHEST = 0.5  # of a log: a pace that is further off says no more than this
+_PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and paces are weighed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usual:
+    """What is usual before a camera: how people walk, and where, seen from the prior pose."""
+
+    prior: CameraPose
+    paces: SiteReference
+    paths: Site
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartyScores:
+    """Scores (P, 14) of parties in the order of their last tracks (P,)."""
+
+    values: Array
+    last: npt.NDArray[np.int64]
+
+
+def score_parties(
+    observations: Observations, usual: Usual, walkers: Walkers | None = None
+) -> PartyScores:
+    """The scores of all parties among tracks that are in the order of time, at the prior pose."""
+    if walkers is None:
+        walkers = walkers_of(observations, candidate_of(usual.prior))
+    _, _, last = parties_in_time(walkers)
+    return PartyScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
+
+
+def scores_at(
+    observations: Observations,
+    walkers: Walkers,
+    usual: Usual,
+    beside: Array,
+    stretch: float = 1.0,
+) -> Array:
+    """Scores (P, 14) at a pose beside the prior: some tilt, roll, log height, heading (4,) on.
+
+    By a clock whose times are longer by a factor, everybody is as much slower.
+    """
+    at = candidate_of(usual.prior) + beside
+    people, party_of, last = parties_in_time(walkers)
+    if not last.size:
+        return np.zeros((0, SCORES))
+    numbers = numbers_of(usual.prior) + beside[:3]
+    observations = replace(observations, steps=_slowed(observations.steps, stretch))
+    walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
+    slopes = per_track(channels_of(observations, usual.paces, usual.prior), numbers).gradient
+    scores = np.concatenate(
+        [
+            -slopes,
+            _bounded(observations, walkers, usual, numbers),
+            *(_along_paths(walkers, usual.paths, at, step) for step in _STEPS),
+        ],
+        axis=1,
+    )
+    sums = np.zeros((last.size, SCORES))
+    np.add.at(sums, party_of, scores[people])
+    return np.asarray(sums / np.bincount(party_of)[:, None])
+
+
+def _slowed(steps: Steps, stretch: float) -> Steps:
+    return replace(steps, seconds=steps.seconds * stretch)
+
+
+def _bounded(observations: Observations, walkers: Walkers, usual: Usual, numbers: Array) -> Array:
+    """How far off paces are, and statures where boxes tell them, times what would mend it."""
+    heading, paces = usual.prior.heading_rad, usual.paces
+    speeds = measure_speeds(walkers.steps, numbers, heading)
+    scores = _off(speeds, paces.speeds, walkers.tracks) / _PACE_SD**2
+    if paces.statures is not None:
+        tops = measure_statures(observations.tops, numbers, heading)
+        scores = scores + _off(tops, paces.statures, walkers.tracks) / _STATURE_SD**2
+    return scores
+
+
+def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
+    """Mean (tracks, 3) of what is measured less what is usual, times its slopes by the pose."""
+    features = learned.field.features(measured)
+    residual = np.where(measured.valid, measured.value - features @ learned.mean, 0.0)
+    slopes = measured.d_value - learned.field.slopes(measured, features, learned.mean)
+    pull = -np.clip(residual, -_FARTHEST, _FARTHEST)[:, None] * slopes
+    sums = np.zeros((tracks, 3))
+    np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
+    number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)
+    return np.asarray(sums / np.maximum(number, 1)[:, None])
+
+
+def _along_paths(walkers: Walkers, paths: Site, at: Array, share: float) -> Array:
+    """How much likelier tracks (N, 4) are a step on than a step back, along each number."""
+    return np.stack(
+        [
+            paths.log_chances(walkers, at + step) - paths.log_chances(walkers, at - step)
+            for step in share * np.diag(REACH)
+        ],
+        axis=1,
+    )

@@ -1,0 +1,87 @@
+"""Quarters of a site's people, each beside a map of all the others: how a map errs is seen so."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.estimation.joint.observations import Observations, of_tracks
+from models.flow.evidence import Walkers, walkers_of
+from models.flow.flow_map import Grain
+from models.flow.registration import Site
+from models.flow.site_map import best_grain, mapped
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array
+
+FEWEST_PARTIES = 12
+_FOLDS = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fold:
+    """A map of the tracks `known`, and the walkers left out of it: they are the tracks `asked`."""
+
+    site: Site
+    walkers: Walkers
+    known: npt.NDArray[np.int64]
+    asked: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Folds:
+    """All quarters, and the grain of map that foretells people best."""
+
+    each: tuple[Fold, ...]
+    grain: Grain
+
+
+def fold_maps(
+    observations: Observations,
+    intrinsics: Intrinsics,
+    at: Array,
+    seed: int,
+    weights: Array | None = None,
+) -> Folds | None:
+    """A map of each three quarters of the parties; None where fewer than 12 parties walk.
+
+    Args:
+        observations: of the tracks.
+        intrinsics: of the camera.
+        at: the known pose (4,).
+        seed: of the quarters; parties stay together.
+        weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
+    """
+    walkers = walkers_of(observations, at)
+    if walkers.parties < FEWEST_PARTIES:
+        return None
+    weights = np.ones(observations.tracks) if weights is None else weights
+    fold_of = _dealt(walkers, seed)
+    parts = []
+    for fold in range(_FOLDS):
+        known, asked = (np.flatnonzero((fold_of == fold) == own) for own in (False, True))
+        left_out = walkers_of(of_tracks(observations, asked), at)
+        if left_out.people:
+            learned_of = walkers_of(of_tracks(observations, known), at)
+            parts.append((learned_of, left_out, known, asked))
+    grain = best_grain(
+        [(of, weights[known], left_out) for of, left_out, known, _ in parts], intrinsics, at
+    )
+    return Folds(
+        each=tuple(
+            Fold(
+                site=mapped(of, weights[known], intrinsics, at, grain),
+                walkers=left_out,
+                known=known,
+                asked=asked,
+            )
+            for of, left_out, known, asked in parts
+        ),
+        grain=grain,
+    )
+
+
+def _dealt(walkers: Walkers, seed: int) -> npt.NDArray[np.int64]:
+    """The fold of each track: parties stay together, and are dealt out by chance."""
+    parties = np.unique(walkers.party_idx)
+    fold_of = np.random.default_rng(seed).permutation(parties.size) % _FOLDS
+    return np.asarray(fold_of[np.searchsorted(parties, walkers.party_idx)])

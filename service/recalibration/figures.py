@@ -1,0 +1,121 @@
+"""The figures of a moment: what operators of the service watch, for metrics."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.recalibration.outbox import is_silenced
+from service.recalibration.poses import PoseState, counting_estimate, state_of
+from service.settings import Settings
+from service.store import cameras, events, figures, webhooks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraFigures:
+    """A camera: its state, its newest track, and those numbers of its drift that are told."""
+
+    camera_id: str
+    state: PoseState
+    last_track_s: float | None
+    drift_rad: dict[str, float]
+    drift_height_m: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertFigures:
+    """An alert that fires; `camera_id` is empty where it is of no one camera."""
+
+    camera_id: str
+    kind: str
+    severity: str
+    silenced: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WebhookFigures:
+    """A webhook: what waits for it, how long it has, and how long it has been failing."""
+
+    webhook_id: str
+    name: str
+    enabled: bool
+    pending: int
+    oldest_s: float
+    failing_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """Everything at one moment. Heartbeats are seconds since the Unix epoch."""
+
+    cameras: tuple[CameraFigures, ...]
+    alerts: tuple[AlertFigures, ...]
+    webhooks: tuple[WebhookFigures, ...]
+    trainings: dict[str, int]
+    heartbeats_s: dict[str, float]
+    queue_lag_s: float
+    events: int
+
+
+def take_figures(session: Session, settings: Settings) -> Figures:
+    """The figures now, by a handful of statements and a few lookups a camera."""
+    now = datetime.now(UTC)
+    due = cameras.longest_due(session)
+    beats = figures.heartbeats(session).items()
+    return Figures(
+        cameras=_cameras(session, settings),
+        alerts=tuple(
+            AlertFigures(
+                camera_id=alert.camera_id or "",
+                kind=alert.kind,
+                severity=alert.severity,
+                silenced=is_silenced(alert, now),
+            )
+            for alert in figures.firing(session)
+        ),
+        webhooks=_webhooks(session, now),
+        trainings=figures.trainings_by_state(session),
+        heartbeats_s={name: at.timestamp() for name, at in beats},
+        queue_lag_s=0.0 if due is None else max((now - due).total_seconds(), 0.0),
+        events=events.newest_id(session),
+    )
+
+
+def _cameras(session: Session, settings: Settings) -> tuple[CameraFigures, ...]:
+    references = figures.newest_references(session)
+    estimates = figures.newest_estimates(session)
+    found = []
+    for camera_id, last_track_s in figures.last_tracks_s(session).items():
+        reference, estimate = references[camera_id], estimates.get(camera_id)
+        estimate = counting_estimate(session, settings, reference, estimate)
+        told = [] if estimate is None else [name for name in estimate.told if name != "height"]
+        height = estimate is not None and "height" in estimate.told
+        found.append(
+            CameraFigures(
+                camera_id=camera_id,
+                state=state_of(session, settings, reference, estimate),
+                last_track_s=last_track_s,
+                drift_rad={name: getattr(estimate, f"drift_{name}_rad") for name in told},
+                drift_height_m=estimate.drift_height_m if estimate and height else None,
+            )
+        )
+    return tuple(found)
+
+
+def _webhooks(session: Session, now: datetime) -> tuple[WebhookFigures, ...]:
+    backlogs = figures.backlogs(session)
+    found = []
+    for record in webhooks.every(session):
+        backlog = backlogs.get(record.id)
+        failing = record.failing_since
+        found.append(
+            WebhookFigures(
+                webhook_id=record.id,
+                name=record.name,
+                enabled=record.enabled,
+                pending=0 if backlog is None else backlog.count,
+                oldest_s=0.0 if backlog is None else (now - backlog.oldest_at).total_seconds(),
+                failing_s=0.0 if failing is None else (now - failing).total_seconds(),
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,21 @@
+"""`GET /metrics`, for Prometheus."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Response
+from prometheus_client.exposition import choose_encoder
+
+from service.recalibration.figures import take_figures
+from service.routes.state import ReadDep, StateDep
+from service.schemas.metrics import FiguresCollector
+
+router = APIRouter(tags=["operation"])
+
+
+@router.get("/metrics", response_class=Response)
+def metrics(state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = "") -> Response:
+    """The figures now, as Prometheus text or OpenMetrics."""
+    encode, media_type = choose_encoder(accept)
+    figures = take_figures(session, state.settings)
+    text = encode(FiguresCollector(figures, state.instruments.registry))
+    return Response(text, media_type=media_type)

@@ -1,0 +1,127 @@
+"""`GET /metrics` in Prometheus' words: base units (seconds, radians, meters), one name a thing.
+
+There is no counter of alerts ever opened: alerts go with their camera, and a counter that falls is
+a lie. `surefoot_events_total` counts by ids that are never given twice.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from itertools import product
+from typing import Any, get_args
+
+from prometheus_client import Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
+from prometheus_client.registry import Collector
+
+from service.recalibration.figures import Figures
+from service.recalibration.poses import PoseState
+from service.schemas.webhooks import AlertKind
+
+_SEVERITIES = ("warning", "critical")
+_TRAINING_STATES = ("queued", "running", "succeeded", "failed", "cancelled")
+
+
+class FiguresCollector(Collector):
+    """The figures of a moment and what others collect, as metrics."""
+
+    def __init__(self, figures: Figures, *others: Collector) -> None:
+        self._figures = figures
+        self._others = others
+
+    def collect(self) -> Iterator[Metric]:
+        """All metrics."""
+        yield InfoMetricFamily("surefoot_build", "Version.", value={"version": version("surefoot")})
+        yield from _of_cameras(self._figures)
+        yield from _of_alerts(self._figures)
+        yield from _of_webhooks(self._figures)
+        yield from _of_service(self._figures)
+        for other in self._others:
+            yield from other.collect()
+
+
+def _of_cameras(figures: Figures) -> Iterator[Metric]:
+    states = get_args(PoseState)
+    count = Counter(camera.state for camera in figures.cameras)
+    yield _gauge(
+        "surefoot_cameras", "Cameras by state.", ["state"], {(s,): count[s] for s in states}
+    )
+    yield _gauge(
+        "surefoot_camera_state",
+        "1 for the state that a camera is in.",
+        ["camera_id", "state"],
+        {(c.camera_id, state): c.state == state for c in figures.cameras for state in states},
+    )
+    yield _gauge(
+        "surefoot_camera_last_track_timestamp_seconds",
+        "When the newest track of a camera ended, by the tracks' own clock.",
+        ["camera_id"],
+        {(c.camera_id,): c.last_track_s for c in figures.cameras if c.last_track_s is not None},
+    )
+    yield _gauge(
+        "surefoot_camera_drift_radians",
+        "Drift of tilt, roll or heading against the prior pose, where it is told.",
+        ["camera_id", "number"],
+        {(c.camera_id, n): value for c in figures.cameras for n, value in c.drift_rad.items()},
+    )
+    yield _gauge(
+        "surefoot_camera_drift_height_meters",
+        "Drift of the height against the prior pose, where it is told.",
+        ["camera_id"],
+        {(c.camera_id,): c.drift_height_m for c in figures.cameras if c.drift_height_m is not None},
+    )
+
+
+def _of_alerts(figures: Figures) -> Iterator[Metric]:
+    zeros = dict.fromkeys(product(get_args(AlertKind), _SEVERITIES), 0)
+    count = Counter((alert.kind, alert.severity) for alert in figures.alerts)
+    yield _gauge(
+        "surefoot_alerts_firing",
+        "Alerts that fire, silenced or not.",
+        ["kind", "severity"],
+        {**zeros, **count},
+    )
+    for name, text, silenced in (
+        ("surefoot_alert_firing", "1 for an alert that fires, silenced or not.", (True, False)),
+        ("surefoot_alert_silenced", "1 for an alert that fires and is silenced.", (True,)),
+    ):
+        found = {(a.camera_id, a.kind): 1 for a in figures.alerts if a.silenced in silenced}
+        yield _gauge(name, text, ["camera_id", "kind"], found)
+
+
+def _of_webhooks(figures: Figures) -> Iterator[Metric]:
+    for name, text, field in (
+        ("surefoot_webhook_enabled", "1 while messages are sent to a webhook.", "enabled"),
+        ("surefoot_webhook_failing_seconds", "Since its last success; 0: fine.", "failing_s"),
+        ("surefoot_deliveries_pending", "Messages that wait for a webhook.", "pending"),
+        ("surefoot_delivery_oldest_pending_seconds", "Age of the oldest of them.", "oldest_s"),
+    ):
+        found = {(w.webhook_id, w.name): getattr(w, field) for w in figures.webhooks}
+        yield _gauge(name, text, ["webhook_id", "webhook_name"], found)
+
+
+def _of_service(figures: Figures) -> Iterator[Metric]:
+    yield _gauge(
+        "surefoot_trainings",
+        "Trainings that are stored, by state.",
+        ["state"],
+        {(state,): figures.trainings.get(state, 0) for state in _TRAINING_STATES},
+    )
+    yield _gauge(
+        "surefoot_worker_last_heartbeat_timestamp_seconds",
+        "When a worker was last heard of.",
+        ["worker"],
+        {(name,): at_s for name, at_s in figures.heartbeats_s.items()},
+    )
+    lag = "How long the tracks of the camera that waits longest have waited."
+    yield GaugeMetricFamily("surefoot_queue_lag_seconds", lag, value=figures.queue_lag_s)
+    yield CounterMetricFamily("surefoot_events", "Events ever written.", value=figures.events)
+
+
+def _gauge(
+    name: str, text: str, labels: list[str], values: Mapping[Any, float]
+) -> GaugeMetricFamily:
+    family = GaugeMetricFamily(name, text, labels=labels)
+    for label_values, value in values.items():
+        family.add_metric(label_values, float(value))
+    return family

@@ -1,0 +1,137 @@
+"""Statements on webhooks, their deliveries and attempts."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import delete, exists, func, or_, select, update
+from sqlalchemy.orm import Session, aliased
+
+from service.store.delivery_tables import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.tables import AlertRecord
+
+
+def find(session: Session, webhook_id: str) -> WebhookRecord | None:
+    """The webhook, or None."""
+    return session.get(WebhookRecord, webhook_id)
+
+
+def every(session: Session) -> Sequence[WebhookRecord]:
+    """All webhooks, oldest first."""
+    return session.scalars(select(WebhookRecord).order_by(WebhookRecord.created_at)).all()
+
+
+def enabled(session: Session) -> Sequence[WebhookRecord]:
+    """Those that messages are made for."""
+    query = select(WebhookRecord).where(WebhookRecord.enabled)
+    return session.scalars(query.order_by(WebhookRecord.created_at)).all()
+
+
+def pending(session: Session) -> dict[str, int]:
+    """How many deliveries of each webhook wait."""
+    rows = session.execute(
+        select(DeliveryRecord.webhook_id, func.count())
+        .where(DeliveryRecord.state == "pending")
+        .group_by(DeliveryRecord.webhook_id)
+    )
+    return {webhook_id: count for webhook_id, count in rows}
+
+
+def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:
+    """The delivery, or None."""
+    return session.scalars(select(DeliveryRecord).where(DeliveryRecord.id == delivery_id)).first()
+
+
+def log(
+    session: Session, webhook_id: str, state: str | None, limit: int
+) -> Sequence[DeliveryRecord]:
+    """A webhook's deliveries, newest first."""
+    query = select(DeliveryRecord).where(DeliveryRecord.webhook_id == webhook_id)
+    if state is not None:
+        query = query.where(DeliveryRecord.state == state)
+    return session.scalars(query.order_by(DeliveryRecord.number.desc()).limit(limit)).all()
+
+
+def attempts_of(session: Session, numbers: Sequence[int]) -> dict[int, list[DeliveryAttemptRecord]]:
+    """The attempts of some deliveries, oldest first, by the deliveries' numbers."""
+    found: dict[int, list[DeliveryAttemptRecord]] = {number: [] for number in numbers}
+    for attempt in session.scalars(
+        select(DeliveryAttemptRecord)
+        .where(DeliveryAttemptRecord.delivery_number.in_(numbers))
+        .order_by(DeliveryAttemptRecord.id)
+    ):
+        found[attempt.delivery_number].append(attempt)
+    return found
+
+
+def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord | None:
+    """The oldest delivery that is due, and does not wait for an earlier one of its alert."""
+    earlier = aliased(DeliveryRecord)
+    waits = exists().where(
+        earlier.webhook_id == webhook_id,
+        earlier.state == "pending",
+        earlier.alert_id == DeliveryRecord.alert_id,
+        earlier.number < DeliveryRecord.number,
+    )
+    return session.scalars(
+        select(DeliveryRecord)
+        .where(
+            DeliveryRecord.webhook_id == webhook_id,
+            DeliveryRecord.state == "pending",
+            DeliveryRecord.next_attempt_at <= now,
+            ~waits,
+        )
+        .order_by(DeliveryRecord.number)
+        .limit(1)
+    ).first()
+
+
+def due(session: Session, now: datetime) -> set[str]:
+    """The ids of webhooks that have a delivery whose time has come."""
+    return set(
+        session.scalars(
+            select(DeliveryRecord.webhook_id)
+            .where(DeliveryRecord.state == "pending", DeliveryRecord.next_attempt_at <= now)
+            .distinct()
+        )
+    )
+
+
+def bring_forward(session: Session, webhook_id: str, now: datetime, refused: Sequence[int]) -> None:
+    """Make due what waits on a webhook that answers again, but for what it itself refused."""
+    session.execute(
+        update(DeliveryRecord)
+        .where(
+            DeliveryRecord.webhook_id == webhook_id,
+            DeliveryRecord.state == "pending",
+            DeliveryRecord.next_attempt_at > now,
+            or_(DeliveryRecord.status_code.is_(None), DeliveryRecord.status_code.not_in(refused)),
+        )
+        .values(next_attempt_at=now)
+    )
+
+
+def give_up(session: Session, before: datetime, now: datetime) -> None:
+    """End what has waited since before a time, on a disabled webhook say."""
+    session.execute(
+        update(DeliveryRecord)
+        .where(DeliveryRecord.state == "pending", DeliveryRecord.queued_at < before)
+        .values(state="failed", finished_at=now, next_attempt_at=None)
+    )
+
+
+def forget(session: Session, before: datetime) -> int:
+    """Delete deliveries that ended before a time, with their attempts. Returns how many."""
+    result = session.execute(delete(DeliveryRecord).where(DeliveryRecord.finished_at < before))
+    return int(result.rowcount)  # type: ignore[attr-defined]
+
+
+def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Sequence[AlertRecord]:
+    """Alerts that fire and are not silenced, of some kinds or all; a group for its members."""
+    query = select(AlertRecord).where(
+        AlertRecord.state == "firing",
+        AlertRecord.group_id.is_(None),
+        or_(AlertRecord.silenced_until.is_(None), AlertRecord.silenced_until <= now),
+    )
+    if kinds is not None:
+        query = query.where(AlertRecord.kind.in_(kinds))
+    return session.scalars(query.order_by(AlertRecord.opened_at)).all()
