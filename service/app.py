@@ -18,6 +18,7 @@ from service.routes import (
     alerts,
     cameras,
     events,
+    maintenance,
     metrics,
     operation,
     poses,
@@ -61,7 +62,18 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Tells when a fixed camera has moved, from the paths of people walking.",
         lifespan=lifespan,
     )
-    for module in (cameras, tracks, poses, trainings, alerts, webhooks, events, operation, metrics):
+    for module in (
+        cameras,
+        tracks,
+        poses,
+        trainings,
+        alerts,
+        maintenance,
+        webhooks,
+        events,
+        operation,
+        metrics,
+    ):
         app.include_router(module.router)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)

@@ -1,9 +1,11 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
 import os
+from datetime import UTC, tzinfo
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Literal
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -31,7 +33,15 @@ class Settings(BaseSettings):
     window_days: float = Field(
         7.0, gt=0, description="age of the oldest of them, before the newest"
     )
-    no_data_after_h: float = Field(24.0, gt=0, description="hours without a track until no_data")
+    no_data_after_h: float = Field(
+        24.0, gt=0, description="hours without a track until no_data, whatever the rhythm"
+    )
+    no_data_min_s: float = Field(600.0, ge=0, description="shortest silence that is no_data")
+    false_no_data_per_year: float = Field(
+        1.0, gt=0, description="false no_data alerts of a camera in a year"
+    )
+    rhythm_days: int = Field(7, ge=1, description="days that a camera's rhythm is learned of first")
+    timezone: str = Field("UTC", description="IANA zone of the cameras: their hours and weekends")
 
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
@@ -41,6 +51,12 @@ class Settings(BaseSettings):
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
     drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
+
+    silence_max_days: float = Field(30.0, gt=0, description="longest silence of an alert")
+    maintenance_max_days: float = Field(30.0, gt=0, description="longest maintenance window")
+    group_cameras: int = Field(3, ge=2, description="cameras of a tracker that make one alert")
+    group_share: float = Field(0.5, gt=0, le=1, description="and this share of its cameras")
+    group_within_s: float = Field(3600.0, gt=0, description="that began to move within this time")
 
     flow_tracks: int = Field(2_000, ge=50, description="newest tracks that a flow map is made of")
     flow_half_life_days: float = Field(
@@ -75,6 +91,23 @@ class Settings(BaseSettings):
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
+
+    @field_validator("timezone")
+    @classmethod
+    def _zone_exists(cls, value: str) -> str:
+        if value != "UTC":
+            try:
+                ZoneInfo(value)
+            except (ZoneInfoNotFoundError, ValueError) as error:
+                raise ValueError(
+                    f"a zone such as Europe/Berlin is needed, got {value!r}"
+                ) from error
+        return value
+
+    @property
+    def zone(self) -> tzinfo:
+        """The cameras' zone; UTC needs no zone database."""
+        return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
 
     @field_validator("webhook_allow")
     @classmethod

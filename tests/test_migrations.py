@@ -9,6 +9,7 @@ from service.migrate import alembic_config, migrate
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
+from service.store.alerts import AlertFilter
 from service.store.database import Store
 from service.store.tables import Record
 
@@ -72,7 +73,7 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
         assert history.told == ["tilt", "roll", "height"]
         assert (history.heading_rad, history.heading_sd_rad) == (0.7, None)
         assert history.drift_heading_rad == 0
-        assert list_alerts(session, "firing", "old", 10)[0].source == "estimate"
+        assert list_alerts(session, AlertFilter(state="firing"), 10)[0].source == "estimate"
     alembic.command.downgrade(config, "2026_11_21_first")
     with sqlite3.connect(settings.database_path) as connection:
         for table, rows in (("estimates", 1), ("models", 1), ("tracks", 7)):

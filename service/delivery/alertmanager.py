@@ -52,10 +52,14 @@ def alert_name(kind: str) -> str:
 def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> dict[str, Any]:
     kind, camera_id = body["kind"], body["camera_id"]
     labels = {"alertname": alert_name(kind), "kind": kind, "severity": severity}
+    whose = f"camera {camera_id}"
     if camera_id is not None:
         labels["camera_id"] = camera_id
+    elif body.get("track_source"):  # of many cameras; another tracker's is another alert
+        labels["track_source"] = body["track_source"]
+        whose = f"{len(body['camera_ids'])} cameras of {body['track_source']}"
     annotations = {
-        "summary": f"{kind.replace('_', ' ')}: camera {camera_id}",
+        "summary": f"{kind.replace('_', ' ')}: {whose}",
         "description": body["reason"],
         "alert_id": body["id"],
         **{f"drift_{name}": f"{value:g}" for name, value in _numbers(body["drift"]).items()},

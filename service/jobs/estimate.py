@@ -45,7 +45,7 @@ def learn_if_due(context: JobContext, camera_id: str) -> None:
         return
     learned = learn_period(period, context.settings.seed)
     with context.store.write() as session:
-        keep_reference(session, camera_id, period, learned)
+        keep_reference(session, context.settings, camera_id, period, learned)
     log.info(
         "reference_learned" if learned else "reference_without_walkers",
         extra={"camera_id": camera_id, "tracks": len(period.trajectories)},

@@ -22,6 +22,8 @@ def run_reconcile(context: JobContext) -> None:
             found = upkeep.reconcile_camera(session, context.queue, context.settings, camera_id)
         for reason in found:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
+    with context.store.write() as session:
+        upkeep.reconcile_alerts(session)
 
 
 def run_retention(context: JobContext) -> None:

@@ -28,6 +28,7 @@ from service.jobs.context import JobContext
 from service.jobs.deliver import run_deliver
 from service.jobs.estimate import run_estimate
 from service.jobs.housekeeping import run_reconcile, run_retention
+from service.jobs.rhythms import run_rhythms
 from service.jobs.train import run_training
 from service.recalibration import upkeep
 from service.settings import Settings
@@ -103,6 +104,7 @@ def _launch(context: JobContext, name: str) -> None:
 
     @DBOS.workflow(name="retention")
     def retention(at: datetime, _: Any) -> None:
+        _guarded(run_rhythms, context)
         _guarded(run_retention, context)
         _forget_finished()
 

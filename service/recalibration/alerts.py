@@ -1,4 +1,4 @@
-"""Open, update and end alerts; one is open for a camera and kind."""
+"""Open, update and end alerts; one is open for a camera and kind, or for a group."""
 
 import secrets
 from collections.abc import Sequence
@@ -8,13 +8,22 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
-from service.recalibration.outbox import queue_alert
-from service.store import alerts, events
+from service.recalibration.groups import group_with
+from service.recalibration.outbox import json_time, queue_alert
+from service.recalibration.references import begin_window_anew
+from service.settings import Settings
+from service.store import acts, alerts, events, maintenance, tracks
+from service.store.alert_tables import AlertActRecord
+from service.store.alerts import AlertFilter
 from service.store.tables import AlertRecord
+
+# What an act of a person is told as.
+_CHANGES = {"acknowledged": "acknowledged", "silenced": "silenced", "silence_ended": "updated"}
 
 
 def open_alert(
     session: Session,
+    settings: Settings,
     camera_id: str,
     kind: str,
     severity: str,
@@ -23,39 +32,50 @@ def open_alert(
     *,
     reason: str,
     source: str = "estimate",
-) -> AlertRecord:
-    """Open an alert, or bring the open one up to date.
+) -> AlertRecord | None:
+    """Open an alert, or bring the open one up to date; None where somebody is at the camera.
 
     What a reference doubts does not overwrite what estimates have found; they take over its alert.
     """
     now = datetime.now(UTC)
+    if maintenance.under_way(session, camera_id, now) is not None:
+        return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
     if record is not None:
         if source == "reference":
             return record
-        told_anew = record.severity != severity or record.source != source
+        change = None
+        if record.severity != severity or record.source != source:
+            change = "updated"
+        if (record.severity, severity) == ("warning", "critical"):
+            _keep_act(session, record, "escalated", None)
         record.drift, record.severity, record.updated_at = drift, severity, now
         record.reason, record.source = reason, source
         record.changed_at = changed_at or record.changed_at
-        if told_anew:
-            _tell(session, record)
-        return record
-    record = AlertRecord(
-        id=secrets.token_hex(16),
-        camera_id=camera_id,
-        kind=kind,
-        state="firing",
-        source=source,
-        severity=severity,
-        reason=reason,
-        drift=drift,
-        opened_at=now,
-        changed_at=changed_at,
-        updated_at=now,
-    )
-    session.add(record)
-    session.flush()
-    _tell(session, record)
+    else:
+        change = "opened"
+        record = AlertRecord(
+            id=secrets.token_hex(16),
+            camera_id=camera_id,
+            track_source=tracks.newest_source(session, camera_id),
+            kind=kind,
+            state="firing",
+            source=source,
+            severity=severity,
+            reason=reason,
+            drift=drift,
+            told=False,
+            opened_at=now,
+            changed_at=changed_at,
+            updated_at=now,
+        )
+        session.add(record)
+        session.flush()
+    group = group_with(session, settings, record)
+    if group is not None:
+        _tell(session, group, "opened")
+    if change is not None:
+        _tell(session, record, change)
     return record
 
 
@@ -74,19 +94,25 @@ def end_alert(
         _end(session, record, outcome, note, None)
 
 
-def close_pose_alerts(session: Session, camera_id: str, outcome: str, by: str | None) -> None:
+def close_pose_alerts(
+    session: Session, camera_id: str, outcome: str, by: str | None, note: str | None = None
+) -> None:
     """End the open alerts that measure a camera against its prior pose, if there are any."""
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            _end(session, record, outcome, None, by)
+            _end(session, record, outcome, note, by)
 
 
-def list_alerts(
-    session: Session, state: str | None, camera_id: str | None, limit: int
-) -> Sequence[AlertRecord]:
+def end_empty_groups(session: Session) -> None:
+    """End groups whose members are gone with their cameras."""
+    for group in alerts.groups_without_members(session):
+        _end(session, group, "cleared", None, None)
+
+
+def list_alerts(session: Session, wanted: AlertFilter, limit: int) -> Sequence[AlertRecord]:
     """Alerts, newest first."""
-    return alerts.listed(session, state, camera_id, limit)
+    return alerts.listed(session, wanted, datetime.now(UTC), limit)
 
 
 def show_alert(session: Session, alert_id: str) -> AlertRecord:
@@ -101,6 +127,11 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
     return record
 
 
+def acts_of(session: Session, alert_id: str) -> Sequence[AlertActRecord]:
+    """What was done with an alert and by whom, oldest first."""
+    return acts.of_alert(session, alert_id)
+
+
 def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
     """Note who has seen an alert; the first one stays.
 
@@ -108,11 +139,11 @@ def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertR
         NotFoundError: there is none of that id.
         ConflictError: it is resolved.
     """
-    record = _require_firing(session, alert_id)
+    record = require_firing(session, alert_id)
     if record.acknowledged_at is None:
         record.acknowledged_by = by or "someone"
         record.acknowledged_at = datetime.now(UTC)
-        _tell(session, record)
+        note_act(session, record, "acknowledged", record.acknowledged_by)
     return record
 
 
@@ -121,20 +152,57 @@ def resolve_alert(
 ) -> AlertRecord:
     """End an alert with what came of it; an alert of the same kind may open anew later.
 
+    A group's members end with it, and the same way.
+
     Raises:
         NotFoundError: there is none of that id.
         ConflictError: it is resolved.
     """
-    record = _require_firing(session, alert_id)
-    _end(session, record, outcome, note, by)
+    record = require_firing(session, alert_id)
+    for member in alerts.firing_members(session, record.id):
+        _resolve(session, member, outcome, note, by)
+    if record.state == "firing":
+        _resolve(session, record, outcome, note, by)
     return record
 
 
-def _require_firing(session: Session, alert_id: str) -> AlertRecord:
+def require_firing(session: Session, alert_id: str) -> AlertRecord:
+    """An open alert.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved.
+    """
     record = show_alert(session, alert_id)
     if record.state != "firing":
         raise ConflictError(f"state: only a firing alert takes this, it is {record.state}")
     return record
+
+
+def note_act(
+    session: Session,
+    record: AlertRecord,
+    act: str,
+    by: str | None,
+    *,
+    until: datetime | None = None,
+    note: str | None = None,
+) -> None:
+    """Keep what was done with an open alert, and tell of it."""
+    record.updated_at = datetime.now(UTC)
+    _keep_act(session, record, act, by, until=until, note=note)
+    _tell(session, record, _CHANGES[act])
+
+
+def _resolve(
+    session: Session, record: AlertRecord, outcome: str, note: str | None, by: str | None
+) -> None:
+    if outcome == "put_back" and record.camera_id and record.kind in alerts.POSE_KINDS:
+        # As a reset, but the reference stays: what was seen until now says nothing any more.
+        close_pose_alerts(session, record.camera_id, outcome, by, note)
+        begin_window_anew(session, record.camera_id)
+    else:
+        _end(session, record, outcome, note, by)
 
 
 def _end(
@@ -143,11 +211,43 @@ def _end(
     now = datetime.now(UTC)
     record.state, record.outcome, record.note, record.resolved_by = "resolved", outcome, note, by
     record.resolved_at = record.updated_at = now
-    _tell(session, record)
+    _keep_act(session, record, "resolved", by, outcome=outcome, note=note)
+    session.flush()
+    _tell(session, record, "resolved")
+    group = None if record.group_id is None else alerts.find(session, record.group_id)
+    over = group is not None and not alerts.firing_members(session, group.id)
+    if group is not None and group.state == "firing" and over:
+        _end(session, group, outcome, note, by)
 
 
-def _tell(session: Session, record: AlertRecord, change: str | None = None) -> None:
-    """Tell of a change: opened, updated, acknowledged, silenced, resolved; None: by its times."""
+def _keep_act(
+    session: Session,
+    record: AlertRecord,
+    act: str,
+    by: str | None,
+    *,
+    until: datetime | None = None,
+    outcome: str | None = None,
+    note: str | None = None,
+) -> None:
+    kept = AlertActRecord(
+        alert_id=record.id,
+        act=act,
+        by=by,
+        until=until,
+        outcome=outcome,
+        note=note,
+        at=datetime.now(UTC),
+    )
+    acts.add(session, kept)
+
+
+def _tell(session: Session, record: AlertRecord, change: str) -> None:
+    """Tell of a change: opened, updated, acknowledged, silenced, resolved."""
+    # A group speaks for its members; the end of one that was told by itself is told so, too.
+    if record.group_id is not None and not (record.told and record.state == "resolved"):
+        return
+    record.told = True
     payload = {
         "id": record.id,
         "camera_id": record.camera_id,
@@ -158,6 +258,12 @@ def _tell(session: Session, record: AlertRecord, change: str | None = None) -> N
         "drift": record.drift,
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,
+        "silenced_until": record.silenced_until and json_time(record.silenced_until),
+        "silence_reason": record.silence_reason,
+        "silenced_by": record.silenced_by,
+        "track_source": record.track_source,
+        "camera_ids": record.camera_ids,
+        "group_id": record.group_id,
     }
     events.add(session, "alert", payload, datetime.now(UTC))
     queue_alert(session, record, change)

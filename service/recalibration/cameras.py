@@ -15,6 +15,7 @@ from service.recalibration.references import begin_reference
 from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
+from service.store.alerts import AlertFilter
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import CameraRecord, PriorPoseRecord
 
@@ -170,7 +171,7 @@ def remove_camera(session: Session, camera_id: str, etag: str) -> None:
     """
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
-    for alert in list_alerts(session, "firing", camera_id, _MANY):
+    for alert in list_alerts(session, AlertFilter(state="firing", camera_id=camera_id), _MANY):
         end_alert(session, camera_id, alert.kind, "camera_removed")
     session.delete(view.record)
 

@@ -122,11 +122,12 @@ def _judge(
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.number == CLOCK:
         clock = describe_reading(reading)
-    _alert(session, record, drift, verdict, charted=charted, clock=clock, edge=edge)
+    _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 
 
 def _alert(
     session: Session,
+    settings: Settings,
     record: EstimateRecord,
     drift: Drift,
     verdict: DriftVerdict,
@@ -142,7 +143,7 @@ def _alert(
     severity = "critical" if verdict.excess >= 2 else "warning"
     since = record.drift_since
     if edge is not None:
-        open_alert(session, camera_id, "out_of_range", severity, body, since, reason=edge)
+        open_alert(session, settings, camera_id, "out_of_range", severity, body, since, reason=edge)
     elif "out_of_range" in firing:
         end_alert(session, camera_id, "out_of_range", "cleared")
     if not verdict.drifting:
@@ -155,7 +156,8 @@ def _alert(
     if other in firing:
         end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
     if drift.told or charted:
-        open_alert(session, camera_id, kind, severity, body, since, reason=clock or record.reason)
+        reason = clock or record.reason
+        open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)
 
 
 def _since(

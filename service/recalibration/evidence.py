@@ -102,7 +102,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
         return None
-    records = tracks.window(session, window_of(reference, settings))
+    records = tracks.window(session, window_of(session, reference, settings))
     model = trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None

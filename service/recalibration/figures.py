@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from service.recalibration.outbox import is_silenced
-from service.recalibration.poses import PoseState, state_of
+from service.recalibration.poses import PoseState, counting_estimate, state_of
 from service.settings import Settings
 from service.store import cameras, events, figures, webhooks
 
@@ -58,7 +58,7 @@ class Figures:
 
 
 def take_figures(session: Session, settings: Settings) -> Figures:
-    """The figures now, by a handful of statements and two lookups a camera."""
+    """The figures now, by a handful of statements and a few lookups a camera."""
     now = datetime.now(UTC)
     due = cameras.longest_due(session)
     beats = figures.heartbeats(session).items()
@@ -87,8 +87,7 @@ def _cameras(session: Session, settings: Settings) -> tuple[CameraFigures, ...]:
     found = []
     for camera_id, last_track_s in figures.last_tracks_s(session).items():
         reference, estimate = references[camera_id], estimates.get(camera_id)
-        if estimate is not None and estimate.reference_id != reference.id:
-            estimate = None  # it was measured against what no longer counts
+        estimate = counting_estimate(session, settings, reference, estimate)
         told = [] if estimate is None else [name for name in estimate.told if name != "height"]
         height = estimate is not None and "height" in estimate.told
         found.append(

@@ -13,8 +13,9 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.trajectory import Trajectory
+from service.recalibration.attendance import Attendance, attendance_of
 from service.recalibration.paths import LearnedPaths, learn_paths
-from service.recalibration.references import made_against
+from service.recalibration.references import is_outdated, made_against, window_of
 from service.recalibration.stillness import Doubt, doubts, still_bounds
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, tracks
@@ -54,12 +55,13 @@ def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthP
         return None
     kept = flow_maps.find(session, reference.id)
     past = doubts(session, settings, reference)
-    if _in_doubt(session, reference, kept, past):
+    if _in_doubt(session, settings, reference, kept, past):
         return None
     assert reference.to_s is not None
     assert reference.data is not None
-    bounds = still_bounds(settings, reference, past)
-    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past)
+    attended = attendance_of(session, camera_id, datetime.now(UTC))
+    bounds = still_bounds(settings, reference, past, attended)
+    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
     if not spoilt:
         since_s = None if kept is None else kept.to_s
         known = 0 if kept is None else kept.tracks
@@ -133,6 +135,7 @@ def keep_growth(
 
 def _in_doubt(
     session: Session,
+    settings: Settings,
     reference: SiteReferenceRecord,
     kept: FlowMapRecord | None,
     past: tuple[Doubt, ...],
@@ -141,6 +144,8 @@ def _in_doubt(
     last = estimates.newest(session, reference.camera_id)
     if last is None or not made_against(reference, last) or not last.told:
         return True
+    if is_outdated(last, window_of(session, reference, settings)):
+        return True  # somebody was at the camera, and nobody knows yet how it stands since
     if last.drift_streak > 0 or last.drifted or last.suspected:
         return True
     if any(alerts.firing(session, reference.camera_id, kind) for kind in alerts.POSE_KINDS):
@@ -167,7 +172,11 @@ def _is_explained(
     return False
 
 
-def _is_spoilt(kept: FlowMapRecord, reference_to_s: float, past: tuple[Doubt, ...]) -> bool:
+def _is_spoilt(
+    kept: FlowMapRecord, reference_to_s: float, past: tuple[Doubt, ...], attended: Attendance
+) -> bool:
+    if attended.told_late(kept.learned_at, kept.to_s):
+        return True
     return kept.to_s > reference_to_s and any(
         doubt.excluded and doubt.from_s <= kept.to_s and doubt.resolved_at > kept.learned_at
         for doubt in past

@@ -24,11 +24,12 @@ from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import open_alert
+from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
 from service.recalibration.paths import LearnedPaths, learn_paths
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
-from service.store import cameras, references, tracks, trainings
+from service.store import cameras, maintenance, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import FlowMapRecord, PredictionRecord
 
@@ -63,8 +64,12 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is not None:
         return None
+    now = datetime.now(UTC)
+    if maintenance.under_way(session, camera_id, now) is not None:
+        return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
-    records = tracks.first(session, camera_id, reference.from_s, wanted)
+    attended = attendance_of(session, camera_id, now)
+    records = tracks.first(session, camera_id, reference.from_s, wanted, without=attended.spans)
     if len(records) < wanted:
         return None
     intrinsics = intrinsics_of(camera)
@@ -99,7 +104,11 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
 
 
 def keep_reference(
-    session: Session, camera_id: str, period: ReferencePeriod, learned: LearnedReference | None
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    period: ReferencePeriod,
+    learned: LearnedReference | None,
 ) -> None:
     """Make a learned reference the one that counts, unless another has begun meanwhile.
 
@@ -133,6 +142,7 @@ def keep_reference(
     if site.doubt:
         open_alert(
             session,
+            settings,
             camera_id,
             _DOUBT_KINDS[site.doubt_about],
             "warning",

@@ -31,25 +31,30 @@ ALERT_FIELDS = (
     "acknowledged_by",
     "acknowledged_at",
     "silenced_until",
+    "silence_reason",
+    "silenced_by",
     "resolved_at",
     "resolved_by",
     "outcome",
     "note",
+    "track_source",
+    "camera_ids",
+    "group_id",
 )
+ALERT_FLAGS = ("acknowledged", "silenced")
 # A silenced alert is quiet but for these.
 _TOLD_IN_SILENCE = ("silenced", "resolved")
 _JOB_LOST = timedelta(seconds=30)
 
 
-def queue_alert(session: Session, record: AlertRecord, change: str | None = None) -> None:
+def queue_alert(session: Session, record: AlertRecord, change: str) -> None:
     """Tell the webhooks that want it of a change to an alert.
 
     Args:
         session: of the change itself.
         record: the alert, changed.
-        change: opened, updated, acknowledged, silenced or resolved; told by its times if None.
+        change: opened, updated, acknowledged, silenced or resolved.
     """
-    change = change or _change_of(record)
     now = datetime.now(UTC)
     if is_silenced(record, now) and change not in _TOLD_IN_SILENCE:
         return
@@ -98,10 +103,12 @@ def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetim
 def alert_body(record: AlertRecord) -> dict[str, Any]:
     """An alert as clients see it."""
     values = {name: getattr(record, name) for name in ALERT_FIELDS}
-    return {
+    told = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
+    flags = (record.acknowledged_at is not None, is_silenced(record, datetime.now(UTC)))
+    return {**told, **dict(zip(ALERT_FLAGS, flags, strict=True))}
 
 
 def is_silenced(record: AlertRecord, now: datetime) -> bool:
@@ -112,11 +119,3 @@ def is_silenced(record: AlertRecord, now: datetime) -> bool:
 def json_time(at: datetime) -> str:
     """A time as JSON has it."""
     return at.astimezone(UTC).isoformat().replace("+00:00", "Z")
-
-
-def _change_of(record: AlertRecord) -> str:
-    if record.state == "resolved":
-        return "resolved"
-    if record.acknowledged_at is not None and record.acknowledged_at >= record.updated_at:
-        return "acknowledged"
-    return "opened" if record.updated_at == record.opened_at else "updated"

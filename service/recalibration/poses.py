@@ -1,10 +1,9 @@
 """The served pose, from the store alone; its history; accepting it; going back to the prior."""
 
-import time
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Literal
 
 from sqlalchemy.orm import Session
@@ -14,18 +13,22 @@ from service.errors import ConflictError
 from service.job_queue import JobQueue
 from service.recalibration.alerts import close_pose_alerts
 from service.recalibration.cameras import renew_prior_pose, require_camera
+from service.recalibration.presence import silence_of
 from service.recalibration.references import (
     FEWEST_WALKERS,
     begin_reference,
+    is_outdated,
     tracks_so_far,
     wanted_tracks,
     window_of,
 )
 from service.recalibration.trainings import request_estimate
 from service.settings import Settings
-from service.store import cameras, estimates, references, tracks, trainings
+from service.store import cameras, estimates, maintenance, references, tracks, trainings
+from service.store.alert_tables import MaintenanceRecord
 from service.store.packing import pose_of_prior
 from service.store.tables import EstimateRecord, SiteReferenceRecord
+from service.store.tracks import WindowBounds
 
 PoseState = Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
 
@@ -70,10 +73,12 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     reference = references.newest(session, camera_id)
     model = trainings.newest_model(session, camera_id)
     estimate = estimates.newest(session, camera_id)
-    if estimate is not None and estimate.reference_id != reference.id:
-        estimate = None  # it was measured against a pose or a reference that no longer counts
+    estimate = counting_estimate(session, settings, reference, estimate)
     so_far = tracks_so_far(session, settings, reference)
+    window = maintenance.under_way(session, camera_id, datetime.now(UTC))
     state, reason = _state(session, settings, reference, estimate, so_far)
+    if window is not None:
+        reason = f"{_describe_window(window)}; {reason}"
     pose = pose_of_prior(prior_record)
     if estimate is not None:
         pose = replace(
@@ -153,6 +158,19 @@ def reset_reference(
     return view_pose(session, settings, camera_id)
 
 
+def _describe_window(window: MaintenanceRecord) -> str:
+    until = f"maintenance is under way until {window.to_at:%Y-%m-%d %H:%M}Z"
+    return f"{until} ({window.reason})" if window.reason else until
+
+
+def _what_was_last(reference: SiteReferenceRecord, bounds: WindowBounds) -> str:
+    put_back_s = (reference.window_from_s or 0.0) if reference.changed_s is None else 0.0
+    began_s = bounds.started_from_s or 0.0
+    if began_s > max(reference.from_s or 0.0, reference.to_s or 0.0, put_back_s):
+        return "maintenance"
+    return "camera was put back" if put_back_s else "reference"
+
+
 def _state(
     session: Session,
     settings: Settings,
@@ -164,16 +182,14 @@ def _state(
         wanted = wanted_tracks(reference, settings)
         return "learning", f"{so_far} of {wanted} reference tracks"
     if estimate is None or estimate.created_at < reference.ready_at:
-        since = tracks.count_window(session, window_of(reference, settings))
-        text = f"{since} tracks since the reference; at least {FEWEST_WALKERS} of people who walk "
-        text += "for a few seconds inside the image are needed"
+        bounds = window_of(session, reference, settings)
+        since = tracks.count_window(session, bounds)
+        text = f"{since} tracks since the {_what_was_last(reference, bounds)}; at least "
+        text += f"{FEWEST_WALKERS} of people who walk for a few seconds inside the image are needed"
         return "learning", "; ".join(part for part in (text, reference.doubt) if part)
-    silent_h = (time.time() - (tracks.newest_end_s(session, reference.camera_id) or 0.0)) / 3600
-    if silent_h > settings.no_data_after_h:
-        return "no_data", (
-            f"the newest track ended {silent_h:.1f} h ago; "
-            f"up to {settings.no_data_after_h:g} h are waited for"
-        )
+    silence = silence_of(session, settings, reference.camera_id, datetime.now(UTC))
+    if silence is not None and silence.no_data:
+        return "no_data", silence.reason
     states: dict[str, PoseState] = {
         "learning": "learning",
         "drifting": "drifting",
@@ -189,5 +205,23 @@ def state_of(
     estimate: EstimateRecord | None,
 ) -> PoseState:
     """A camera's state alone, of its newest reference and estimate: for who asks about many."""
-    counts = estimate is not None and estimate.reference_id == reference.id
-    return _state(session, settings, reference, estimate if counts else None, 0)[0]
+    counting = counting_estimate(session, settings, reference, estimate)
+    return _state(session, settings, reference, counting, 0)[0]
+
+
+def counting_estimate(
+    session: Session,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    estimate: EstimateRecord | None,
+) -> EstimateRecord | None:
+    """The newest estimate of a camera; None where it says nothing of how the camera stands now."""
+    if estimate is None or estimate.reference_id != reference.id:
+        return None  # it was measured against a pose or a reference that no longer counts
+    if reference.ready_at is None or not is_outdated(
+        estimate, window_of(session, reference, settings)
+    ):
+        return estimate
+    # It was put back, or somebody was at it and has gone: it may stand elsewhere.
+    attended = maintenance.under_way(session, reference.camera_id, datetime.now(UTC))
+    return None if attended is None else estimate

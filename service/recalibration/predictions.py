@@ -30,7 +30,7 @@ def take_pending(
     model = trainings.newest_model(session, camera_id)
     if model is None or reference is None:
         return None
-    bounds = window_of(reference, settings)
+    bounds = window_of(session, reference, settings)
     return PendingTracks(
         model_id=model.id,
         weights_sha256=model.weights_sha256,

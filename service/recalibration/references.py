@@ -1,11 +1,13 @@
 """References: when one begins, which of a camera's tracks it is of, and which come after it."""
 
+import math
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from service.recalibration.attendance import attendance_of
 from service.settings import Settings
-from service.store import cameras, tracks
+from service.store import cameras, estimates, references, tracks
 from service.store.tables import EstimateRecord, SiteReferenceRecord
 from service.store.tracks import WindowBounds
 
@@ -40,20 +42,48 @@ def begin_reference(
     return record
 
 
-def window_of(reference: SiteReferenceRecord, settings: Settings) -> WindowBounds:
+def window_of(session: Session, reference: SiteReferenceRecord, settings: Settings) -> WindowBounds:
     """The tracks that an estimate is made of.
 
     While a reference is being learned, those of its period; later, those that ended after it, from
-    the newest change of the camera on.
+    the newest change of the camera on. Never those of a time in which somebody was at the camera,
+    nor, once there is a reference, those of before: it may stand elsewhere since.
     """
+    attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
+    from_s = reference.from_s
+    if reference.ready_at is not None and attended.judged_from_s is not None:
+        from_s = max(from_s or 0.0, attended.judged_from_s)
     return WindowBounds(
         camera_id=reference.camera_id,
         tracks=settings.window_tracks,
         days=settings.window_days,
-        started_from_s=reference.from_s,
+        started_from_s=from_s,
         ended_after_s=reference.to_s,
         ended_from_s=reference.window_from_s,
+        without=attended.spans,
     )
+
+
+def begin_window_anew(session: Session, camera_id: str) -> None:
+    """Judge a camera by tracks that are yet to come: it was put back, and its reference holds."""
+    reference = references.newest(session, camera_id)
+    newest_s = tracks.newest_end_s(session, camera_id)
+    if reference.ready_at is not None and newest_s is not None:
+        reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None
+    forget_streak(session, camera_id)
+
+
+def forget_streak(session: Session, camera_id: str) -> None:
+    """Have a drift earn its updates anew: those so far were of before somebody was there."""
+    last = estimates.newest(session, camera_id)
+    if last is not None:
+        last.drift_streak, last.drifted, last.drift_since = 0, [], None
+
+
+def is_outdated(estimate: EstimateRecord, bounds: WindowBounds) -> bool:
+    """Whether none of the tracks of an estimate could be in a window: it is of before."""
+    begins_s = max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
+    return estimate.to_s < begins_s
 
 
 def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
@@ -72,5 +102,8 @@ def tracks_so_far(session: Session, settings: Settings, reference: SiteReference
     """How many of the wanted tracks there are."""
     if reference.ready_at is not None:
         return reference.tracks
-    stored = tracks.count_from(session, reference.camera_id, reference.from_s)
+    attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
+    stored = tracks.count_from(
+        session, reference.camera_id, reference.from_s, without=attended.spans
+    )
     return min(stored, wanted_tracks(reference, settings))

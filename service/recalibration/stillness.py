@@ -5,6 +5,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
+from service.recalibration.attendance import Attendance
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables import AlertRecord, SiteReferenceRecord
@@ -47,9 +48,12 @@ def _concerns(doubt: Doubt, reference: SiteReferenceRecord) -> bool:
 
 
 def still_bounds(
-    settings: Settings, reference: SiteReferenceRecord, past: tuple[Doubt, ...]
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    past: tuple[Doubt, ...],
+    attended: Attendance,
 ) -> StillBounds:
-    """The tracks of a time in which a camera is known to have been still.
+    """The tracks of a time in which a camera is known to have been still, and left alone.
 
     Of a move that nobody has noticed yet, the newest tracks may be.
     """
@@ -60,6 +64,7 @@ def still_bounds(
         reference_to_s=reference.to_s,
         unsure=settings.flow_unsure_tracks,
         without=tuple((doubt.from_s, doubt.to_s) for doubt in past if doubt.excluded),
+        attended=attended.spans,
     )
 
 

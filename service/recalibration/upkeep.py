@@ -8,10 +8,22 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
+from service.recalibration.alerts import end_empty_groups
+from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
+from service.recalibration.silence import end_silences
 from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
 from service.settings import Settings
-from service.store import cameras, estimates, events, references, tracks, trainings, workers
+from service.store import (
+    cameras,
+    estimates,
+    events,
+    maintenance,
+    references,
+    tracks,
+    trainings,
+    workers,
+)
 from service.store.tables import CameraRecord
 
 # A model reads tracks at another step than its own, but less well the farther they are apart.
@@ -38,13 +50,23 @@ def reconcile_camera(
         camera.estimate_due_at = None
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
+    presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
+    if presence is not None:
+        found.append(presence)
     return found
 
 
+def reconcile_alerts(session: Session) -> None:
+    """End silences that have come to their time, and groups whose cameras are gone."""
+    end_silences(session)
+    end_empty_groups(session)
+
+
 def forget_old(session: Session, settings: Settings, camera_id: str) -> int:
-    """Apply the limits on tracks, estimates and models of a camera; returns tracks deleted."""
+    """Apply the limits on what is stored of a camera; returns tracks deleted."""
     before_s = time.time() - settings.keep_days * 86_400
     deleted = tracks.forget(session, camera_id, before_s, settings.keep_tracks)
+    maintenance.forget(session, camera_id, datetime.fromtimestamp(before_s, UTC))
     estimates.forget(session, camera_id, settings.keep_estimates)
     for model in trainings.superseded_models(session, camera_id, _KEPT_MODELS):
         session.delete(model)
@@ -97,7 +119,7 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
     model = trainings.newest_model(session, camera.id)
     if model is None:
         return False
-    bounds = window_of(references.newest(session, camera.id), settings)
+    bounds = window_of(session, references.newest(session, camera.id), settings)
     return bool(tracks.without_prediction(session, bounds, model.id, 1))
 
 

@@ -1,12 +1,22 @@
-"""`/alerts`: list, show, acknowledge, resolve."""
+"""`/alerts`: list, show, acknowledge, silence, resolve."""
 
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
+from sqlalchemy.orm import Session
 
-from service.recalibration import alerts
-from service.routes.state import ReadDep, WriteDep
-from service.schemas.alerts import AcknowledgeBody, AlertList, AlertOut, ResolveBody
+from service.recalibration import alerts, silence
+from service.routes.state import ReadDep, StateDep, WriteDep
+from service.schemas.alerts import (
+    AcknowledgeBody,
+    AlertDetail,
+    AlertList,
+    AlertOut,
+    ResolveBody,
+    SilenceBody,
+)
+from service.store.alerts import AlertFilter
+from service.store.tables import AlertRecord
 
 router = APIRouter(prefix="/alerts", tags=["alerts"])
 
@@ -16,29 +26,55 @@ def list_all(
     session: ReadDep,
     state: Literal["firing", "resolved"] | None = None,
     camera_id: str | None = None,
+    group_id: str | None = None,
+    acknowledged: bool | None = None,
+    silenced: bool | None = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> AlertList:
     """Alerts, newest first."""
-    records = alerts.list_alerts(session, state, camera_id, limit)
+    wanted = AlertFilter(
+        state=state,
+        camera_id=camera_id,
+        group_id=group_id,
+        acknowledged=acknowledged,
+        silenced=silenced,
+    )
+    records = alerts.list_alerts(session, wanted, limit)
     return AlertList(items=[AlertOut.from_record(record) for record in records])
 
 
 @router.get("/{alert_id}")
-def show(alert_id: str, session: ReadDep) -> AlertOut:
-    """An alert."""
-    return AlertOut.from_record(alerts.show_alert(session, alert_id))
+def show(alert_id: str, session: ReadDep) -> AlertDetail:
+    """An alert, and what was done with it."""
+    return _with_acts(session, alerts.show_alert(session, alert_id))
 
 
 @router.post("/{alert_id}/acknowledge")
-def acknowledge(alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None) -> AlertOut:
+def acknowledge(
+    alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
+) -> AlertDetail:
     """Note who has seen an alert."""
     by = None if body is None else body.by
-    return AlertOut.from_record(alerts.acknowledge_alert(session, alert_id, by))
+    return _with_acts(session, alerts.acknowledge_alert(session, alert_id, by))
+
+
+@router.post("/{alert_id}/silence")
+def silence_one(
+    alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep
+) -> AlertDetail:
+    """Silence an alert until a time, in place of the silence it may have; null ends that."""
+    record = silence.silence_alert(
+        session, state.settings, alert_id, body.until, body.reason, body.by
+    )
+    return _with_acts(session, record)
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, session: WriteDep) -> AlertOut:
+def resolve(alert_id: str, body: ResolveBody, session: WriteDep) -> AlertDetail:
     """End an alert with what came of it."""
-    return AlertOut.from_record(
-        alerts.resolve_alert(session, alert_id, body.outcome, body.note, body.by)
-    )
+    record = alerts.resolve_alert(session, alert_id, body.outcome, body.note, body.by)
+    return _with_acts(session, record)
+
+
+def _with_acts(session: Session, record: AlertRecord) -> AlertDetail:
+    return AlertDetail.from_records(record, alerts.acts_of(session, record.id))

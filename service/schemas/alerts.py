@@ -1,17 +1,28 @@
 """Bodies of `/alerts`."""
 
-from datetime import datetime
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Who
+from service.store.alert_tables import AlertActRecord
 from service.store.tables import AlertRecord
 
 
 class AcknowledgeBody(Body):
     """Who has seen the alert."""
 
+    by: Who | None = None
+
+
+class SilenceBody(Body):
+    """Until when nobody is to be woken by the alert, and why; null ends a silence."""
+
+    until: AwareDatetime | None
+    reason: str | None = Field(None, max_length=2000)
     by: Who | None = None
 
 
@@ -24,10 +35,15 @@ class ResolveBody(Body):
 
 
 class AlertOut(BaseModel):
-    """An alert."""
+    """An alert; a group's has no `camera_id` but `camera_ids`.
+
+    `acknowledged` and `silenced` are flags of a firing alert, not states.
+    """
+
+    model_config = ConfigDict(from_attributes=True)
 
     id: str
-    camera_id: str
+    camera_id: str | None
     kind: str
     state: str
     severity: str
@@ -36,18 +52,54 @@ class AlertOut(BaseModel):
     opened_at: datetime
     changed_at: datetime | None
     updated_at: datetime
+    acknowledged: bool = False
     acknowledged_by: str | None
     acknowledged_at: datetime | None
+    silenced: bool = False
     silenced_until: datetime | None
+    silence_reason: str | None
+    silenced_by: str | None
     resolved_at: datetime | None
     resolved_by: str | None
     outcome: str | None
     note: str | None
+    track_source: str | None
+    camera_ids: list[str] | None
+    group_id: str | None
 
     @classmethod
     def from_record(cls, record: AlertRecord) -> Self:
         """The body of a stored alert."""
-        return cls.model_validate(record, from_attributes=True)
+        body = cls.model_validate(record)
+        body.acknowledged = record.acknowledged_at is not None
+        body.silenced = is_silenced(record, datetime.now(UTC))
+        return body
+
+
+class ActOut(BaseModel):
+    """What somebody did with an alert; without a name, the service by itself."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    at: datetime
+    act: Literal["acknowledged", "silenced", "silence_ended", "escalated", "resolved"]
+    by: str | None
+    until: datetime | None
+    outcome: str | None
+    note: str | None
+
+
+class AlertDetail(AlertOut):
+    """An alert, and what was done with it, oldest first."""
+
+    acts: list[ActOut] = []
+
+    @classmethod
+    def from_records(cls, record: AlertRecord, acts: Sequence[AlertActRecord]) -> Self:
+        """The body of a stored alert with its acts."""
+        body = cls.from_record(record)
+        body.acts = [ActOut.model_validate(act) for act in acts]
+        return body
 
 
 class AlertList(BaseModel):

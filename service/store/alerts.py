@@ -1,14 +1,26 @@
 """Statements on alerts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy import and_, exists, not_, select
+from sqlalchemy.orm import Session, aliased
 
 from service.store.tables import AlertRecord
 
 POSE_KINDS = ("drift", "clock", "out_of_range")  # that hold a camera against its prior pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertFilter:
+    """Which alerts are wanted; None is any."""
+
+    state: str | None = None
+    camera_id: str | None = None
+    group_id: str | None = None
+    acknowledged: bool | None = None
+    silenced: bool | None = None
 
 
 def find(session: Session, alert_id: str) -> AlertRecord | None:
@@ -27,14 +39,80 @@ def firing(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
     ).first()
 
 
-def ended(session: Session, camera_id: str) -> Sequence[AlertRecord]:
-    """The alerts about a camera's pose that have ended."""
+def newest(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
+    """The alert of a camera and kind that was opened last, or None."""
+    return session.scalars(
+        select(AlertRecord)
+        .where(AlertRecord.camera_id == camera_id, AlertRecord.kind == kind)
+        .order_by(AlertRecord.opened_at.desc())
+        .limit(1)
+    ).first()
+
+
+def ended(
+    session: Session, camera_id: str, kinds: Sequence[str] = POSE_KINDS
+) -> Sequence[AlertRecord]:
+    """The alerts of a camera and some kinds that have ended; those about its pose, if unsaid."""
     return session.scalars(
         select(AlertRecord).where(
             AlertRecord.camera_id == camera_id,
-            AlertRecord.kind.in_(POSE_KINDS),
+            AlertRecord.kind.in_(kinds),
             AlertRecord.resolved_at.is_not(None),
         )
+    ).all()
+
+
+def firing_of_source(
+    session: Session, track_source: str, kinds: Sequence[str]
+) -> Sequence[AlertRecord]:
+    """The open alerts of some kinds about the cameras of a source of tracks."""
+    return session.scalars(
+        select(AlertRecord).where(
+            AlertRecord.track_source == track_source,
+            AlertRecord.kind.in_(kinds),
+            AlertRecord.state == "firing",
+            AlertRecord.camera_id.is_not(None),
+        )
+    ).all()
+
+
+def firing_group(session: Session, track_source: str, kind: str) -> AlertRecord | None:
+    """The open alert about all of a source of tracks, or None."""
+    return session.scalars(
+        select(AlertRecord).where(
+            AlertRecord.track_source == track_source,
+            AlertRecord.kind == kind,
+            AlertRecord.state == "firing",
+            AlertRecord.camera_id.is_(None),
+        )
+    ).first()
+
+
+def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
+    """The open alerts that a group is made of."""
+    return session.scalars(
+        select(AlertRecord)
+        .where(AlertRecord.group_id == group_id, AlertRecord.state == "firing")
+        .order_by(AlertRecord.camera_id)
+    ).all()
+
+
+def groups_without_members(session: Session) -> Sequence[AlertRecord]:
+    """Open groups none of whose members is: their cameras are gone."""
+    member = aliased(AlertRecord)
+    return session.scalars(
+        select(AlertRecord).where(
+            AlertRecord.camera_id.is_(None),
+            AlertRecord.state == "firing",
+            ~exists().where(member.group_id == AlertRecord.id, member.state == "firing"),
+        )
+    ).all()
+
+
+def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
+    """Open alerts whose silence has come to its time."""
+    return session.scalars(
+        select(AlertRecord).where(AlertRecord.state == "firing", AlertRecord.silenced_until <= now)
     ).all()
 
 
@@ -53,12 +131,21 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
 
 
 def listed(
-    session: Session, state: str | None, camera_id: str | None, limit: int
+    session: Session, wanted: AlertFilter, now: datetime, limit: int
 ) -> Sequence[AlertRecord]:
     """Alerts, newest first."""
     query = select(AlertRecord)
-    if state is not None:
-        query = query.where(AlertRecord.state == state)
-    if camera_id is not None:
-        query = query.where(AlertRecord.camera_id == camera_id)
+    if wanted.state is not None:
+        query = query.where(AlertRecord.state == wanted.state)
+    if wanted.camera_id is not None:
+        query = query.where(AlertRecord.camera_id == wanted.camera_id)
+    if wanted.group_id is not None:
+        query = query.where(AlertRecord.group_id == wanted.group_id)
+    if wanted.acknowledged is not None:
+        seen = AlertRecord.acknowledged_at.is_not(None)
+        query = query.where(seen if wanted.acknowledged else not_(seen))
+    if wanted.silenced is not None:
+        until = AlertRecord.silenced_until
+        silent = and_(until.is_not(None), until > now)
+        query = query.where(silent if wanted.silenced else not_(silent))
     return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()

@@ -181,6 +181,8 @@ class TrackRecord(Record):
     __table_args__ = (
         UniqueConstraint("camera_id", "source", "track_id", "started_s"),
         Index(None, "camera_id", "ended_s"),
+        # When tracks came and what they were of, without their points: the camera's rhythm.
+        Index(None, "camera_id", "received_at", "ended_s"),
     )
 
 
@@ -305,16 +307,25 @@ class EstimateRecord(Record):
 class AlertRecord(Record):
     """An alert; at most one of a camera and kind is firing.
 
-    `source` tells whether an estimate fired it, which then ends it too, or the reference.
+    `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
+    rhythm, or a group. A group's alert has no camera but `camera_ids`, and its members have its id
+    as `group_id`; at most one of a `track_source` and kind is firing. `told` says whether an event
+    told of the alert by itself.
     """
 
     __tablename__ = "alerts"
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
-    camera_id: Mapped[str] = _camera_key()
+    camera_id: Mapped[str | None] = _camera_key()
+    camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
+    group_id: Mapped[str | None] = mapped_column(
+        ForeignKey("alerts.id", ondelete="SET NULL"), index=True
+    )
+    track_source: Mapped[str | None]
     kind: Mapped[str]  # drift, no_data, out_of_range, clock
     state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference
+    source: Mapped[str]  # estimate, reference, rhythm, group
+    told: Mapped[bool] = mapped_column(default=False)
     severity: Mapped[str]  # warning, critical
     reason: Mapped[str]
     drift: Mapped[dict[str, Any]]
@@ -325,6 +336,7 @@ class AlertRecord(Record):
     acknowledged_at: Mapped[datetime | None]
     silenced_until: Mapped[datetime | None]
     silence_reason: Mapped[str | None]
+    silenced_by: Mapped[str | None]
     resolved_at: Mapped[datetime | None]
     resolved_by: Mapped[str | None]
     outcome: Mapped[str | None]  # put_back, accepted, false_alarm, cleared
@@ -339,7 +351,16 @@ class AlertRecord(Record):
             sqlite_where=text("state = 'firing'"),
             postgresql_where=text("state = 'firing'"),
         ),
+        Index(
+            "uq_alerts_firing_group",
+            "track_source",
+            "kind",
+            unique=True,
+            sqlite_where=text("state = 'firing' AND camera_id IS NULL"),
+            postgresql_where=text("state = 'firing' AND camera_id IS NULL"),
+        ),
         Index(None, "opened_at"),
+        Index(None, "camera_id", "opened_at"),
     )
 
 

@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, and_, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from service.store.tables import PredictionRecord, TrackRecord
+from service.store.tables import CameraRecord, PredictionRecord, TrackRecord
+
+Spans = tuple[tuple[float, float], ...]  # times, from and to
 
 _DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
 
@@ -18,7 +21,7 @@ class WindowBounds:
     """The newest so many tracks of a camera within so many days of its newest, by their own times.
 
     Only those count that started at or after `started_from_s`, ended after `ended_after_s` and at
-    or after `ended_from_s`; None is no bound.
+    or after `ended_from_s`; None is no bound. Those do not that were seen at any time `without`.
     """
 
     camera_id: str
@@ -27,6 +30,7 @@ class WindowBounds:
     started_from_s: float | None = None
     ended_after_s: float | None = None
     ended_from_s: float | None = None
+    without: Spans = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,14 +39,16 @@ class StillBounds:
 
     The period is of tracks that started at or after `started_from_s` and ended by
     `reference_to_s`. Of later ones, the newest `unsure` of all its tracks do not count, nor those
-    that were seen at any time `without`, from and to.
+    that were seen at any time `without`. Of neither do those that were seen while somebody
+    `attended` to the camera.
     """
 
     camera_id: str
     started_from_s: float | None
     reference_to_s: float
     unsure: int
-    without: tuple[tuple[float, float], ...]
+    without: Spans
+    attended: Spans = ()
 
 
 def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
@@ -67,6 +73,57 @@ def newest_end_s(session: Session, camera_id: str) -> float | None:
     )
 
 
+def newest_received_at(session: Session, camera_id: str) -> datetime | None:
+    """When a track was stored last."""
+    return session.scalar(
+        select(func.max(TrackRecord.received_at)).where(TrackRecord.camera_id == camera_id)
+    )
+
+
+def arrivals(
+    session: Session, camera_id: str, received_after: datetime
+) -> Sequence[tuple[datetime, float]]:
+    """When tracks were stored and when they had ended, of those stored after a time."""
+    rows = session.execute(
+        select(TrackRecord.received_at, TrackRecord.ended_s).where(
+            TrackRecord.camera_id == camera_id, TrackRecord.received_at > received_after
+        )
+    )
+    return [(received_at, ended_s) for received_at, ended_s in rows]
+
+
+def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
+    """How many tracks ended from one time to another."""
+    query = select(func.count()).where(
+        TrackRecord.camera_id == camera_id,
+        TrackRecord.ended_s >= from_s,
+        TrackRecord.ended_s <= to_s,
+    )
+    return session.scalar(query) or 0
+
+
+def newest_source(session: Session, camera_id: str) -> str | None:
+    """The source of the newest track."""
+    return session.scalar(_newest_source(camera_id))
+
+
+def cameras_fed_by(session: Session, source: str, received_after: datetime) -> set[str]:
+    """The cameras whose newest track is of a source, of those that got one after a time."""
+    received = (
+        select(func.max(TrackRecord.received_at))
+        .where(TrackRecord.camera_id == CameraRecord.id)
+        .scalar_subquery()
+    )
+    return set(
+        session.scalars(
+            select(CameraRecord.id).where(
+                _newest_source(CameraRecord.id).scalar_subquery() == source,
+                received > received_after,
+            )
+        )
+    )
+
+
 def newest_pk(session: Session, camera_id: str) -> int | None:
     """The track that was stored last."""
     return session.scalar(
@@ -83,10 +140,13 @@ def window(session: Session, bounds: WindowBounds) -> Sequence[TrackRecord]:
     ).all()
 
 
-def count_from(session: Session, camera_id: str, started_from_s: float | None) -> int:
-    """How many tracks started at or after a time."""
+def count_from(
+    session: Session, camera_id: str, started_from_s: float | None, without: Spans = ()
+) -> int:
+    """How many tracks started at or after a time and were not seen at others."""
     query = select(func.count()).select_from(TrackRecord)
-    return session.scalar(query.where(*_started_from(camera_id, started_from_s))) or 0
+    wanted = (*_started_from(camera_id, started_from_s), *_outside(without))
+    return session.scalar(query.where(*wanted)) or 0
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
@@ -96,12 +156,16 @@ def count_window(session: Session, bounds: WindowBounds) -> int:
 
 
 def first(
-    session: Session, camera_id: str, started_from_s: float | None, limit: int
+    session: Session,
+    camera_id: str,
+    started_from_s: float | None,
+    limit: int,
+    without: Spans = (),
 ) -> Sequence[TrackRecord]:
-    """The first tracks by their ends, of those that started at or after a time."""
+    """The first tracks by their ends that started from a time on and were not seen at others."""
     return session.scalars(
         select(TrackRecord)
-        .where(*_started_from(camera_id, started_from_s))
+        .where(*_started_from(camera_id, started_from_s), *_outside(without))
         .order_by(TrackRecord.ended_s, TrackRecord.id)
         .limit(limit)
     ).all()
@@ -220,11 +284,26 @@ def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
 
 
+def _newest_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
+    return (
+        select(TrackRecord.source)
+        .where(TrackRecord.camera_id == camera_id)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(1)
+    )
+
+
 def _started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
     conditions: list[ColumnElement[bool]] = [TrackRecord.camera_id == camera_id]
     if started_from_s is not None:
         conditions.append(TrackRecord.started_s >= started_from_s)
     return conditions
+
+
+def _outside(spans: Spans) -> list[ColumnElement[bool]]:
+    return [
+        (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s) for from_s, to_s in spans
+    ]
 
 
 def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
@@ -234,19 +313,16 @@ def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .limit(bounds.unsure)
     )
-    outside = [
-        (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s)
-        for from_s, to_s in bounds.without
-    ]
-    later = and_(TrackRecord.id.not_in(newest), *outside)
+    later = and_(TrackRecord.id.not_in(newest), *_outside(bounds.without))
     return [
         *_started_from(bounds.camera_id, bounds.started_from_s),
+        *_outside(bounds.attended),
         (TrackRecord.ended_s <= bounds.reference_to_s) | later,
     ]
 
 
 def _window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
-    inside = _started_from(bounds.camera_id, bounds.started_from_s)
+    inside = [*_started_from(bounds.camera_id, bounds.started_from_s), *_outside(bounds.without)]
     if bounds.ended_after_s is not None:
         inside.append(TrackRecord.ended_s > bounds.ended_after_s)
     if bounds.ended_from_s is not None:

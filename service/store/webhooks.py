@@ -126,9 +126,10 @@ def forget(session: Session, before: datetime) -> int:
 
 
 def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Sequence[AlertRecord]:
-    """Alerts that fire and are not silenced, of some kinds or all."""
+    """Alerts that fire and are not silenced, of some kinds or all; a group for its members."""
     query = select(AlertRecord).where(
         AlertRecord.state == "firing",
+        AlertRecord.group_id.is_(None),
         or_(AlertRecord.silenced_until.is_(None), AlertRecord.silenced_until <= now),
     )
     if kinds is not None:

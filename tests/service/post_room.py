@@ -33,7 +33,15 @@ class PostRoom:
         drift = {"tilt_deg": 5.0, "told": True}
         with self.store.write() as session:
             record = alerts.open_alert(
-                session, "corner", kind, severity, drift, None, reason="tilt +5.00 deg", **more
+                session,
+                self.settings,
+                "corner",
+                kind,
+                severity,
+                drift,
+                None,
+                reason="tilt +5.00 deg",
+                **more,
             )
         return record.id
 

@@ -9,6 +9,7 @@ import pytest
 from service.delivery.alertmanager import alert_name, postable_alerts
 from service.jobs.housekeeping import run_reconcile
 from service.recalibration import alerts
+from service.recalibration.outbox import alert_body
 from tests.service.conftest import problem
 from tests.service.receiver import receiver
 
@@ -68,7 +69,8 @@ def test_an_alert_and_its_end(post_room, inbox, manager):
     moved = datetime.now(UTC) - timedelta(minutes=50)
     with post_room.store.write() as session:
         alerts.open_alert(
-            session, "corner", "drift", "critical", {"tilt_deg": 5.25, "roll_deg": None}, moved,
+            session, post_room.settings, "corner", "drift", "critical",
+            {"tilt_deg": 5.25, "roll_deg": None}, moved,
             reason="tilt +5.25 deg",
         )  # fmt: skip
     post_room.send(manager)
@@ -113,7 +115,9 @@ def test_a_change_that_the_camera_dates_after_its_alert_is_no_contradiction(post
     manager = post_room.hook(inbox.url, format="alertmanager")
     with post_room.store.write() as session:
         ahead = datetime.now(UTC) + timedelta(hours=2)
-        alerts.open_alert(session, "corner", "clock", "warning", {}, ahead, reason="r")
+        alerts.open_alert(
+            session, post_room.settings, "corner", "clock", "warning", {}, ahead, reason="r"
+        )
     post_room.end("clock")
     post_room.send(manager)
     for received in inbox.received:
@@ -242,3 +246,14 @@ def test_a_public_url_makes_links_and_names_come_of_kinds():
     assert alert["generatorURL"] == "https://surefoot.example/alerts/a1"
     assert "camera_id" not in alert["labels"]  # of no one camera
     assert alert["labels"]["alertname"] == alert_name("out_of_range") == "SurefootCameraOutOfRange"
+
+
+def test_a_group_is_told_as_one_alert_of_its_tracker(post_room):
+    alert_id = post_room.open("clock")
+    with post_room.store.read() as session:
+        body = alert_body(alerts.show_alert(session, alert_id))
+    body |= {"camera_id": None, "camera_ids": ["a", "b", "c"], "track_source": "bytetrack"}
+    (alert,) = postable_alerts(body, None, changed=False)
+    assert alert["labels"]["track_source"] == "bytetrack"
+    assert "camera_id" not in alert["labels"]
+    assert alert["annotations"]["summary"] == "clock: 3 cameras of bytetrack"

@@ -71,7 +71,9 @@ def test_alertmanager_holds_what_fires_and_nothing_else(post_room, alertmanager)
     post_room.open("drift", "warning")
     with post_room.store.write() as session:
         ahead = datetime.now(UTC) + timedelta(hours=2)
-        alerts.open_alert(session, "corner", "clock", "warning", {}, ahead, reason="r")
+        alerts.open_alert(
+            session, post_room.settings, "corner", "clock", "warning", {}, ahead, reason="r"
+        )
     post_room.send(hook)
     assert held(alertmanager) == [
         ("SurefootCameraClock", "warning"), ("SurefootCameraDrift", "warning")

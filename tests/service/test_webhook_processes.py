@@ -41,7 +41,9 @@ def open_alert(service, kind):
     """As the estimate job would, in a transaction of another process."""
     store = Store(service.settings)
     with store.write() as session:
-        alerts.open_alert(session, "corner", kind, "warning", {}, None, reason="a test")
+        alerts.open_alert(
+            session, service.settings, "corner", kind, "warning", {}, None, reason="a test"
+        )
     store.close()
 
 

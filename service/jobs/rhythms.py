@@ -1,0 +1,28 @@
+"""The hourly look at when each camera sees people."""
+
+import logging
+from datetime import UTC, datetime
+
+from service.jobs.context import JobContext
+from service.recalibration import upkeep
+from service.recalibration.rhythms import keep_rhythm, learn, take_arrivals
+
+log = logging.getLogger("surefoot.jobs")
+
+
+def run_rhythms(context: JobContext) -> None:
+    """Learn every camera's rhythm anew; before retention, so that its hours are counted whole."""
+    with context.store.read() as session:
+        ids = upkeep.camera_ids(session)
+    learned = 0
+    for camera_id in ids:
+        now = datetime.now(UTC)
+        with context.store.read() as session:
+            arrivals = take_arrivals(session, camera_id, now)
+        if arrivals is None:
+            continue
+        rhythm, counts = learn(arrivals, context.settings, now)
+        with context.store.write() as session:
+            keep_rhythm(session, camera_id, rhythm, counts, now)
+        learned += rhythm is not None
+    log.info("rhythms_learned", extra={"cameras": learned})

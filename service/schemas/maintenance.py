@@ -1,0 +1,65 @@
+"""Bodies of `/cameras/{id}/maintenance`."""
+
+from datetime import UTC, datetime
+from typing import Literal, Self
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+
+from service.schemas.base import Body, Who
+from service.store.alert_tables import MaintenanceRecord
+
+
+class WindowBody(Body):
+    """A time in which somebody is at a camera; it begins now, if not told otherwise."""
+
+    from_: AwareDatetime | None = Field(None, alias="from")
+    to: AwareDatetime
+    reason: str | None = Field(None, max_length=2000)
+    by: Who | None = None
+
+
+class WindowPatch(Body):
+    """What to change of a window; fields left out stay."""
+
+    from_: AwareDatetime | None = Field(None, alias="from")
+    to: AwareDatetime | None = None
+    reason: str | None = Field(None, max_length=2000)
+
+
+class WindowOut(BaseModel):
+    """A maintenance window."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    id: str
+    camera_id: str
+    state: Literal["planned", "under_way", "over"]
+    from_: datetime = Field(serialization_alias="from")
+    to: datetime
+    reason: str | None
+    by: str | None
+    created_at: datetime
+    updated_at: datetime
+
+    @classmethod
+    def from_record(cls, record: MaintenanceRecord) -> Self:
+        """The body of a stored window."""
+        now = datetime.now(UTC)
+        begun, over = record.from_at <= now, record.to_at <= now
+        return cls(
+            id=record.id,
+            camera_id=record.camera_id,
+            state="over" if over else "under_way" if begun else "planned",
+            from_=record.from_at,
+            to=record.to_at,
+            reason=record.reason,
+            by=record.requested_by,
+            created_at=record.created_at,
+            updated_at=record.updated_at,
+        )
+
+
+class WindowList(BaseModel):
+    """Windows in the order of their beginnings."""
+
+    items: list[WindowOut]

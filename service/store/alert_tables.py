@@ -1,0 +1,62 @@
+"""Records beside alerts: what was done with them, and what keeps a camera from having any."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import JSON, ForeignKey, Index, String
+from sqlalchemy.orm import Mapped, mapped_column
+
+from service.store.tables import Record
+
+
+class AlertActRecord(Record):
+    """What somebody, or the service where `by` is None, did with an alert.
+
+    `until` is of a silence, `outcome` of an end; `note` has the words that were given.
+    """
+
+    __tablename__ = "alert_acts"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    alert_id: Mapped[str] = mapped_column(ForeignKey("alerts.id", ondelete="CASCADE"))
+    act: Mapped[str]  # acknowledged, silenced, silence_ended, escalated, resolved
+    by: Mapped[str | None]
+    until: Mapped[datetime | None]
+    outcome: Mapped[str | None]
+    note: Mapped[str | None]
+    at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "alert_id", "id"),)
+
+
+class MaintenanceRecord(Record):
+    """A time in which somebody is at a camera: what is seen in it is not judged."""
+
+    __tablename__ = "maintenance_windows"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
+    from_at: Mapped[datetime]
+    to_at: Mapped[datetime]
+    reason: Mapped[str | None]
+    requested_by: Mapped[str | None]
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "to_at"),)
+
+
+class RhythmRecord(Record):
+    """How many people a camera usually sees when (`models.drift.rhythm`), and how late they come.
+
+    `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
+    """
+
+    __tablename__ = "camera_rhythms"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    profile: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    counts: Mapped[dict[str, Any]]
+    learned_at: Mapped[datetime]

@@ -1,0 +1,47 @@
+"""Statements on maintenance windows."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from service.store.alert_tables import MaintenanceRecord
+
+
+def find(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord | None:
+    """The window of a camera, or None."""
+    record = session.get(MaintenanceRecord, window_id)
+    return record if record is not None and record.camera_id == camera_id else None
+
+
+def of_camera(session: Session, camera_id: str) -> Sequence[MaintenanceRecord]:
+    """A camera's windows in the order of their beginnings."""
+    return session.scalars(
+        select(MaintenanceRecord)
+        .where(MaintenanceRecord.camera_id == camera_id)
+        .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
+    ).all()
+
+
+def under_way(session: Session, camera_id: str, now: datetime) -> MaintenanceRecord | None:
+    """The window that a camera is in, of several the one that ends last; None out of any."""
+    return session.scalars(
+        select(MaintenanceRecord)
+        .where(
+            MaintenanceRecord.camera_id == camera_id,
+            MaintenanceRecord.to_at > now,
+            MaintenanceRecord.from_at <= now,
+        )
+        .order_by(MaintenanceRecord.to_at.desc())
+        .limit(1)
+    ).first()
+
+
+def forget(session: Session, camera_id: str, before: datetime) -> None:
+    """Delete windows that ended before a time."""
+    session.execute(
+        delete(MaintenanceRecord).where(
+            MaintenanceRecord.camera_id == camera_id, MaintenanceRecord.to_at < before
+        )
+    )
