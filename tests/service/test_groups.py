@@ -132,7 +132,7 @@ def test_another_incident_of_another_time_stays_by_itself_until_it_is_one(town):
 
 def test_webhooks_hear_of_the_group_instead_of_its_members(town):
     town.build(5)
-    hook = town.http.post("/webhooks", json={"url": "http://198.51.100.7/hook"}).json()
+    hook = town.http.post("/webhooks", json={"url": "http://93.184.215.14/hook"}).json()
     for n in range(5):
         town.moves(n)
     log = town.http.get(f"/webhooks/{hook['id']}/deliveries").json()["items"]
