@@ -19,6 +19,8 @@ from models.evaluation.alarms import AlarmResults, judge_scene
 from models.evaluation.camera_years import live_year
 from models.evaluation.scenes import load_scene
 from service.alarm_tables import BARS, delay_table, still_table
+from service.recalibration.estimates import drift_limits
+from service.settings import Settings
 
 _TABLE_WIDTH = 130
 
@@ -111,6 +113,7 @@ def _judge(folder: Path, seed: int, plan: AlarmPlan) -> AlarmResults | None:
         tracks_a_day=plan.tracks_a_day,
         years=plan.days / 365.25,
         angles_deg=tuple(BARS),
+        limits=drift_limits(Settings()),
     )
 
 

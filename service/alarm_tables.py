@@ -16,14 +16,14 @@ def still_table(title: str, results: Sequence[AlarmResults]) -> Table:
     table = Table(title=title, title_justify="left")
     for name in (
         "scene",
-        "parties of the reference",
-        "camera-years",
-        "false alarms",
-        "a camera-year",
-        "95 %",
-        "as recorded, of its level",
+        "reference,\nparties",
+        "camera-\nyears",
+        "false\nalarms",
+        "a camera-\nyear (95 %)",
+        "highest,\nof its level",
+        "pose, of\nits limit",
     ):
-        table.add_column(name, justify="left" if name == "scene" else "right", no_wrap=True)
+        table.add_column(name, justify="left" if name == "scene" else "right")
     names = list(dict.fromkeys(result.name for result in results))
     groups = [(name, [one for one in results if one.name == name]) for name in names]
     if len(names) <= 12:
@@ -41,7 +41,7 @@ def delay_table(title: str, results: Sequence[AlarmResults]) -> Table:
     for angle_deg, pan in knocks:
         within = BARS[angle_deg][0] if angle_deg in BARS else 0
         kind = "pan" if pan else "tilt, roll"
-        table.add_column(f"{angle_deg:g} deg {kind}, within {within}", justify="right")
+        table.add_column(f"{angle_deg:g} deg {kind},\nwithin {within}", justify="right")
     names = list(dict.fromkeys(result.name for result in results))
     if len(names) <= 12:
         for name in names:
@@ -61,9 +61,9 @@ def _still_cells(name: str, results: Sequence[AlarmResults]) -> list[str]:
         f"{np.median([result.parties for result in results]):.0f}",
         f"{years:.1f}",
         str(alarms),
-        f"{alarms / years:.2f}",
-        f"{low:.2f} to {high:.2f}",
+        f"{alarms / years:.2f} ({low:.2f} to {high:.2f})",
         f"{max(result.highest for result in results):.2f}",
+        f"{max(result.told for result in results):.2f}",
     ]
 
 

@@ -46,7 +46,7 @@ class Settings(BaseSettings):
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
     )
-    drift_sigmas: float = Field(6.0, gt=0, description="a told drift must exceed so many sd")
+    drift_sigmas: float = Field(5.0, gt=0, description="a told drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
     drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")

@@ -1,25 +1,29 @@
 """How a drift chart does: false alarms of a camera that stands, tracks until one that was knocked.
 
 For recorded scenes by the protocol's halves: one is the reference, and the people of the other are
-drawn some parties after one another (a block bootstrap) for as long as is asked.
+drawn some parties after one another (a block bootstrap) for as long as is asked. An alarm is the
+chart's or the told pose's, whichever comes first, as in the service.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.drift.chart import RUN, DriftChart, Ratios, ratios_of, trace
 from models.drift.chart_learning import learn_chart
 from models.drift.party_scores import PartyScores, Usual, score_parties
-from models.estimation.joint.observations import Observations, observe
+from models.drift.verdict import DriftLimits, drift_between, judge
+from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.site import SiteReference
-from models.evaluation.learned import learn_case
+from models.evaluation.learned import Learned, learn_case
 from models.evaluation.protocol import STILL, draw_case
 from models.evaluation.scenes import Knock, Scene, knock_trajectory
 from models.flow.evidence import walkers_of
 from models.flow.folds import fold_maps
+from models.flow.fusion import fused_estimate
 from models.flow.reference import candidate_of, learn_flow
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -34,6 +38,8 @@ _DRAWS = 10
 _REDRAWN = 4000
 _NONE_SEEN = 3.689  # of a Poisson variable that was 0, the 97.5 % limit of its mean
 _SEED = 0
+_LOOKS = (20, 40, 60, 100, 200, 400)  # tracks after which a pose is asked for
+_FEWEST_WALKERS = 5  # as the service has it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +55,8 @@ class Delay:
 class AlarmResults:
     """One case: false alarms in some camera-years, and delays after knocks.
 
-    `highest` is the largest statistic of the still half as it was recorded, in units of the level.
+    `highest` is the largest statistic of the still half as it was recorded, in units of the level,
+    `told` the largest drift that the pose by that half tells, in units of its limit.
     """
 
     name: str
@@ -58,6 +65,7 @@ class AlarmResults:
     years: float
     false_alarms: int
     highest: float
+    told: float
     delays: tuple[Delay, ...]
 
 
@@ -134,6 +142,7 @@ def judge_scene(
     tracks_a_day: float,
     years: float,
     angles_deg: Sequence[float],
+    limits: DriftLimits,
 ) -> AlarmResults | None:
     """False alarms and delays on a recorded scene; None where too few people walk for a chart."""
     case = draw_case(scene, seed, STILL)
@@ -160,9 +169,12 @@ def judge_scene(
         seen = _seen(scene, case.seen, moved)
         apart = watch.apart(score_parties(seen, watch.usual))
         if len(apart):
+            told = _told_after(learned, seen, limits)
             drawn = (apart[_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
             tracks = seen.tracks / len(apart)
-            delays += [_delay(asked, watch, one, tracks) for one in drawn]
+            delays += [
+                replace(asked, tracks=min(told, first_alarm(watch, one, tracks))) for one in drawn
+            ]
     return AlarmResults(
         name=scene.scene_id,
         seed=seed,
@@ -170,6 +182,7 @@ def judge_scene(
         years=years,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, still).statistic.max()) / watch.level,
+        told=_told(learned, learned.seen, limits),
         delays=tuple(delays),
     )
 
@@ -207,12 +220,28 @@ def first_alarm(watch: Watch, apart: Array, tracks_a_party: float) -> float:
     return (int(beyond[0]) + 1) * tracks_a_party if beyond.size else math.inf
 
 
-def _delay(asked: Delay, watch: Watch, apart: Array, tracks_a_party: float) -> Delay:
-    return Delay(
-        angle_deg=asked.angle_deg,
-        pan=asked.pan,
-        tracks=first_alarm(watch, apart, tracks_a_party),
-    )
+def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """Tracks after which the pose by all until then tells a drift beyond its limit; inf: never.
+
+    Looked at after some numbers of tracks only: a pose takes half a second.
+    """
+    for number in _LOOKS:
+        if number > seen.tracks:
+            break
+        if _told(learned, of_tracks(seen, np.arange(number)), limits) >= 1:
+            return float(number)
+    return math.inf
+
+
+def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """The largest told drift of the pose by what is seen, in units of its limit."""
+    case, flow = learned.case, learned.flow
+    if flow is None or seen.walkers < _FEWEST_WALKERS:
+        return 0.0
+    joint = joint_estimate(seen, case.prior_pose, learned.site)
+    fused = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, flow)
+    drift = drift_between(fused.values, fused.covariance, fused.told, case.prior_pose)
+    return judge(drift, limits, 0, ()).excess
 
 
 def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Observations:

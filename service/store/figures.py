@@ -66,8 +66,10 @@ def newest_estimates(session: Session) -> dict[str, EstimateRecord]:
 
 
 def firing(session: Session) -> Sequence[AlertRecord]:
-    """All alerts that fire."""
-    return session.scalars(select(AlertRecord).where(AlertRecord.state == "firing")).all()
+    """All alerts that fire, but for members of a group, which speaks for them."""
+    return session.scalars(
+        select(AlertRecord).where(AlertRecord.state == "firing", AlertRecord.group_id.is_(None))
+    ).all()
 
 
 def trainings_by_state(session: Session) -> dict[str, int]:

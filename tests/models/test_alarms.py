@@ -60,7 +60,14 @@ def test_alarms_are_renewed_after_each(watch):
 
 def results(alarms, years=1.0, delays=()):
     return AlarmResults(
-        name="x", seed=0, parties=60, years=years, false_alarms=alarms, highest=0.5, delays=delays
+        name="x",
+        seed=0,
+        parties=60,
+        years=years,
+        false_alarms=alarms,
+        highest=0.5,
+        told=0.0,
+        delays=delays,
     )
 
 
