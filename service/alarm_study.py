@@ -15,8 +15,9 @@ from rich.console import Console
 from rich.progress import track
 
 from models.errors import DegenerateGeometryError
-from models.evaluation.alarms import AlarmResults, judge_scene
+from models.evaluation.alarms import AlarmResults
 from models.evaluation.camera_years import live_year
+from models.evaluation.scene_alarms import judge_scene
 from models.evaluation.scenes import load_scene
 from service.alarm_tables import BARS, delay_table, still_table
 from service.recalibration.estimates import drift_limits

@@ -10,16 +10,9 @@ from models.drift.party_scores import score_parties
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.reference import learn_reference
-from models.evaluation.alarms import (
-    DAYS,
-    AlarmResults,
-    Delay,
-    Watch,
-    first_alarm,
-    knocks_of,
-    watch_over,
-)
+from models.evaluation.alarms import DAYS, AlarmResults, Delay, knocks_of
 from models.evaluation.study_site import Place, draw_place, observe_feet
+from models.evaluation.watch import Watch, first_alarm, watch_over
 from models.geometry.pose import CameraPose
 from models.simulation.habits import HabitConfig, walk_days
 from models.simulation.walkers import WalkConfig

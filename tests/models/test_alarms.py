@@ -1,29 +1,34 @@
 """How alarms are measured: renewals, delays and rates by hand; a year of habits."""
 
 import math
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from models.drift.chart import KNOCKS, DriftChart, Knocked, ratios_of
 from models.drift.party_scores import SCORES
+from models.drift.verdict import DriftLimits
 from models.evaluation.alarms import (
     AlarmResults,
     Delay,
-    Watch,
     by_knock,
-    first_alarm,
     knocks_of,
     rate_interval,
     share_within,
 )
 from models.evaluation.camera_years import live_year
+from models.evaluation.scene_alarms import judge_scene
+from models.evaluation.scenes import load_scene
+from models.evaluation.watch import Watch, first_alarm
 from models.geometry.ground import ground_from_pixel
 from models.simulation.habits import DAY_S, HabitConfig, walk_days
 from models.simulation.site import SiteConfig, draw_lanes
 from tests.models.sites import LENS, PRIOR
 
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 QUIET = SiteConfig(noise_px=0.0, standing_share=0.0, between_sd=0.0, within_sd=0.0)
 EVEN = HabitConfig(
     evenness=1e9, rain_share=0.0, crowd_share=0.0, day_sd=0.0, season=0.0, weekend_faster=0.0
@@ -162,3 +167,28 @@ def test_a_simulated_camera_is_quiet_for_six_weeks_and_notices_five_degrees():
     assert found.years == pytest.approx(42 / 365.25)
     assert len(found.delays) == 2
     assert all(delay.tracks <= 60 for delay in found.delays)
+
+
+@pytest.mark.slow
+def test_a_recorded_camera_is_judged_still_and_knocked():
+    folder = SCENES / "wildtrack_c6"
+    if not folder.is_dir():
+        pytest.skip(f"no recorded scenes in {SCENES}")
+    limits = DriftLimits(
+        sigmas=5.0, floor_rad=math.radians(1), floor_m=0.3, updates=3, clear_ratio=0.7
+    )
+    found = judge_scene(
+        load_scene(folder),
+        2,
+        alarms_a_year=1.0,
+        tracks_a_day=100.0,
+        years=0.1,
+        angles_deg=(5.0,),
+        limits=limits,
+    )
+    assert found.false_alarms == 0
+    assert 0 < found.highest < 1
+    assert 0 < found.told < 1
+    assert found.parties == pytest.approx(60, abs=15)
+    assert [len(own) for own in by_knock([found]).values()] == [10, 10]
+    assert share_within(by_knock([found])[(5.0, False)], 130) == 1.0

@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 
 import pytest
 
+from service.recalibration.evidence import gather, weigh
 from service.store import flow_maps, references
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
@@ -78,3 +79,32 @@ def test_new_paths_leave_the_map_out_and_say_so(street):
     assert body["pose"]["heading_deg"] == pytest.approx(40)
     assert "registered" not in body["estimates"]
     assert tracks_of_map(street) == WANTED
+
+
+def test_fewer_allowed_alarms_need_more(street):
+    street.keep_to_lanes(turned(2), 40)
+    levels = []
+    for allowed in (0.01, 1.0, 100.0):
+        settings = street.context.settings.model_copy(update={"false_alarms_per_year": allowed})
+        with street.context.store.read() as session:
+            found = weigh(gather(session, settings, "corner"), 0)
+        levels.append(found.reading.level)
+    assert levels[0] > levels[1] > levels[2]
+
+
+def test_what_was_seen_while_somebody_was_at_the_camera_is_no_alarm(street):
+    street.keep_to_lanes(PRIOR, 40)
+    street.look()
+    window = {"from": at(street.clock_s + 1), "to": at(street.clock_s + 60 * 5 + 2), "by": "Ada"}
+    street.http.post("/cameras/corner/maintenance", json=window).raise_for_status()
+    street.keep_to_lanes(turned(8), 60)
+    street.look()
+    street.keep_to_lanes(PRIOR, 40)
+    assert (street.look()["state"], street.alerts()) == ("ok", [])
+    street.keep_to_lanes(turned(8), 60)
+    street.look()
+    assert [alert["kind"] for alert in street.alerts(state="firing")] == ["drift"]
+
+
+def at(time_s):
+    return datetime.fromtimestamp(time_s, UTC).isoformat()
