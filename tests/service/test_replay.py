@@ -28,7 +28,7 @@ def surefoot(*arguments: str) -> str:
         [sys.executable, "-m", "service.cli", *arguments],
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=280,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
