@@ -1,5 +1,6 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,6 +10,7 @@ from sqlalchemy.orm import Session
 from models.drift.chart import RUN, DriftChart, Reading, read_chart
 from models.drift.chart_packing import chart_from_bytes
 from models.drift.party_scores import Usual, score_parties
+from models.errors import CheckpointError
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -38,6 +40,8 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
 )
+
+log = logging.getLogger("surefoot.recalibration")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,8 +159,9 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     else:
         site = reference_from_bytes(evidence.site)
         flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
-        if flow is not None and evidence.chart is not None:
-            reading = _read(evidence, observations, flow, chart_from_bytes(evidence.chart))
+        chart = _chart_of(evidence)
+        if flow is not None and chart is not None:
+            reading = _read(evidence, observations, flow, chart)
         ends_s = np.array([track.ended_s for track in seen])
         found, observations, joint = change_among(observations, ends_s, lens, prior, site, flow)
         if found is not None:
@@ -179,6 +184,20 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         tracks=seen,
         change=change,
     )
+
+
+def _chart_of(evidence: Evidence) -> DriftChart | None:
+    """The drift chart; None where there is none, or one of another release.
+
+    The pose judges the camera until the next growth of the map brings a new one.
+    """
+    if evidence.chart is None:
+        return None
+    try:
+        return chart_from_bytes(evidence.chart)
+    except CheckpointError as error:
+        log.warning("chart_unreadable", extra={"camera_id": evidence.camera_id, "why": str(error)})
+        return None
 
 
 def _read(

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import pytest
 
+from models.drift.chart_packing import chart_from_bytes
 from service.recalibration.evidence import gather, weigh
 from service.store import flow_maps, references
 from tests.conftest import CAMERA
@@ -108,3 +109,14 @@ def test_what_was_seen_while_somebody_was_at_the_camera_is_no_alarm(street):
 
 def at(time_s):
     return datetime.fromtimestamp(time_s, UTC).isoformat()
+
+
+def test_a_chart_of_another_release_is_done_without(street):
+    with street.context.store.write() as session:
+        reference = references.newest(session, "corner")
+        flow_maps.find(session, reference.id).chart = b"of another release"
+    street.keep_to_lanes(PRIOR, 60)
+    assert street.look()["state"] == "ok"
+    with street.context.store.read() as session:
+        kept = flow_maps.find(session, references.newest(session, "corner").id)
+    assert chart_from_bytes(kept.chart).parties > 100  # the map has grown, and its chart with it
