@@ -122,6 +122,18 @@ def pose_history(
     return estimates.between(session, camera_id, start, end, limit)
 
 
+def thinned_history(
+    session: Session, camera_id: str, start: datetime | None, end: datetime | None, most: int
+) -> Sequence[EstimateRecord]:
+    """At most so many of the estimates between two times, evenly thinned out, oldest first.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    return estimates.thinned(session, camera_id, start, end, most)
+
+
 def accept_pose(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, by: str | None
 ) -> PoseView:
