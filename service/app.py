@@ -18,9 +18,11 @@ from service.routes import (
     alerts,
     cameras,
     events,
+    fleet,
     maintenance,
     metrics,
     operation,
+    pages,
     poses,
     tracks,
     trainings,
@@ -73,8 +75,10 @@ def create_app(settings: Settings) -> FastAPI:
         events,
         operation,
         metrics,
+        fleet,
     ):
         app.include_router(module.router)
+    pages.mount_static(app)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(CalibrationError, _calibration_error)
