@@ -26,6 +26,7 @@ def opencv_yaml(
     rotation, translation = pose.rotation, pose.translation_m[:, None]
     projection = intrinsics.matrix @ np.hstack([rotation, translation])
     image_from_ground = projection[:, [0, 1, 3]]
+    ground_from_image = np.asarray(np.linalg.inv(image_from_ground), dtype=np.float64)
     lines = ["%YAML:1.0", "---"]
     lines += [f"# {' '.join(word.split())}" for word in words]
     lines += [
@@ -42,7 +43,7 @@ def opencv_yaml(
         *_matrix("P", projection),
         "# between (x, y, 1) on the ground in metres and undistorted pixels (u, v, 1)",
         *_matrix("H_image_from_ground", image_from_ground),
-        *_matrix("H_ground_from_image", np.linalg.inv(image_from_ground)),
+        *_matrix("H_ground_from_image", ground_from_image),
     ]
     return "\n".join(lines) + "\n"
 
