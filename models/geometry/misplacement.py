@@ -16,14 +16,16 @@ from models.geometry.pose import CameraPose
 class Misplacement:
     """How far off a person is placed who stands at a distance from the camera's foot.
 
-    `off_m` is None where the wrong pose takes the person to be above its horizon, which is
-    nowhere. `farther_m` is how much of it is along the line of sight, positive away from the
-    camera.
+    `off_m` and `placed_m` are None where the wrong pose takes the person to be above its horizon,
+    which is nowhere. `farther_m` is how much of it is along the line of sight, positive away from
+    the camera. Places are x and y in the world.
     """
 
     distance_m: float
     off_m: float | None
     farther_m: float | None
+    stands_m: tuple[float, float]
+    placed_m: tuple[float, float] | None
 
 
 def misplacements(
@@ -53,9 +55,11 @@ def misplacements(
             distance_m=float(distance),
             off_m=float(np.linalg.norm(step)) if lands else None,
             farther_m=float(step @ away) if lands else None,
+            stands_m=(float(stand[0]), float(stand[1])),
+            placed_m=(float(stand[0] + step[0]), float(stand[1] + step[1])) if lands else None,
         )
-        for distance, step, lands, seen in zip(
-            distances_m, off, hit, intrinsics.contains(uv), strict=True
+        for distance, stand, step, lands, seen in zip(
+            distances_m, stands, off, hit, intrinsics.contains(uv), strict=True
         )
         if seen
     )

@@ -21,6 +21,8 @@ def test_a_lower_tilt_is_believed_to_see_farther():
     assert at.distance_m == 10.0
     assert at.off_m == pytest.approx(1.9175, abs=1e-4)  # 10 / tan 40 deg - 10
     assert at.farther_m == pytest.approx(1.9175, abs=1e-4)
+    assert at.stands_m == pytest.approx((3.0, 8.0))  # heading 0 is along +Y
+    assert at.placed_m == pytest.approx((3.0, 9.9175), abs=1e-4)
 
 
 def test_the_other_way_round_people_come_nearer():
@@ -60,7 +62,7 @@ def test_distances_out_of_the_picture_are_left_out():
 
 def test_a_person_above_the_believed_horizon_is_nowhere():
     (at,) = misplacements(LENS, looks_down(30), looks_down(2), [40.0])  # seen 14 deg down: 14 up
-    assert (at.off_m, at.farther_m) == (None, None)
+    assert (at.off_m, at.farther_m, at.placed_m) == (None, None, None)
 
 
 def test_a_distance_is_above_0():
