@@ -16,6 +16,7 @@ from service.errors import FieldError, ServiceError
 from service.job_queue import JobQueue
 from service.routes import (
     alerts,
+    camera_page,
     cameras,
     events,
     fleet,
@@ -78,6 +79,7 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         metrics,
         fleet,
+        camera_page,
     ):
         app.include_router(module.router)
     pages.mount_static(app)
