@@ -24,6 +24,7 @@ from service.routes import (
     operation,
     pages,
     poses,
+    registration,
     tracks,
     trainings,
     webhooks,
@@ -76,6 +77,7 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         metrics,
         fleet,
+        registration,
     ):
         app.include_router(module.router)
     pages.mount_static(app)
