@@ -25,6 +25,7 @@ from service.routes import (
     operation,
     pages,
     poses,
+    registration,
     snapshots,
     tracks,
     trainings,
@@ -80,6 +81,7 @@ def create_app(settings: Settings) -> FastAPI:
         metrics,
         fleet,
         camera_page,
+        registration,
     ):
         app.include_router(module.router)
     pages.mount_static(app)

@@ -19,6 +19,7 @@ from service.web.camera_drawings import draw_camera
 from service.web.camera_words import Clock
 from service.web.moments import next_morning
 from service.web.sentences import headline
+from service.web.words import STATES
 
 router = APIRouter(include_in_schema=False)
 
@@ -49,6 +50,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         flags=camera_words.flags(page, clock),
         deeds=[(deed, camera_words.deed_words(deed, clock)) for deed in page.deeds],
         words=camera_words,
+        states=STATES,
         chart_facts=_chart_facts(page),
         tomorrow=next_morning(page.now, zone).isoformat(),
         charts_url=CHARTS_URL,

@@ -10,8 +10,9 @@ from service.recalibration.camera_page import CameraPage
 from service.recalibration.deeds import Deed
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
-from service.web.moments import ago, when
+from service.web.moments import when
 from service.web.sentences import NAMES, Z90, signed
+from service.web.words import ago
 
 KINDS = {
     "drift": "The camera moved",
@@ -25,13 +26,6 @@ OUTCOMES = {
     "false_alarm": "false alarm",
     "cleared": "ended by itself",
     "camera_removed": "camera removed",
-}
-STATES = {
-    "ok": "In place",
-    "learning": "Learning",
-    "drifting": "Moved",
-    "no_data": "No people",
-    "out_of_range": "Beyond range",
 }
 _UNCHANGED_M = 0.05
 _DEEDS = {

@@ -20,20 +20,6 @@ def when(at: datetime, now: datetime, zone: tzinfo) -> str:
     return f"{local.day} {local:%b}{year}, {clock}"
 
 
-def span(seconds: float) -> str:
-    """A length of time in its largest unit: "40 s", "12 min", "5 h", "3 days"."""
-    for unit, name in ((86_400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 1.95 * unit or (unit < 86_400 and seconds >= 0.95 * unit):
-            return f"{seconds / unit:.0f} {name}"
-    return f"{max(seconds, 0.0):.0f} s"
-
-
-def ago(at: datetime, now: datetime) -> str:
-    """How long ago a time is; "just now" within seconds, or if its clock is ahead."""
-    seconds = (now - at).total_seconds()
-    return "just now" if seconds < 5 else f"{span(seconds)} ago"
-
-
 def next_morning(now: datetime, zone: tzinfo) -> datetime:
     """Eight o'clock of tomorrow, by the cameras' clock."""
     local = now.astimezone(zone) + timedelta(days=1)

@@ -125,7 +125,7 @@ def picture_svg(
     """
     if ground is None and overlays:
         ground = ground_of(lens, overlays[0].pose)
-    parts = []
+    parts, seen = [], not overlays
     if snapshot_url is not None:
         parts.append(
             f'<image href="{escape(snapshot_url)}" x="-0.5" y="-0.5" width="{lens.width}" '
@@ -135,8 +135,15 @@ def picture_svg(
         if ground is not None:
             drawn = grid_path(lens, overlay.pose, ground)
             parts.append(f'<path class="grid {overlay.kind}" d="{drawn}"/>')
+            seen = seen or bool(drawn)
         drawn = horizon_path(lens, overlay.pose)
         parts.append(f'<path class="horizon {overlay.kind}" d="{drawn}"/>')
+        seen = seen or bool(drawn)
+    if not seen:
+        parts.append(
+            f'<text class="nothing" x="{lens.width / 2:.0f}" y="{lens.height / 2:.0f}" '
+            f'text-anchor="middle" font-size="{lens.width / 24:.0f}">nothing but sky</text>'
+        )
     if tracks:
         parts.append(f'<path class="track" d="{path_data(tracks, picture_frame(lens))}"/>')
     return Markup(

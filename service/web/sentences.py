@@ -6,7 +6,8 @@ from datetime import UTC, datetime, tzinfo
 from models.estimation.numbers import ANGLES
 from service.recalibration.camera_page import CameraPage
 from service.store.tables import EstimateRecord
-from service.web.moments import span, when
+from service.web.moments import when
+from service.web.words import duration
 
 # Operators say pan. Height is told apart.
 NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
@@ -29,7 +30,9 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
         return f"{quiet} {before}".strip()
     if page.pose.state == "learning" or estimate is None:
         return _learning(page)
-    people = f"{estimate.tracks} people of the last {span(estimate.to_s - estimate.from_s)} show"
+    people = (
+        f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
+    )
     if page.pose.state == "out_of_range":
         return (
             f"At the edge of what its model was trained for: {turned(estimate)}, as {people}. "

@@ -138,6 +138,7 @@ def test_an_alert_is_resolved_as_a_false_alarm_by_keyboard_alone(seen, knocked):
     seen.get_by_label("Note (optional)").focus()
     seen.keyboard.type("a truck")
     seen.keyboard.press("Enter")
+    expect(seen.get_by_label("Kept beside what you do here")).to_be_focused()
     seen.keyboard.type("Ada")
     seen.keyboard.press("Enter")
     expect(seen.locator("section.alert")).to_have_count(0)
@@ -208,7 +209,7 @@ def test_a_knocked_street_is_seen_to_be_knocked(page, server):
         street.keep_to_lanes(STREET_PRIOR, 25)
         street.look()
     expect(page.locator(".headline")).to_contain_text("Standing where it should", timeout=30_000)
-    page.wait_for_function("document.getElementById('charts').dataset.points >= 4")
+    expect(page.locator("#charts")).to_have_attribute("data-points", re.compile("^[4-9]"))
     shoot(page, "camera-still")
     for _ in range(4):
         street.keep_to_lanes(KNOCKED, 15)

@@ -25,7 +25,7 @@ export async function call(method, url, body, headers = {}) {
   } catch {
     throw new Refused({ title: "No answer", detail: "The service does not answer. Is it running?" });
   }
-  const isJson = (answer.headers.get("Content-Type") || "").includes("json");
+  const isJson = answer.status !== 204 && (answer.headers.get("Content-Type") || "").includes("json");
   const document = isJson ? await answer.json() : null;
   if (answer.ok) return document;
   throw new Refused(document ?? { title: `Error ${answer.status}`, detail: answer.statusText });

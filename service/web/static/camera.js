@@ -3,6 +3,7 @@
 import { Refused, announce, call, confirmed, guarded } from "./act.js";
 import { ask, myName, nameMe } from "./camera_dialogs.js";
 import { debounced, subscribe } from "./events.js";
+import { keepTimes } from "./times.js";
 
 const root = document.getElementById("camera");
 const camera = root.dataset.camera;
@@ -49,22 +50,7 @@ subscribe(({ data }) => {
   if (data.camera_id === camera || data.camera_ids?.includes(camera)) soon();
 });
 
-// --- Times -------------------------------------------------------------------------------------
-
-const UNITS = [[86400, "days"], [3600, "h"], [60, "min"], [1, "s"]];
-
-/** How long ago, in the words of service/web/moments.py. */
-function ago(seconds) {
-  if (seconds < 5) return "just now";
-  const [unit, name] = UNITS.find(([each]) => seconds >= (each === 86400 ? 1.95 : 0.95) * each);
-  return `${Math.round(seconds / unit)} ${name} ago`;
-}
-
-setInterval(() => {
-  for (const each of document.querySelectorAll("time[data-ago]")) {
-    each.textContent = ago((Date.now() - Date.parse(each.dateTime)) / 1000);
-  }
-}, 15_000);
+keepTimes(document.querySelector('[data-part="summary"]'));
 
 // --- Actions -----------------------------------------------------------------------------------
 
