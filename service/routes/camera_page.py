@@ -46,7 +46,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         headline=headline(page, zone),
         drawings=draw_camera(page),
         numbers=camera_words.number_rows(page.camera.prior_pose, page.pose.pose, estimate),
-        misplaced=[camera_words.misplaced_words(each) for each in page.misplaced],
+        misplaced=camera_words.misplaced_words(page.misplaced),
         flags=camera_words.flags(page, clock),
         deeds=[(deed, camera_words.deed_words(deed, clock)) for deed in page.deeds],
         words=camera_words,

@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from service.recalibration.camera_page import CameraPage
 from service.web.ground_plan import ground_plan_svg
-from service.web.picture import Overlay, ground_of, picture_svg
+from service.web.picture import Overlay, ground_of, horizon_path, picture_svg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,6 +18,7 @@ class CameraDrawings:
     spacing_m: float | None
     people: int
     two_poses: bool
+    horizon: bool
 
 
 def draw_camera(page: CameraPage) -> CameraDrawings:
@@ -58,4 +59,5 @@ def draw_camera(page: CameraPage) -> CameraDrawings:
         spacing_m=None if ground is None else ground.spacing_m,
         people=len(feet),
         two_poses=len(overlays) > 1,
+        horizon=any(horizon_path(lens, each.pose) for each in overlays),
     )

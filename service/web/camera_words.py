@@ -1,6 +1,7 @@
 """The rest of a camera's page in words: numbers of the pose, deeds, what a move means, flags."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
 
@@ -80,7 +81,7 @@ def number_rows(
     for name, words in NAMES.items():
         before, after = (_number(pose, name) for pose in (prior, served))
         unit, digits = (" m", 2) if name == "height" else ("°", 1)
-        row = {"name": words, "prior": f"{before:.{digits}f}{unit}"}
+        row = {"name": words.capitalize(), "prior": _text(before, digits) + unit}
         if estimate is not None and name in told:
             suffix = "_m" if name == "height" else "_rad"
             drift = float(getattr(estimate, f"drift_{name}{suffix}"))
@@ -88,7 +89,7 @@ def number_rows(
             if name != "height":
                 drift, sd = math.degrees(drift), math.degrees(sd)
             row |= {
-                "served": f"{after:.{digits}f}{unit}",
+                "served": _text(after, digits) + unit,
                 "drift": f"{signed(drift, digits)}{unit}",
                 "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
             }
@@ -96,18 +97,27 @@ def number_rows(
     return tuple(rows)
 
 
-def misplaced_words(each: Misplacement) -> str:
-    """What a move means for a person at a distance."""
-    where = f"A person at {each.distance_m:.0f} m"
-    if each.off_m is None or each.farther_m is None:
-        return f"{where} is placed nowhere: the prior pose takes them to be above the horizon."
-    if each.off_m < _UNCHANGED_M:
-        return f"{where} is placed where they stand."
+def misplaced_words(each: Sequence[Misplacement]) -> str:
+    """What a move means on the ground: "A person at 10 m is now placed 1.7 m too far, …"."""
+    if not each:
+        return ""
+    if all(one.off_m is not None and one.off_m < _UNCHANGED_M for one in each):
+        far = each[-1].distance_m
+        return f"By the prior pose, people up to {far:.0f} m away are placed where they stand."
+    first, *others = each
+    parts = [f"A person at {first.distance_m:.0f} m is now placed {_off_words(first)}"]
+    parts += [f"at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
+    return f"{', '.join(parts)}: by the prior pose, against the served one."
+
+
+def _off_words(one: Misplacement) -> str:
+    if one.off_m is None or one.farther_m is None:
+        return "above the horizon, which is nowhere"
     way = ""
     # Mostly along the line of sight; else to a side.
-    if abs(each.farther_m) > 0.7 * each.off_m:
-        way = ", too far away" if each.farther_m > 0 else ", too near"
-    return f"{where} is now placed {each.off_m:.1f} m off{way}."
+    if abs(one.farther_m) > 0.7 * one.off_m and one.off_m >= _UNCHANGED_M:
+        way = " too far" if one.farther_m > 0 else " too near"
+    return f"{one.off_m:.1f} m{way or ' off'}"
 
 
 def deed_words(deed: Deed, clock: Clock) -> str:
@@ -151,6 +161,10 @@ def flags(page: CameraPage, clock: Clock) -> tuple[str, ...]:
             cameras = len(story.group.camera_ids or [])
             found.append(f"One of {cameras} cameras of {record.track_source} at once")
     return tuple(dict.fromkeys(found))
+
+
+def _text(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def _number(pose: CameraPose, name: str) -> float:

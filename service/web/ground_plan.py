@@ -16,8 +16,9 @@ from service.web.picture import Overlay
 from service.web.strokes import Frame, path_data
 
 _SIZE_PX = 640.0
-_MARGIN_PX = 34.0
-_FLATTEST = 0.62  # height over width, so that it lies well beside the picture
+_MARGIN_PX = 18.0
+_STRIP_PX = 26.0  # below the ground, for the scale and +Y
+_HEIGHT_PX = 470.0
 _BORDER = 25  # pixels of each side of the picture's edge
 _REACH = 10.0  # camera heights, where no track says how far people are seen
 _FARTHEST = 30.0
@@ -31,7 +32,6 @@ class Plan:
     left_m: float
     top_m: float
     px_per_m: float
-    height_px: float
 
     def on_paper(self, ground_m: Array) -> Array:
         """Where points of the ground (N, 2) lie, in pixels from the left upper corner."""
@@ -40,7 +40,7 @@ class Plan:
     @property
     def frame(self) -> Frame:
         """The edges of the paper."""
-        return Frame(left=0.0, top=0.0, right=_SIZE_PX, bottom=self.height_px)
+        return Frame(left=0.0, top=0.0, right=_SIZE_PX, bottom=_HEIGHT_PX)
 
 
 def ground_plan_svg(
@@ -76,7 +76,7 @@ def ground_plan_svg(
     parts += [_stroke(plan, each) for each in misplaced]
     parts += [_camera(plan, pose), _north(), _scale_bar(plan)]
     return Markup(
-        f'<svg class="picture plan" viewBox="0 0 {_SIZE_PX:.0f} {plan.height_px:.0f}" role="img" '
+        f'<svg class="picture plan" viewBox="0 0 {_SIZE_PX:.0f} {_HEIGHT_PX:.0f}" role="img" '
         f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
     )
 
@@ -101,14 +101,12 @@ def view_outline(lens: Intrinsics, pose: CameraPose, reach_m: float) -> Array:
 def plan_around(points_m: Array) -> Plan:
     """The paper that shows some points of the ground (N, 2), all of them."""
     (left, low), (right, high) = points_m.min(0).tolist(), points_m.max(0).tolist()
-    room = _SIZE_PX - 2 * _MARGIN_PX
-    px_per_m = room / max(right - left, high - low, 1.0)
-    height_px = max((high - low) * px_per_m + 2 * _MARGIN_PX, _FLATTEST * _SIZE_PX)
+    wide, tall = _SIZE_PX - 2 * _MARGIN_PX, _HEIGHT_PX - 2 * _MARGIN_PX - _STRIP_PX
+    px_per_m = min(wide / max(right - left, 1.0), tall / max(high - low, 1.0))
     return Plan(
         left_m=(left + right - _SIZE_PX / px_per_m) / 2,
-        top_m=(low + high + height_px / px_per_m) / 2,
+        top_m=(low + high + (_HEIGHT_PX - _STRIP_PX) / px_per_m) / 2,
         px_per_m=px_per_m,
-        height_px=height_px,
     )
 
 
@@ -135,7 +133,7 @@ def _stroke(plan: Plan, each: Misplacement) -> str:
     stands = plan.on_paper(np.array([each.stands_m]))[0]
     x, y = stands
     words = f"{each.distance_m:.0f} m"
-    inside = 0 < x < _SIZE_PX and 0 < y < plan.height_px
+    inside = 0 < x < _SIZE_PX and 0 < y < _HEIGHT_PX
     if not inside:
         return ""
     line = ""
@@ -157,19 +155,19 @@ def _camera(plan: Plan, pose: CameraPose) -> str:
 
 
 def _north() -> str:
-    x, y = _SIZE_PX - 24, 44
+    x, y = _SIZE_PX - 14, _HEIGHT_PX - 8
     return (
         f'<path class="mark" d="M{x:.0f} {y}V{y - 22}M{x - 5:.0f} {y - 14}L{x:.0f} {y - 22}'
-        f'L{x + 5:.0f} {y - 14}"/><text class="halo" x="{x:.0f}" y="{y + 15}" '
-        'text-anchor="middle">+Y</text>'
+        f'L{x + 5:.0f} {y - 14}"/><text class="halo" x="{x - 9:.0f}" y="{y - 4}" '
+        'text-anchor="end">+Y</text>'
     )
 
 
 def _scale_bar(plan: Plan) -> str:
     fits = [length for length in _SCALES_M if length * plan.px_per_m <= 0.28 * _SIZE_PX]
     length = fits[-1] if fits else _SCALES_M[0]
-    left, y, wide = 20.0, plan.height_px - 18, length * plan.px_per_m
+    left, y, wide = 12.0, _HEIGHT_PX - 8, length * plan.px_per_m
     return (
         f'<path class="mark" d="M{left} {y - 5:.1f}V{y:.1f}H{left + wide:.1f}V{y - 5:.1f}"/>'
-        f'<text class="halo" x="{left + 4}" y="{y - 8:.1f}">{length:g} m</text>'
+        f'<text class="halo" x="{left + wide + 8:.1f}" y="{y:.1f}">{length:g} m</text>'
     )

@@ -34,41 +34,53 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
     if page.pose.state == "out_of_range":
-        return (
-            f"At the edge of what its model was trained for: {turned(estimate)}, as {people}. "
-            "No alert of a drift yet."
-        )
+        how = moved_words(estimate)
+        edge = "At the edge of what its model was trained for"
+        return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
     if estimate.drift_streak > 0 or estimate.suspected:
-        return f"It may have moved: {turned(estimate)}. The next people will tell."
+        how = moved_words(estimate)
+        return f"It may have moved{how and ': it ' + how}. The next people will tell."
     return f"Standing where it should, as {people}{_sure(estimate)}."
 
 
-def turned(estimate: EstimateRecord) -> str:
-    """How far, in words, which numbers, and how sure: of what is told."""
-    parts = []
+def turn_words(estimate: EstimateRecord) -> str:
+    """How far a camera has turned: "turned 5.1° (pan +4.9°, tilt −1.2°)"; empty where untold.
+
+    What is within its own 90 % interval is not named.
+    """
     angles = [name for name in ("heading", "tilt", "roll") if name in estimate.told]
-    if angles:
-        each = [f"{NAMES[name]} {signed(_degrees(estimate, name), 1)}°" for name in angles]
-        large = [
-            text
-            for name, text in zip(angles, each, strict=True)
-            if abs(_degrees(estimate, name)) >= _SAYS_DEG
-        ]
-        # A lone angle has said it all.
-        detail = f" ({', '.join(large)})" if large and len(angles) > 1 else ""
-        whole = f"{math.degrees(estimate.drift_angle_rad):.1f}°"
-        parts.append(f"turned by {whole}{detail}")
-    if "height" in estimate.told and abs(estimate.drift_height_m) >= _height_says_m(estimate):
-        way = "higher" if estimate.drift_height_m > 0 else "lower"
-        parts.append(f"{abs(estimate.drift_height_m):.2f} m {way}")
-    text = " and ".join(parts) or "nothing that the tracks could tell"
-    return text
+    named = [
+        f"{NAMES[name]} {signed(_degrees(estimate, name), 1)}°"
+        for name in angles
+        if abs(_degrees(estimate, name)) >= _says_deg(estimate, name)
+    ]
+    if not angles:
+        return ""
+    detail = f" ({', '.join(named)})" if named else ""
+    return f"turned {math.degrees(estimate.drift_angle_rad):.1f}°{detail}"
+
+
+def height_words(estimate: EstimateRecord) -> str:
+    """How far a camera was raised or lowered: "0.24 m higher"; empty where that is not told."""
+    if "height" not in estimate.told or abs(estimate.drift_height_m) < _height_says_m(estimate):
+        return ""
+    way = "higher" if estimate.drift_height_m > 0 else "lower"
+    return f"{abs(estimate.drift_height_m):.2f} m {way}"
+
+
+def moved_words(estimate: EstimateRecord, since: str = "") -> str:
+    """How a camera has moved, after its name: "turned 5.1° (tilt +5.1°) and is 0.24 m higher"."""
+    turn, height = turn_words(estimate), height_words(estimate)
+    if height and estimate.drifted == ["height"]:
+        return f"is {height} than it should be{since and ', since'}{since}"
+    parts = [f"{turn}{since}" if turn else "", f"is {height}" if height else ""]
+    return " and ".join(part for part in parts if part)
 
 
 def signed(value: float, digits: int) -> str:
     """A number with its sign, a real minus, and never a minus nought."""
     text = f"{value:+.{digits}f}"
-    return ("0" + text[2:] if float(text) == 0 else text).replace("-", "\u2212")
+    return ("0" + text[2:] if float(text) == 0 else text).replace("-", "\N{MINUS SIGN}")
 
 
 def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
@@ -90,16 +102,15 @@ def _moved(page: CameraPage, estimate: EstimateRecord, zone: tzinfo) -> str:
     if estimate.drift_since is not None:
         since = f" about {when(estimate.drift_since, page.now, zone)}"
     if any(story.record.kind == "clock" for story in page.firing):
+        how = moved_words(estimate)
         return (
             f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
-            f"frame rate looks like that, or the camera is {turned(estimate)}{_sure(estimate)}."
+            f"frame rate looks like that{how and ', or the camera ' + how}{_sure(estimate)}."
         )
-    if not estimate.told:
+    words = moved_words(estimate, since)
+    if not words or not set(estimate.drifted) & set(estimate.told):
         return f"The camera moved{since}; the newest people cannot tell how far."
-    text = turned(estimate)
-    if text.startswith("turned by"):
-        return f"The camera {text}{since}{_sure(estimate)}."
-    return f"The camera is {text} than it should be{since and ', since' + since}{_sure(estimate)}."
+    return f"The camera {words}{_sure(estimate)}."
 
 
 def _sure(estimate: EstimateRecord) -> str:
@@ -127,6 +138,10 @@ def _degrees(estimate: EstimateRecord, name: str) -> float:
 
 def _sd(estimate: EstimateRecord, name: str) -> float:
     return float(getattr(estimate, f"{name}_sd_rad") or 0.0)
+
+
+def _says_deg(estimate: EstimateRecord, name: str) -> float:
+    return max(Z90 * math.degrees(_sd(estimate, name)), _SAYS_DEG)
 
 
 def _height_says_m(estimate: EstimateRecord) -> float:
