@@ -162,6 +162,23 @@ def test_the_history_is_in_units_of_the_limits(bench):
     assert history[-1] > 3
 
 
+def test_a_large_page_is_packed_for_who_takes_it(http, fleet):
+    afternoon(fleet, 20)
+    packed = http.get("/")
+    plain = http.get("/", headers={"Accept-Encoding": "identity"})
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert rows(packed.text) == rows(plain.text)
+
+
+def test_who_looks_for_a_page_that_is_not_there_gets_one(http):
+    page = http.get("/ui/nothing", headers={"Accept": "text/html,*/*"})
+    assert page.status_code == 404
+    assert page.headers["content-type"].startswith("text/html")
+    assert "All cameras" in page.text
+    assert http.get("/ui/nothing").headers["content-type"] == "application/problem+json"
+
+
 def test_lines_are_made_without_a_store():
     assert rows_of([], datetime.now(UTC), UTC) == []
     assert [duration(s) for s in (3, 100, 7000, 2e5)] == ["3 s", "2 min", "2 h", "2 days"]
