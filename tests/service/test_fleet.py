@@ -110,6 +110,24 @@ def test_names_are_text_and_never_run(http, fleet):
     assert "unsafe" not in policy
 
 
+def test_no_statement_reads_through_what_grows(http, fleet, settings):
+    """Tracks and estimates are millions: of each camera, a few are looked up."""
+    afternoon(fleet, 12)
+    plans = []
+
+    def note(_conn, cursor, statement, parameters, *_):
+        if statement.startswith("SELECT"):
+            explain = cursor.connection.execute(f"EXPLAIN QUERY PLAN {statement}", parameters)
+            plans.extend(row[3] for row in explain)
+
+    event.listen(fleet.store.engine, "before_cursor_execute", note)
+    with fleet.store.read() as session:
+        use_cases.list_fleet(session, settings)
+        use_cases.list_groups(session)
+    assert plans
+    assert not [plan for plan in plans if re.match(r"SCAN (tracks|estimates|events)", plan)]
+
+
 def test_it_asks_as_many_statements_for_many_cameras_as_for_one(http, fleet, settings):
     def statements_of():
         seen = []
