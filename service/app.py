@@ -8,7 +8,7 @@ from typing import TypedDict
 from fastapi import FastAPI, Request
 from fastapi.encoders import jsonable_encoder
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
 
 from models.errors import CalibrationError
@@ -93,16 +93,16 @@ def create_app(settings: Settings) -> FastAPI:
     return app
 
 
-def _service_error(_: Request, error: Exception) -> JSONResponse:
+def _service_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ServiceError)
-    return _problem(error.status, error.code, error.detail, error.errors)
+    return _problem(request, error.status, error.code, error.detail, error.errors)
 
 
-def _calibration_error(_: Request, error: Exception) -> JSONResponse:
-    return _problem(409, "calibration", str(error))
+def _calibration_error(request: Request, error: Exception) -> Response:
+    return _problem(request, 409, "calibration", str(error))
 
 
-def _validation_error(_: Request, error: Exception) -> JSONResponse:
+def _validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     errors = tuple(
         FieldError(
@@ -112,19 +112,23 @@ def _validation_error(_: Request, error: Exception) -> JSONResponse:
         for item in error.errors()
     )
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
-    return _problem(422, "malformed", detail, errors)
+    return _problem(request, 422, "malformed", detail, errors)
 
 
-def _http_error(_: Request, error: Exception) -> JSONResponse:
+def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
-    return _problem(error.status_code, code, str(error.detail))
+    return _problem(request, error.status_code, code, str(error.detail))
 
 
 def _problem(
-    status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
-) -> JSONResponse:
-    """A problem document (RFC 9457)."""
+    request: Request, status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
+) -> Response:
+    """A problem document (RFC 9457); for who looks for a page, a page."""
+    if pages.wants_page(request):
+        return pages.render(
+            request, "problem.html", status, title=HTTPStatus(status).phrase, detail=detail
+        )
     content = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,

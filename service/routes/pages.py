@@ -1,5 +1,6 @@
 """What every page shares: templates, static files, and the headers that keep strangers out."""
 
+import gzip
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import service.web
 
 _WEB = Path(service.web.__file__).parent
 _STATIC = _WEB / "static"
+_LARGE = 16_384  # bytes; a phone far away gets larger pages packed
 # No other host, no inline script, no inline style, no frame: a name that was typed is never run.
 HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; object-src 'none'; "
@@ -54,8 +56,20 @@ def mount_static(app: FastAPI) -> None:
     app.mount(STATIC_URL, _KeptFiles(directory=_STATIC), name="static")
 
 
+def wants_page(request: Request) -> bool:
+    """Whether somebody looks for a page in a browser, rather than a program for an answer."""
+    looks = request.method == "GET" and request.url.path.startswith("/ui/")
+    return looks and "text/html" in request.headers.get("accept", "")
+
+
 def render(request: Request, template: str, status: int = 200, **context: Any) -> HTMLResponse:
     """A page, or a part of one, out of a template; everything in it is escaped."""
-    return templates.TemplateResponse(
+    page = templates.TemplateResponse(
         request, template, context, status_code=status, headers=HEADERS
     )
+    if len(page.body) > _LARGE and "gzip" in request.headers.get("accept-encoding", ""):
+        page.body = gzip.compress(page.body, compresslevel=4)
+        page.headers["Content-Encoding"] = "gzip"
+        page.headers["Content-Length"] = str(len(page.body))
+        page.headers["Vary"] = "Accept-Encoding"
+    return page

@@ -54,14 +54,16 @@ def drift_history(
         _ratio("height", e.drift_height_m, e.height_sd_m, limits, limits.floor_m),
     ]
     query = (
-        select(e.camera_id, func.nullif(func.max(*ratios), -1.0))
-        .join(CameraRecord, (e.camera_id == CameraRecord.id) & (e.id >= func.coalesce(first, 0)))
+        select(CameraRecord.id, e.id, func.nullif(func.max(*ratios), -1.0))
+        # Outer: cameras come first, and of each only its newest estimates are looked at.
+        .outerjoin(e, (e.camera_id == CameraRecord.id) & (e.id >= func.coalesce(first, 0)))
         .where(among(CameraRecord.id, ids))
-        .order_by(e.camera_id, e.id)
+        .order_by(CameraRecord.id, e.id)
     )
     found: dict[str, list[float | None]] = defaultdict(list)
-    for camera_id, ratio in session.connection().execute(query):
-        found[camera_id].append(ratio)
+    for camera_id, estimate_id, ratio in session.connection().execute(query):
+        if estimate_id is not None:
+            found[camera_id].append(ratio)
     return found
 
 

@@ -18,7 +18,7 @@ from models.geometry.rotation import Array
 from service.web.strokes import Frame, path_data
 
 _SPACINGS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-_LINES = 14  # about so many lie across the view
+_LINES = 20  # about so many lie across the view
 _FAR = 12.0  # heights away, where a grid would be mere noise
 _ALONG = 61  # points of a line, so that it bends with the lens
 _LATTICE = 41

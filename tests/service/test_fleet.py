@@ -110,6 +110,24 @@ def test_names_are_text_and_never_run(http, fleet):
     assert "unsafe" not in policy
 
 
+def test_no_statement_reads_through_what_grows(http, fleet, settings):
+    """Tracks and estimates are millions: of each camera, a few are looked up."""
+    afternoon(fleet, 12)
+    plans = []
+
+    def note(_conn, cursor, statement, parameters, *_):
+        if statement.startswith("SELECT"):
+            explain = cursor.connection.execute(f"EXPLAIN QUERY PLAN {statement}", parameters)
+            plans.extend(row[3] for row in explain)
+
+    event.listen(fleet.store.engine, "before_cursor_execute", note)
+    with fleet.store.read() as session:
+        use_cases.list_fleet(session, settings)
+        use_cases.list_groups(session)
+    assert plans
+    assert not [plan for plan in plans if re.match(r"SCAN (tracks|estimates|events)", plan)]
+
+
 def test_it_asks_as_many_statements_for_many_cameras_as_for_one(http, fleet, settings):
     def statements_of():
         seen = []
@@ -160,6 +178,23 @@ def test_the_history_is_in_units_of_the_limits(bench):
             expected.append(max(abs(drift[n]) / limits.of(n, sd[n]) for n in e.told))
     assert history == pytest.approx(expected)
     assert history[-1] > 3
+
+
+def test_a_large_page_is_packed_for_who_takes_it(http, fleet):
+    afternoon(fleet, 20)
+    packed = http.get("/")
+    plain = http.get("/", headers={"Accept-Encoding": "identity"})
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert rows(packed.text) == rows(plain.text)
+
+
+def test_who_looks_for_a_page_that_is_not_there_gets_one(http):
+    page = http.get("/ui/nothing", headers={"Accept": "text/html,*/*"})
+    assert page.status_code == 404
+    assert page.headers["content-type"].startswith("text/html")
+    assert "All cameras" in page.text
+    assert http.get("/ui/nothing").headers["content-type"] == "application/problem+json"
 
 
 def test_lines_are_made_without_a_store():

@@ -51,8 +51,7 @@ def walks(speed_mps=1.3, rate_hz=25.0, count=6, pose=POSE):
     frames = np.arange(0, 150, 5.0)
     found = []
     for n in range(count):
-        start = pose.centre_m[:2] + (16 + n) * ahead
-        ground = start + np.outer(frames / rate_hz * speed_mps, [ahead[1] * 0.3, ahead[0] * 0.3])
+        start = pose.centre_m[:2] + (18 + n) * ahead + (n - 2.5) * np.array([ahead[1], -ahead[0]])
         ground = start + np.outer(frames / rate_hz * speed_mps, -ahead * (-1) ** n)
         uv, valid = pixel_from_ground(lens, pose.rotation, pose.centre_m, ground)
         assert valid.all()

@@ -72,7 +72,7 @@ async function look() {
     picture.innerHTML = answer.picture;
     const label = picture.firstElementChild.getAttribute("aria-label").split("; ")[1];
     document.getElementById("squares").textContent = `ground, ${label}`;
-    document.getElementById("caption").hidden = false;
+    document.getElementById("caption").hidden = !picture.querySelector(".grid");
   }
   document.getElementById("ground").innerHTML = answer.ground;
   document.getElementById("ground-figure").hidden = !answer.ground;
