@@ -106,8 +106,8 @@ def misplaced_words(each: Sequence[Misplacement]) -> str:
         return f"By the prior pose, people up to {far:.0f} m away are placed where they stand."
     first, *others = each
     parts = [f"A person at {first.distance_m:.0f} m is now placed {_off_words(first)}"]
-    parts += [f"at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
-    return f"{', '.join(parts)}: by the prior pose, against the served one."
+    parts += [f"one at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
+    return f"{', '.join(parts)}."
 
 
 def _off_words(one: Misplacement) -> str:

@@ -218,6 +218,7 @@ def test_a_knocked_street_is_seen_to_be_knocked(page, server):
     expect(page.get_by_role("heading", name="The camera moved")).to_be_visible(timeout=30_000)
     expect(page.locator(".headline")).to_contain_text("turned", timeout=30_000)
     page.wait_for_timeout(1500)
+    page.evaluate("document.getElementById('announce').textContent = ''")
     told = page.locator(".headline").inner_text()
     angle = float(re.search(r"turned (\d+\.\d)°", told)[1])
     assert angle == pytest.approx(math.hypot(5, 4), abs=1.0), told

@@ -137,6 +137,9 @@ def test_the_page_lets_no_stranger_in(corner):
 
 def test_there_is_no_page_of_no_camera(http):
     problem(http.get("/ui/cameras/nowhere"), 404, "not_found")
+    looked_for = http.get("/ui/cameras/nowhere", headers={"Accept": "text/html"})
+    assert looked_for.status_code == 404
+    assert looked_for.headers["content-type"].startswith("text/html")
 
 
 def test_the_chart_script_comes_out_of_its_package(corner):
