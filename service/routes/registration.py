@@ -22,7 +22,7 @@ from service.schemas.registration import (
     TriedOut,
     values_of,
 )
-from service.web.judgement import judge_pose, judge_tracks
+from service.web.judgement import judge_pose, judge_tracks, worst_first
 from service.web.picture import Overlay, ground_of, picture_svg
 from service.web.tried import tried_ground_svg
 
@@ -52,7 +52,7 @@ def preview(body: PreviewBody) -> PreviewOut:
     says = judge_pose(lens, pose, typed_angles=body.fields.form == "angles")
     if tracks:
         rate_hz = read.rest["frame_rate_hz"] or _USUAL_RATE_HZ
-        says = [*judge_tracks(lens, pose, tracks, max(rate_hz, 1e-3)), *says]
+        says += judge_tracks(lens, pose, tracks, max(rate_hz, 1e-3))
     view = ground_of(lens, pose)
     squares = "no ground in it" if view is None else f"a square is {view.spacing_m:g} m"
     drawn = picture_svg(
@@ -65,7 +65,7 @@ def preview(body: PreviewBody) -> PreviewOut:
     return PreviewOut(
         picture=str(drawn),
         ground=str(tried_ground_svg(lens, pose, feet)) if tracks else "",
-        says=[SayingOut.model_validate(said, from_attributes=True) for said in says],
+        says=[SayingOut.model_validate(said, from_attributes=True) for said in worst_first(says)],
         errors=errors,
     )
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from models.geometry.ground import ground_from_pixel
-from models.geometry.ground_speed import ground_speed
+from models.geometry.ground_speed import walking_speed
 from models.geometry.horizon import ground_share, horizon_pixels
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -32,12 +32,17 @@ class Saying:
 
 
 def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[Saying]:
-    """What is to say of a pose, the worst first."""
+    """What is to say of a pose."""
     found = [*_looking(lens, pose, typed_angles=typed_angles), *_standing(pose)]
     if not typed_angles:
         found.append(Saying(kind="info", text=f"R and t say: {pose_words(pose)}."))
-    order = ("critical", "warning", "info", "good")
-    return sorted(found, key=lambda saying: order.index(saying.kind))
+    return found
+
+
+def worst_first(sayings: Sequence[Saying]) -> list[Saying]:
+    """The same, those first that somebody has to look at; then what is good to know."""
+    order = ("critical", "warning", "good", "info")
+    return sorted(sayings, key=lambda saying: order.index(saying.kind))
 
 
 def pose_words(pose: CameraPose) -> str:
@@ -56,12 +61,12 @@ def judge_tracks(
     lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array], rate_hz: float
 ) -> list[Saying]:
     """What recorded tracks, each (N, 3) of frame, u and v, say of a pose and a frame rate."""
-    speeds, floating = [], 0
+    floating = 0
     for track in tracks:
         _, hits = ground_from_pixel(lens, pose.rotation, pose.centre_m, track[:, 1:])
         floating += bool(np.mean(hits) < 0.5)
-        speeds.append(ground_speed(lens, pose, track[:, 0] / rate_hz, track[:, 1:]))
-    known = np.array(speeds)[np.isfinite(speeds)]
+    walks = [(track[:, 0] / rate_hz, track[:, 1:]) for track in tracks]
+    speed = walking_speed(lens, pose, walks)
     found = []
     if floating:
         found.append(
@@ -71,8 +76,8 @@ def judge_tracks(
                 "too close to it. The tilt, or its sign, is wrong.",
             )
         )
-    if len(known):
-        found.append(_pace(float(np.median(known)), pose, rate_hz))
+    if math.isfinite(speed):
+        found.append(_pace(speed, pose, rate_hz))
     elif not floating:
         found.append(Saying(kind="info", text="No track is long enough to tell how fast it is."))
     return found

@@ -52,6 +52,19 @@ def test_a_camera_that_comes_and_one_that_goes(page, fleet, server):
     assert shown(page) == ["Beta", "Alpha"]
 
 
+def test_it_comes_back_by_itself_and_has_missed_nothing(page, fleet, server):
+    fleet.add("alpha", "Alpha")
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    server.process.kill()
+    server.process.wait(10)
+    page.get_by_text("Reconnecting").wait_for()
+    fleet.knock("alpha")
+    server.start()
+    page.locator("#row-alpha.drifting").wait_for()
+    page.get_by_text("Live").wait_for()
+
+
 def test_what_happened_while_the_page_was_made_is_not_lost(page, fleet, server):
     fleet.add("alpha", "Alpha")
     page.goto("/")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.geometry.ground import pixel_from_ground
-from models.geometry.ground_speed import ground_speed
+from models.geometry.ground_speed import walking_speed
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from tests.conftest import CAMERA
@@ -133,15 +133,20 @@ def test_recorded_people_say_what_the_pose_implies(http, changes, kind, words):
 
 def test_people_in_the_sky(http):
     shown = preview(http, walks(), **LENS, **{**ANGLES, "tilt_deg": "-20"})
-    assert "walk in the sky" in shown["says"][0]["text"]
+    assert "looks up" in shown["says"][0]["text"]
+    assert "6 of 6 people walk in the sky" in shown["says"][1]["text"]
     assert shown["ground"] == ""
 
 
 def test_the_speed_on_the_ground():
     lens = Intrinsics(width=1920, height=1080, fx=2696.36, fy=2696.36, cx=959.5, cy=539.5)
-    track = np.array(walks(1.3)[0])
-    assert ground_speed(lens, POSE, track[:, 0] / 25, track[:, 1:]) == pytest.approx(1.3, abs=1e-6)
-    assert math.isnan(ground_speed(lens, POSE, track[:3, 0] / 25, track[:3, 1:]))
+    tracks = [(track[:, 0] / 25, track[:, 1:]) for track in map(np.array, walks(1.3))]
+    assert walking_speed(lens, POSE, tracks) == pytest.approx(1.3, abs=1e-6)
+    time_s, uv = tracks[0]
+    standing = [(time_s, np.tile(uv[:1], (len(uv), 1)))] * 20
+    assert walking_speed(lens, POSE, [*tracks, *standing]) == pytest.approx(1.3, abs=1e-6)
+    assert math.isnan(walking_speed(lens, POSE, standing))
+    assert math.isnan(walking_speed(lens, POSE, [(time_s[:3], uv[:3])]))
 
 
 def test_a_motchallenge_file_is_thinned_and_not_stored(http):

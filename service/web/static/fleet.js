@@ -48,19 +48,18 @@ function siftAndSay() {
   history.replaceState(null, "", query.size ? `?${query}` : location.pathname);
 }
 
-/** Put rows where they belong by their keys, in place of what was there of the same cameras. */
+/** Put rows where they belong by their keys, in place of those asked for, or of all. */
 function place(fresh, asked) {
   const held = document.activeElement?.closest?.("li.row")?.dataset.id;
-  const arrived = new Set(fresh.map((row) => row.dataset.id));
-  for (const id of asked ?? [...list.children].map((row) => row.dataset.id)) {
-    if (!arrived.has(id)) document.getElementById(`row-${id}`)?.remove();
-  }
-  for (const row of fresh) {
-    const old = document.getElementById(row.id);
-    if (old && asked) row.classList.add("fresh");
-    old?.remove();
-    const after = [...list.children].find((other) => other.dataset.key > row.dataset.key);
-    list.insertBefore(row, after ?? null);
+  if (!asked) {
+    list.replaceChildren(...fresh);
+  } else {
+    for (const id of asked) document.getElementById(`row-${id}`)?.remove();
+    for (const row of fresh) {
+      row.classList.add("fresh");
+      const after = [...list.children].find((other) => other.dataset.key > row.dataset.key);
+      list.insertBefore(row, after ?? null);
+    }
   }
   if (held && !list.contains(document.activeElement)) {
     document.querySelector(`#row-${CSS.escape(held)} a`)?.focus({ preventScroll: true });
