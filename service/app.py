@@ -8,7 +8,7 @@ from typing import TypedDict
 from fastapi import FastAPI, Request
 from fastapi.encoders import jsonable_encoder
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
 
 from models.errors import CalibrationError
@@ -16,12 +16,17 @@ from service.errors import FieldError, ServiceError
 from service.job_queue import JobQueue
 from service.routes import (
     alerts,
+    camera_page,
     cameras,
     events,
+    fleet,
     maintenance,
     metrics,
     operation,
+    pages,
     poses,
+    registration,
+    snapshots,
     tracks,
     trainings,
     webhooks,
@@ -66,6 +71,7 @@ def create_app(settings: Settings) -> FastAPI:
         cameras,
         tracks,
         poses,
+        snapshots,
         trainings,
         alerts,
         maintenance,
@@ -73,8 +79,12 @@ def create_app(settings: Settings) -> FastAPI:
         events,
         operation,
         metrics,
+        fleet,
+        camera_page,
+        registration,
     ):
         app.include_router(module.router)
+    pages.mount_static(app)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(CalibrationError, _calibration_error)
@@ -83,16 +93,16 @@ def create_app(settings: Settings) -> FastAPI:
     return app
 
 
-def _service_error(_: Request, error: Exception) -> JSONResponse:
+def _service_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ServiceError)
-    return _problem(error.status, error.code, error.detail, error.errors)
+    return _problem(request, error.status, error.code, error.detail, error.errors)
 
 
-def _calibration_error(_: Request, error: Exception) -> JSONResponse:
-    return _problem(409, "calibration", str(error))
+def _calibration_error(request: Request, error: Exception) -> Response:
+    return _problem(request, 409, "calibration", str(error))
 
 
-def _validation_error(_: Request, error: Exception) -> JSONResponse:
+def _validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     errors = tuple(
         FieldError(
@@ -102,19 +112,23 @@ def _validation_error(_: Request, error: Exception) -> JSONResponse:
         for item in error.errors()
     )
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
-    return _problem(422, "malformed", detail, errors)
+    return _problem(request, 422, "malformed", detail, errors)
 
 
-def _http_error(_: Request, error: Exception) -> JSONResponse:
+def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
-    return _problem(error.status_code, code, str(error.detail))
+    return _problem(request, error.status_code, code, str(error.detail))
 
 
 def _problem(
-    status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
-) -> JSONResponse:
-    """A problem document (RFC 9457)."""
+    request: Request, status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
+) -> Response:
+    """A problem document (RFC 9457); for who looks for a page, a page."""
+    if pages.wants_page(request):
+        return pages.render(
+            request, "problem.html", status, title=HTTPStatus(status).phrase, detail=detail
+        )
     content = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,

@@ -201,7 +201,7 @@ def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
         f"{_clock(screen.alert['changed_at'])}.\n"
         f"The served pose is {to_knocked:.1f} deg from the knocked camera and {to_prior:.1f} deg "
         f"from where it was; {took_s:.0f} s in all.\n"
-        f"Look: {url}/docs, {url}/cameras/{CAMERA_ID}/pose, {url}/alerts"
+        f"Look: {url}/, {url}/ui/cameras/{CAMERA_ID}, {url}/docs"
     )
     return to_knocked < to_prior
 

@@ -23,6 +23,12 @@ class ServiceError(Exception):
         self.errors = errors
 
 
+class SwitchedOffError(ServiceError):
+    """The operator has not switched on what is asked for."""
+
+    status, code = 403, "switched_off"
+
+
 class NotFoundError(ServiceError):
     """The path names nothing that exists."""
 

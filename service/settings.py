@@ -71,6 +71,10 @@ class Settings(BaseSettings):
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
+    snapshots: bool = Field(
+        False, description="keep a still image of a camera that somebody uploads for its page"
+    )
+
     webhook_allow: str = Field(
         "", description="CIDRs, with commas, of private addresses that webhooks may go to"
     )

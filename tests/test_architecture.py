@@ -14,7 +14,7 @@ SERVICE_ROOMS = [
     {"settings", "errors", "logs"},
     {"formats", "store", "job_queue", "delivery"},
     {"migrate", "recalibration"},
-    {"schemas", "jobs"},
+    {"schemas", "jobs", "web"},
     {"routes"},
     {"app", "protocol_plots", "protocol_tables", "alarm_tables"},
     {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},

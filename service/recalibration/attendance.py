@@ -1,11 +1,13 @@
 """When somebody was at a camera: what it saw then says nothing of how it stands."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy.orm import Session
 
 from service.store import maintenance
+from service.store.alert_tables import MaintenanceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +27,18 @@ class Attendance:
         """Whether a window was told of after a time that reaches into what was known then."""
         return any(from_s <= known_to_s and at > known_at for from_s, at in self.told)
 
+    def under_way(self, now: datetime) -> bool:
+        """Whether somebody is at the camera."""
+        return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
+
 
 def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
-    """When somebody was at a camera; overlapping windows are one time."""
-    records = maintenance.of_camera(session, camera_id)
+    """When somebody was at a camera."""
+    return attendance_by(maintenance.of_camera(session, camera_id), now)
+
+
+def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:
+    """The same by windows in the order of their beginnings; overlapping ones are one time."""
     spans: list[tuple[float, float]] = []
     for record in records:
         from_s, to_s = record.from_at.timestamp(), record.to_at.timestamp()

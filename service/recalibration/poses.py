@@ -12,6 +12,7 @@ from models.geometry.pose import CameraPose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
 from service.recalibration.alerts import close_pose_alerts
+from service.recalibration.attendance import Attendance, attendance_of
 from service.recalibration.cameras import renew_prior_pose, require_camera
 from service.recalibration.presence import silence_of
 from service.recalibration.references import (
@@ -20,6 +21,7 @@ from service.recalibration.references import (
     is_outdated,
     tracks_so_far,
     wanted_tracks,
+    window_beside,
     window_of,
 )
 from service.recalibration.trainings import request_estimate
@@ -122,6 +124,18 @@ def pose_history(
     return estimates.between(session, camera_id, start, end, limit)
 
 
+def thinned_history(
+    session: Session, camera_id: str, start: datetime | None, end: datetime | None, most: int
+) -> Sequence[EstimateRecord]:
+    """At most so many of the estimates between two times, evenly thinned out, oldest first.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    return estimates.thinned(session, camera_id, start, end, most)
+
+
 def accept_pose(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, by: str | None
 ) -> PoseView:
@@ -190,12 +204,22 @@ def _state(
     silence = silence_of(session, settings, reference.camera_id, datetime.now(UTC))
     if silence is not None and silence.no_data:
         return "no_data", silence.reason
+    return state_by(reference, estimate, silent=False), estimate.reason
+
+
+def state_by(
+    reference: SiteReferenceRecord, counting: EstimateRecord | None, *, silent: bool
+) -> PoseState:
+    """A camera's state by its newest reference, the estimate that counts, and its silence."""
+    ready_at = reference.ready_at
+    if ready_at is None or counting is None or counting.created_at < ready_at:
+        return "learning"
     states: dict[str, PoseState] = {
         "learning": "learning",
         "drifting": "drifting",
         "out_of_range": "out_of_range",
     }
-    return states.get(estimate.state, "ok"), estimate.reason
+    return "no_data" if silent else states.get(counting.state, "ok")
 
 
 def state_of(
@@ -216,12 +240,23 @@ def counting_estimate(
     estimate: EstimateRecord | None,
 ) -> EstimateRecord | None:
     """The newest estimate of a camera; None where it says nothing of how the camera stands now."""
+    now = datetime.now(UTC)
+    attended = attendance_of(session, reference.camera_id, now)
+    return counting_beside(attended, settings, reference, estimate, now)
+
+
+def counting_beside(
+    attended: Attendance,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    estimate: EstimateRecord | None,
+    now: datetime,
+) -> EstimateRecord | None:
+    """The same, where it is known when somebody was at the camera."""
     if estimate is None or estimate.reference_id != reference.id:
         return None  # it was measured against a pose or a reference that no longer counts
-    if reference.ready_at is None or not is_outdated(
-        estimate, window_of(session, reference, settings)
-    ):
+    bounds = window_beside(attended, reference, settings)
+    if reference.ready_at is None or not is_outdated(estimate, bounds):
         return estimate
     # It was put back, or somebody was at it and has gone: it may stand elsewhere.
-    attended = maintenance.under_way(session, reference.camera_id, datetime.now(UTC))
-    return None if attended is None else estimate
+    return estimate if attended.under_way(now) else None

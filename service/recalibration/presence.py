@@ -47,6 +47,19 @@ def silence_of(
     return _by_rhythm(session, settings, camera_id, known, last_s, now)
 
 
+def is_no_data(
+    settings: Settings, known: CameraRhythm | None, last_s: float | None, now: datetime
+) -> bool:
+    """Whether a camera whose newest track ended then has been silent for too long to be ok."""
+    if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
+        return False
+    limit_s = settings.no_data_after_h * _HOUR_S
+    if known is None:
+        return now.timestamp() - last_s > limit_s
+    gap_s = max(_GAPS * known.rhythm.usual_gap_s, settings.no_data_min_s)
+    return now.timestamp() - known.delay_s - last_s > min(gap_s, _STATE_BY_S, limit_s)
+
+
 def watch_presence(
     session: Session, settings: Settings, camera_id: str, now: datetime
 ) -> str | None:
@@ -86,7 +99,7 @@ def _by_the_limit(
     begun_s = max(last_s, _received_s(session, camera_id), _answered_s(session, camera_id, now))
     return Silence(
         last_s=last_s,
-        no_data=silent_s > limit_s,
+        no_data=is_no_data(settings, None, last_s, now),
         reason=f"the newest track ended {_hours(silent_s)} ago; "
         f"up to {settings.no_data_after_h:g} h are waited for",
         severity="warning" if now.timestamp() - begun_s > limit_s else None,
@@ -105,7 +118,6 @@ def _by_rhythm(
     # Tracks of later may be on their way.
     until_s = now_s - known.delay_s
     limit_s = settings.no_data_after_h * _HOUR_S
-    gap_s = min(max(_GAPS * rhythm.usual_gap_s, settings.no_data_min_s), _STATE_BY_S, limit_s)
     from_s = max(last_s, until_s - _LONGEST_S)
     missed, verdict = _expected(settings, known, from_s, until_s), "usual"
     if is_missed(rhythm, missed):  # at night, hundreds of cameras need no closer look
@@ -131,7 +143,10 @@ def _by_rhythm(
     if known.delay_s > settings.no_data_min_s:
         words += f"; its tracks come up to {_hours(known.delay_s)} late"
     return Silence(
-        last_s=last_s, no_data=until_s - last_s > gap_s, reason=words, severity=_SEVERITIES[verdict]
+        last_s=last_s,
+        no_data=is_no_data(settings, known, last_s, now),
+        reason=words,
+        severity=_SEVERITIES[verdict],
     )
 
 

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.recalibration.attendance import attendance_of
+from service.recalibration.attendance import Attendance, attendance_of
 from service.settings import Settings
 from service.store import cameras, estimates, references, tracks
 from service.store.tables import EstimateRecord, SiteReferenceRecord
@@ -50,6 +50,13 @@ def window_of(session: Session, reference: SiteReferenceRecord, settings: Settin
     nor, once there is a reference, those of before: it may stand elsewhere since.
     """
     attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
+    return window_beside(attended, reference, settings)
+
+
+def window_beside(
+    attended: Attendance, reference: SiteReferenceRecord, settings: Settings
+) -> WindowBounds:
+    """The same, where it is known when somebody was at the camera."""
     from_s = reference.from_s
     if reference.ready_at is not None and attended.judged_from_s is not None:
         from_s = max(from_s or 0.0, attended.judged_from_s)

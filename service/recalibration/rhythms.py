@@ -131,8 +131,11 @@ def keep_rhythm(
 def rhythm_of(session: Session, camera_id: str) -> CameraRhythm | None:
     """The rhythm of a camera; None where too little of it is known."""
     profile = rhythms.profile(session, camera_id)
-    if profile is None:
-        return None
+    return None if profile is None else unpacked(profile)
+
+
+def unpacked(profile: dict[str, Any]) -> CameraRhythm:
+    """A rhythm as it was stored."""
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
     return CameraRhythm(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
 

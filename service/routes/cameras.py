@@ -5,9 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from service.recalibration import cameras
-from service.recalibration.cameras import CameraChange, CameraSpec
+from service.recalibration.cameras import CameraChange
 from service.routes.state import EtagDep, ReadDep, StateDep, WriteDep
-from service.schemas.cameras import CameraBody, CameraOut, CameraPage, CameraPatch, slug
+from service.schemas.cameras import CameraBody, CameraOut, CameraPage, CameraPatch
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
 
@@ -15,21 +15,7 @@ router = APIRouter(prefix="/cameras", tags=["cameras"])
 @router.post("", status_code=201)
 def register(body: CameraBody, state: StateDep, session: WriteDep, response: Response) -> CameraOut:
     """Register a camera with its intrinsics and prior pose; queues its first training."""
-    view = cameras.register_camera(
-        session,
-        state.queue,
-        state.settings,
-        CameraSpec(
-            camera_id=body.id or (slug(body.name) if body.name else None) or None,
-            name=body.name or "",
-            intrinsics=body.intrinsics.to_value(),
-            prior_pose=body.prior_pose.to_value(),
-            frame_rate_hz=body.frame_rate_hz,
-            walking_speed_mean_mps=body.walking_speed.mean_mps,
-            walking_speed_sd_mps=body.walking_speed.sd_mps,
-            reference_tracks=body.reference_tracks,
-        ),
-    )
+    view = cameras.register_camera(session, state.queue, state.settings, body.to_spec())
     response.headers["Location"] = f"/cameras/{view.record.id}"
     response.headers["ETag"] = view.etag
     return CameraOut.from_value(view)

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Sequence
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Request
+from fastapi import APIRouter, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
@@ -24,10 +24,16 @@ async def events(
     request: Request,
     state: StateDep,
     last_event_id: Annotated[str | None, Header()] = None,
+    after: Annotated[int | None, Query(ge=0)] = None,
 ) -> AsyncIterator[ServerSentEvent]:
-    """Poses, alerts and trainings as they happen; with `Last-Event-ID`, all since that one."""
+    """Poses, alerts and trainings as they happen; with `Last-Event-ID`, all since that one.
+
+    `after` says the same for who cannot send a header with the first request: browsers.
+    """
     given = (last_event_id or "").strip()
-    seen = int(given) if given.isdigit() else await run_in_threadpool(_newest, state)
+    seen = int(given) if given.isdigit() else after
+    if seen is None:
+        seen = await run_in_threadpool(_newest, state)
     silent_s = 0.0
     yield ServerSentEvent(comment="connected", retry=2000)
     while not state.stopping.is_set() and not await request.is_disconnected():

@@ -1,19 +1,12 @@
-"""`/healthz` and `/readyz`, and the way from `/` to the documentation."""
+"""`/healthz` and `/readyz`."""
 
 from fastapi import APIRouter, Response
-from fastapi.responses import RedirectResponse
 
 from service.recalibration import operation
 from service.routes.state import StateDep
 from service.schemas.operation import HealthOut, ReadyOut
 
 router = APIRouter(tags=["operation"])
-
-
-@router.get("/", include_in_schema=False)
-def root() -> RedirectResponse:
-    """To the interactive documentation, until there are pages."""
-    return RedirectResponse("/docs")
 
 
 @router.get("/healthz")

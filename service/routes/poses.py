@@ -4,9 +4,11 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
+from fastapi.responses import PlainTextResponse
 
 from service.errors import FieldError, MalformedError
-from service.recalibration import poses
+from service.formats.opencv_yaml import opencv_yaml
+from service.recalibration import cameras, poses
 from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
 
@@ -29,22 +31,48 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
+@router.get("/pose.yaml", response_class=PlainTextResponse)
+def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
+    """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
+    view = poses.view_pose(session, state.settings, camera_id)
+    lens = cameras.view_camera(session, camera_id).intrinsics
+    words = (f"state: {view.state}", f"why: {view.reason}")
+    return PlainTextResponse(
+        opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
+        media_type="application/yaml",
+        headers={
+            "ETag": view.etag,
+            "Content-Disposition": f'inline; filename="{camera_id}.yaml"',
+        },
+    )
+
+
 @router.get("/pose/history")
 def history(
     camera_id: str,
     session: ReadDep,
     from_: Annotated[datetime | None, Query(alias="from")] = None,
     to: datetime | None = None,
-    limit: Annotated[int, Query(ge=1, le=10_000)] = 1000,
+    limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
+    points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
-    """The estimates between two times, oldest first."""
+    """The estimates between two times, oldest first: the newest `limit`, 1,000 if unsaid.
+
+    With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
+    """
     for name, value in (("from", from_), ("to", to)):
         if value is not None and value.tzinfo is None:
             reason = f"a time with its zone is needed, got {value.isoformat()}"
             raise MalformedError(
                 f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),)
             )
-    records = poses.pose_history(session, camera_id, from_, to, limit)
+    if points is not None and limit is not None:
+        reason = "either limit or points is taken"
+        raise MalformedError(f"points: {reason}", (FieldError(pointer="/points", reason=reason),))
+    if points is not None:
+        records = poses.thinned_history(session, camera_id, from_, to, points)
+    else:
+        records = poses.pose_history(session, camera_id, from_, to, limit or 1000)
     return History(items=[HistoryPoint.from_record(record) for record in records])
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, StringConstraints
 
-from service.recalibration.cameras import CameraView
+from service.recalibration.cameras import CameraSpec, CameraView
 from service.schemas.base import Body, Finite
 from service.schemas.geometry import IntrinsicsBody, PoseOut, PriorPoseBody
 
@@ -30,6 +30,19 @@ class CameraBody(Body):
     frame_rate_hz: Annotated[Finite, Field(gt=0, le=1000)] | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: int = Field(200, ge=5, le=100_000)
+
+    def to_spec(self) -> CameraSpec:
+        """What the use case takes; an id is made of the name where none is given."""
+        return CameraSpec(
+            camera_id=self.id or (slug(self.name) if self.name else None) or None,
+            name=self.name or "",
+            intrinsics=self.intrinsics.to_value(),
+            prior_pose=self.prior_pose.to_value(),
+            frame_rate_hz=self.frame_rate_hz,
+            walking_speed_mean_mps=self.walking_speed.mean_mps,
+            walking_speed_sd_mps=self.walking_speed.sd_mps,
+            reference_tracks=self.reference_tracks,
+        )
 
 
 class CameraPatch(Body):

@@ -13,6 +13,15 @@ def add(session: Session, record: AlertActRecord) -> None:
     session.add(record)
 
 
+def of_alerts(session: Session, alert_ids: Sequence[str]) -> Sequence[AlertActRecord]:
+    """What was done with some alerts, oldest first."""
+    return session.scalars(
+        select(AlertActRecord)
+        .where(AlertActRecord.alert_id.in_(alert_ids))
+        .order_by(AlertActRecord.id)
+    ).all()
+
+
 def of_alert(session: Session, alert_id: str) -> Sequence[AlertActRecord]:
     """What was done with an alert, oldest first."""
     return session.scalars(

@@ -35,6 +35,16 @@ def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
     ).one()
 
 
+def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:
+    """The poses that a camera was trusted to have, newest first."""
+    return session.scalars(
+        select(PriorPoseRecord)
+        .where(PriorPoseRecord.camera_id == camera_id)
+        .order_by(PriorPoseRecord.id.desc())
+        .limit(limit)
+    ).all()
+
+
 def longest_due(session: Session) -> datetime | None:
     """Since when the tracks of the camera that waits longest have waited."""
     return session.scalars(

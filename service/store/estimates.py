@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, select
+from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import EstimateRecord
@@ -33,12 +33,22 @@ def between(
     session: Session, camera_id: str, start: datetime | None, end: datetime | None, limit: int
 ) -> Sequence[EstimateRecord]:
     """The newest so many estimates made between two times, oldest first."""
-    query = select(EstimateRecord).where(EstimateRecord.camera_id == camera_id)
-    if start is not None:
-        query = query.where(EstimateRecord.created_at >= start)
-    if end is not None:
-        query = query.where(EstimateRecord.created_at <= end)
+    query = select(EstimateRecord).where(*_made_between(camera_id, start, end))
     return session.scalars(query.order_by(EstimateRecord.id.desc()).limit(limit)).all()[::-1]
+
+
+def thinned(
+    session: Session, camera_id: str, start: datetime | None, end: datetime | None, most: int
+) -> Sequence[EstimateRecord]:
+    """Every so many-th of the estimates made between two times, oldest first; the newest is one."""
+    wanted = _made_between(camera_id, start, end)
+    count = session.scalar(select(func.count()).where(*wanted)) or 0
+    number = func.row_number().over(order_by=EstimateRecord.id.desc()).label("number")
+    numbered = select(EstimateRecord.id, number).where(*wanted).subquery()
+    every = max(-(-count // most), 1)
+    kept = select(numbered.c.id).where((numbered.c.number - 1) % every == 0)
+    query = select(EstimateRecord).where(EstimateRecord.id.in_(kept)).order_by(EstimateRecord.id)
+    return session.scalars(query).all()
 
 
 def forget(session: Session, camera_id: str, keep: int) -> None:
@@ -50,3 +60,14 @@ def forget(session: Session, camera_id: str, keep: int) -> None:
         .offset(keep)
     )
     session.execute(delete(EstimateRecord).where(EstimateRecord.id.in_(surplus)))
+
+
+def _made_between(
+    camera_id: str, start: datetime | None, end: datetime | None
+) -> list[ColumnElement[bool]]:
+    conditions: list[ColumnElement[bool]] = [EstimateRecord.camera_id == camera_id]
+    if start is not None:
+        conditions.append(EstimateRecord.created_at >= start)
+    if end is not None:
+        conditions.append(EstimateRecord.created_at <= end)
+    return conditions

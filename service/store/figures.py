@@ -1,11 +1,12 @@
 """Statements that look at everything at once, for metrics: a lookup a camera, never a scan."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session, defer
+from sqlalchemy import ColumnElement, func, select, true
+from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.store.delivery_tables import DeliveryRecord
 from service.store.tables import (
@@ -18,6 +19,9 @@ from service.store.tables import (
     WorkerRecord,
 )
 
+# Which cameras are asked about; None is all.
+Ids = Collection[str] | None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backlog:
@@ -27,42 +31,28 @@ class Backlog:
     oldest_at: datetime
 
 
-def last_tracks_s(session: Session) -> dict[str, float | None]:
+def last_tracks_s(session: Session, ids: Ids = None) -> dict[str, float | None]:
     """When the newest track of each camera ended."""
-    newest = (
-        select(func.max(TrackRecord.ended_s))
-        .where(TrackRecord.camera_id == CameraRecord.id)
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )
-    rows = session.execute(select(CameraRecord.id, newest).order_by(CameraRecord.id))
+    newest = newest_of(TrackRecord.ended_s, TrackRecord.camera_id)
+    query = select(CameraRecord.id, newest).where(among(CameraRecord.id, ids))
+    rows = session.execute(query.order_by(CameraRecord.id))
     return {camera_id: ended_s for camera_id, ended_s in rows}
 
 
-def newest_references(session: Session) -> dict[str, SiteReferenceRecord]:
+def newest_references(session: Session, ids: Ids = None) -> dict[str, SiteReferenceRecord]:
     """The reference of each camera that counts, without the site itself."""
-    newest = (
-        select(func.max(SiteReferenceRecord.id))
-        .where(SiteReferenceRecord.camera_id == CameraRecord.id)
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )
+    newest = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
     query = select(SiteReferenceRecord).join(CameraRecord, SiteReferenceRecord.id == newest)
-    records = session.scalars(query.options(defer(SiteReferenceRecord.data)))
-    return {record.camera_id: record for record in records}
+    query = query.where(among(CameraRecord.id, ids)).options(defer(SiteReferenceRecord.data))
+    return {record.camera_id: record for record in session.scalars(query)}
 
 
-def newest_estimates(session: Session) -> dict[str, EstimateRecord]:
+def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRecord]:
     """The newest estimate of each camera, without what is behind it."""
-    newest = (
-        select(func.max(EstimateRecord.id))
-        .where(EstimateRecord.camera_id == CameraRecord.id)
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )
+    newest = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
     query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
-    records = session.scalars(query.options(defer(EstimateRecord.raw)))
-    return {record.camera_id: record for record in records}
+    query = query.where(among(CameraRecord.id, ids)).options(defer(EstimateRecord.raw))
+    return {record.camera_id: record for record in session.scalars(query)}
 
 
 def firing(session: Session) -> Sequence[AlertRecord]:
@@ -94,3 +84,20 @@ def backlogs(session: Session) -> dict[str, Backlog]:
         .group_by(DeliveryRecord.webhook_id)
     )
     return {name: Backlog(count=count, oldest_at=oldest) for name, count, oldest in rows}
+
+
+def among(column: InstrumentedAttribute[Any], ids: Ids) -> ColumnElement[bool]:
+    """Whether a column names one of the cameras that are asked about."""
+    return true() if ids is None else column.in_(ids)
+
+
+def newest_of(
+    column: InstrumentedAttribute[Any], camera_id: InstrumentedAttribute[str]
+) -> ColumnElement[Any]:
+    """The largest value of a column among what is stored of each camera: a lookup in an index."""
+    return (
+        select(func.max(column))
+        .where(camera_id == CameraRecord.id)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )

@@ -211,11 +211,13 @@ def a_year(session: Session, camera_id: str) -> float:
     return max(float(count), 1.0) * _YEAR_S / span_s
 
 
-def newest(session: Session, camera_id: str, limit: int) -> Sequence[TrackRecord]:
-    """The newest tracks, newest first."""
+def newest(
+    session: Session, camera_id: str, limit: int, started_from_s: float | None = None
+) -> Sequence[TrackRecord]:
+    """The newest tracks, newest first; of those that started from a time on, if it is given."""
     return session.scalars(
         select(TrackRecord)
-        .where(TrackRecord.camera_id == camera_id)
+        .where(*_started_from(camera_id, started_from_s))
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .limit(limit)
     ).all()

@@ -207,6 +207,22 @@ def test_history_is_a_series_between_two_times(bench):
     problem(bad, 422, "malformed")
 
 
+def test_a_chart_gets_a_thinned_history_that_ends_with_the_newest(bench):
+    for n in range(7):
+        bench.see(moved(tilt_deg=0.1 * n))
+    url = "/cameras/corner/pose/history"
+
+    def tilts(**query):
+        items = bench.http.get(url, params=query).json()["items"]
+        return [round(item["tilt_deg"], 1) for item in items]
+
+    assert tilts(points=7) == [22.0, 22.1, 22.2, 22.3, 22.4, 22.5, 22.6]
+    assert tilts(points=4) == [22.0, 22.2, 22.4, 22.6]
+    assert tilts(points=2) == [22.2, 22.6]
+    problem(bench.http.get(url, params={"points": 2, "limit": 2}), 422, "malformed")
+    problem(bench.http.get("/cameras/nowhere/pose/history?points=9"), 404, "not_found")
+
+
 def test_silence_is_no_data(bench):
     bench.see(PRIOR)
     strict = bench.settings.model_copy(update={"no_data_after_h": 0.5})

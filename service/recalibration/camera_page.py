@@ -1,0 +1,130 @@
+"""All that the page of a camera shows, read in one go."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from models.geometry.misplacement import Misplacement, misplacements
+from models.trajectory import Trajectory
+from service.recalibration.alerts import list_alerts
+from service.recalibration.cameras import CameraView, view_camera
+from service.recalibration.deeds import Deed, deeds_of
+from service.recalibration.poses import PoseView, view_pose
+from service.recalibration.presence import Silence, silence_of
+from service.recalibration.snapshots import snapshot_facts
+from service.settings import Settings
+from service.store import acts, alerts, cameras, events, maintenance, tracks, trainings
+from service.store.alert_tables import AlertActRecord, MaintenanceRecord
+from service.store.alerts import AlertFilter
+from service.store.packing import trajectory_of
+from service.store.snapshots import SnapshotFacts
+from service.store.tables import AlertRecord, PriorPoseRecord, TrainingRecord
+
+_TRACKS = 120  # more are a carpet
+_ALERTS, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 5, 20, 5
+DISTANCES_M = (5.0, 10.0, 20.0, 40.0, 80.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertStory:
+    """An alert, what was done with it, and the group that it belongs to, if it does."""
+
+    record: AlertRecord
+    acts: tuple[AlertActRecord, ...]
+    group: AlertRecord | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraPage:
+    """What the page of a camera shows. Lists are newest first, windows in their order.
+
+    `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
+    means on the ground; empty where nothing is told.
+    """
+
+    now: datetime
+    camera: CameraView
+    pose: PoseView
+    silence: Silence | None
+    newest_track_s: float | None
+    tracks: tuple[Trajectory, ...]
+    misplaced: tuple[Misplacement, ...]
+    alerts: tuple[AlertStory, ...]
+    priors: tuple[PriorPoseRecord, ...]
+    windows: tuple[MaintenanceRecord, ...]
+    trainings: tuple[TrainingRecord, ...]
+    deeds: tuple[Deed, ...]
+    snapshot: SnapshotFacts | None
+    snapshots_allowed: bool
+    newest_event_id: int
+
+    @property
+    def firing(self) -> tuple[AlertStory, ...]:
+        """The open alerts."""
+        return tuple(story for story in self.alerts if story.record.state == "firing")
+
+    @property
+    def past(self) -> tuple[AlertStory, ...]:
+        """The alerts that have ended."""
+        return tuple(story for story in self.alerts if story.record.state != "firing")
+
+    @property
+    def attended(self) -> MaintenanceRecord | None:
+        """The maintenance window that is under way, the one that ends last."""
+        here = [each for each in self.windows if each.from_at <= self.now < each.to_at]
+        return max(here, key=lambda each: each.to_at, default=None)
+
+
+def view_camera_page(session: Session, settings: Settings, camera_id: str) -> CameraPage:
+    """All that the page of a camera shows.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    now = datetime.now(UTC)
+    # Taken first: what happens while the rest is read is told again, and not missed.
+    newest_event_id = events.newest_id(session)
+    camera = view_camera(session, camera_id)
+    pose = view_pose(session, settings, camera_id)
+    estimate = pose.estimate
+    found = list_alerts(session, AlertFilter(camera_id=camera_id), _ALERTS)
+    windows = maintenance.of_camera(session, camera_id)
+    over = sum(window.to_at <= now for window in windows)
+    priors = cameras.prior_poses(session, camera_id, _PRIORS)
+    shown = tracks.newest(
+        session, camera_id, _TRACKS, None if estimate is None else estimate.from_s
+    )
+    misplaced: tuple[Misplacement, ...] = ()
+    if pose.told:
+        misplaced = misplacements(camera.intrinsics, pose.pose, camera.prior_pose, DISTANCES_M)
+    return CameraPage(
+        now=now,
+        camera=camera,
+        pose=pose,
+        silence=silence_of(session, settings, camera_id, now),
+        newest_track_s=tracks.newest_end_s(session, camera_id),
+        tracks=tuple(trajectory_of(record) for record in shown),
+        misplaced=misplaced,
+        alerts=_stories(session, found),
+        priors=tuple(priors),
+        windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
+        trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
+        deeds=deeds_of(session, camera_id, found),
+        snapshot=snapshot_facts(session, settings, camera_id),
+        snapshots_allowed=settings.snapshots,
+        newest_event_id=newest_event_id,
+    )
+
+
+def _stories(session: Session, found: Sequence[AlertRecord]) -> tuple[AlertStory, ...]:
+    told = acts.of_alerts(session, [record.id for record in found])
+    return tuple(
+        AlertStory(
+            record=record,
+            acts=tuple(act for act in told if act.alert_id == record.id),
+            group=None if record.group_id is None else alerts.find(session, record.group_id),
+        )
+        for record in found
+    )

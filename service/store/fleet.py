@@ -1,0 +1,143 @@
+"""Statements that the fleet page asks of many cameras at once: each one for all, none for each."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, String, case, func, select, type_coerce
+from sqlalchemy.orm import Session, aliased
+
+from models.drift.verdict import DriftLimits
+from service.store.alert_tables import MaintenanceRecord, RhythmRecord
+from service.store.figures import Ids, among, newest_of
+from service.store.tables import (
+    AlertRecord,
+    CameraRecord,
+    EstimateRecord,
+    SiteReferenceRecord,
+    TrackRecord,
+    TrainingRecord,
+)
+from service.store.trainings import UNFINISHED
+
+
+def names(session: Session, ids: Ids) -> list[tuple[str, str]]:
+    """Id and name of each camera."""
+    query = select(CameraRecord.id, CameraRecord.name).where(among(CameraRecord.id, ids))
+    return [(camera_id, name) for camera_id, name in session.execute(query)]
+
+
+def drift_history(
+    session: Session, ids: Ids, count: int, limits: DriftLimits
+) -> dict[str, list[float | None]]:
+    """The drifts of the newest so many estimates of each camera in units of the limits.
+
+    Oldest first; the largest of what an estimate told, None where it told nothing. What
+    `DriftLimits.of` says, said in SQL: thousands of estimates are one number each.
+    """
+    earlier = aliased(EstimateRecord)
+    first = (
+        select(earlier.id)
+        .where(earlier.camera_id == CameraRecord.id)
+        .order_by(earlier.id.desc())
+        .limit(1)
+        .offset(count - 1)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    e = EstimateRecord
+    ratios = [
+        _ratio("tilt", e.drift_tilt_rad, e.tilt_sd_rad, limits, limits.floor_rad),
+        _ratio("roll", e.drift_roll_rad, e.roll_sd_rad, limits, limits.floor_rad),
+        _ratio("heading", e.drift_heading_rad, e.heading_sd_rad, limits, limits.floor_rad),
+        _ratio("height", e.drift_height_m, e.height_sd_m, limits, limits.floor_m),
+    ]
+    query = (
+        select(CameraRecord.id, e.id, func.nullif(func.max(*ratios), -1.0))
+        # Outer: cameras come first, and of each only its newest estimates are looked at.
+        .outerjoin(e, (e.camera_id == CameraRecord.id) & (e.id >= func.coalesce(first, 0)))
+        .where(among(CameraRecord.id, ids))
+        .order_by(CameraRecord.id, e.id)
+    )
+    found: dict[str, list[float | None]] = defaultdict(list)
+    for camera_id, estimate_id, ratio in session.connection().execute(query):
+        if estimate_id is not None:
+            found[camera_id].append(ratio)
+    return found
+
+
+def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
+    """How many tracks have come that the reference being learned of each camera may be made of."""
+    begun = func.coalesce(SiteReferenceRecord.from_s, -math.inf)
+    count = (
+        select(func.count())
+        .where(TrackRecord.camera_id == CameraRecord.id, TrackRecord.started_s >= begun)
+        .correlate(CameraRecord, SiteReferenceRecord)
+        .scalar_subquery()
+    )
+    other = aliased(SiteReferenceRecord)
+    newest = newest_of(other.id, other.camera_id)
+    query = (
+        select(CameraRecord.id, count)
+        .join(SiteReferenceRecord, SiteReferenceRecord.id == newest)
+        .where(among(CameraRecord.id, ids), SiteReferenceRecord.ready_at.is_(None))
+    )
+    return {camera_id: number for camera_id, number in session.execute(query)}
+
+
+def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
+    """The alerts of cameras that fire, those about one camera."""
+    query = select(AlertRecord).where(
+        AlertRecord.state == "firing", AlertRecord.camera_id.is_not(None)
+    )
+    return session.scalars(query.where(among(AlertRecord.camera_id, ids))).all()
+
+
+def firing_groups(session: Session) -> Sequence[AlertRecord]:
+    """The alerts of groups that fire, the newest first."""
+    return session.scalars(
+        select(AlertRecord)
+        .where(AlertRecord.state == "firing", AlertRecord.camera_id.is_(None))
+        .order_by(AlertRecord.opened_at.desc())
+    ).all()
+
+
+def unfinished_trainings(session: Session, ids: Ids) -> dict[str, TrainingRecord]:
+    """The training of each camera that is under way or waits; of several the one that began."""
+    query = (
+        select(TrainingRecord)
+        .where(TrainingRecord.state.in_(UNFINISHED), among(TrainingRecord.camera_id, ids))
+        .order_by(TrainingRecord.state, TrainingRecord.queued_at.desc())
+    )
+    return {record.camera_id: record for record in session.scalars(query)}
+
+
+def maintenance_windows(session: Session, ids: Ids) -> dict[str, list[MaintenanceRecord]]:
+    """The windows of each camera in the order of their beginnings."""
+    query = (
+        select(MaintenanceRecord)
+        .where(among(MaintenanceRecord.camera_id, ids))
+        .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
+    )
+    found: dict[str, list[MaintenanceRecord]] = defaultdict(list)
+    for record in session.scalars(query):
+        found[record.camera_id].append(record)
+    return found
+
+
+def rhythm_profiles(session: Session, ids: Ids) -> dict[str, dict[str, Any]]:
+    """The rhythm of each camera that has one."""
+    query = select(RhythmRecord.camera_id, RhythmRecord.profile).where(
+        among(RhythmRecord.camera_id, ids)
+    )
+    return {camera_id: profile for camera_id, profile in session.execute(query) if profile}
+
+
+def _ratio(
+    name: str, drift: Any, sd: Any, limits: DriftLimits, floor: float
+) -> ColumnElement[float]:
+    """A number's drift in units of its limit; -1 where it is not told."""
+    told = type_coerce(EstimateRecord.told, String).contains(f'"{name}"')
+    limit = func.max(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
+    return case((told, func.abs(drift) / limit), else_=-1.0)

@@ -1,0 +1,173 @@
+"""The rest of a camera's page in words: numbers of the pose, deeds, what a move means, flags."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, tzinfo
+
+from models.geometry.misplacement import Misplacement
+from models.geometry.pose import CameraPose
+from service.recalibration.camera_page import CameraPage
+from service.recalibration.deeds import Deed
+from service.recalibration.outbox import is_silenced
+from service.store.tables import EstimateRecord
+from service.web.moments import when
+from service.web.sentences import NAMES, Z90, signed
+from service.web.words import ago
+
+KINDS = {
+    "drift": "The camera moved",
+    "clock": "The clock looks wrong",
+    "out_of_range": "Beyond the model's range",
+    "no_data": "No people come",
+}
+OUTCOMES = {
+    "put_back": "put back",
+    "accepted": "new pose accepted",
+    "false_alarm": "false alarm",
+    "cleared": "ended by itself",
+    "camera_removed": "camera removed",
+}
+_UNCHANGED_M = 0.05
+_DEEDS = {
+    "registered": "registered the camera",
+    "changed": "changed the lens or the prior pose",
+    "accepted": "accepted the new pose as the prior pose",
+    "reset": "said that the camera is back at its prior pose; it is learned anew",
+    "learned": "The reference was learned.",
+    "acknowledged": "acknowledged",
+    "silence_ended": "ended the silence",
+    "escalated": "It grew: critical now.",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clock:
+    """Now, by the cameras' own clock: what templates say times with."""
+
+    now: datetime
+    zone: tzinfo
+
+    def when(self, at: datetime) -> str:
+        """A time in words."""
+        return when(at, self.now, self.zone)
+
+    def ago(self, at: datetime) -> str:
+        """How long ago a time is, in words."""
+        return ago(at, self.now)
+
+    def of(self, seconds: float) -> datetime:
+        """The time of seconds since the epoch."""
+        return datetime.fromtimestamp(seconds, self.now.tzinfo)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumberRow:
+    """One number of the pose as text; `served`, `drift` and `sure` are empty where not told."""
+
+    name: str
+    prior: str
+    served: str
+    drift: str
+    sure: str
+
+
+def number_rows(
+    prior: CameraPose, served: CameraPose, estimate: EstimateRecord | None
+) -> tuple[NumberRow, ...]:
+    """Pan, tilt, roll and height: prior, served, the drift, and half its 90 % interval."""
+    told = () if estimate is None else tuple(estimate.told)
+    rows = []
+    for name, words in NAMES.items():
+        before, after = (_number(pose, name) for pose in (prior, served))
+        unit, digits = (" m", 2) if name == "height" else ("°", 1)
+        row = {"name": words.capitalize(), "prior": _text(before, digits) + unit}
+        if estimate is not None and name in told:
+            suffix = "_m" if name == "height" else "_rad"
+            drift = float(getattr(estimate, f"drift_{name}{suffix}"))
+            sd = float(getattr(estimate, f"{name}_sd{suffix}") or 0.0)
+            if name != "height":
+                drift, sd = math.degrees(drift), math.degrees(sd)
+            row |= {
+                "served": _text(after, digits) + unit,
+                "drift": f"{signed(drift, digits)}{unit}",
+                "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
+            }
+        rows.append(NumberRow(**{"served": "", "drift": "", "sure": "", **row}))
+    return tuple(rows)
+
+
+def misplaced_words(each: Sequence[Misplacement]) -> str:
+    """What a move means on the ground: "A person at 10 m is now placed 1.7 m too far, …"."""
+    if not each:
+        return ""
+    if all(one.off_m is not None and one.off_m < _UNCHANGED_M for one in each):
+        far = each[-1].distance_m
+        return f"By the prior pose, people up to {far:.0f} m away are placed where they stand."
+    first, *others = each
+    parts = [f"A person at {first.distance_m:.0f} m is now placed {_off_words(first)}"]
+    parts += [f"one at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
+    return f"{', '.join(parts)}."
+
+
+def _off_words(one: Misplacement) -> str:
+    if one.off_m is None or one.farther_m is None:
+        return "above the horizon, which is nowhere"
+    way = ""
+    # Mostly along the line of sight; else to a side.
+    if abs(one.farther_m) > 0.7 * one.off_m and one.off_m >= _UNCHANGED_M:
+        way = " too far" if one.farther_m > 0 else " too near"
+    return f"{one.off_m:.1f} m{way or ' off'}"
+
+
+def deed_words(deed: Deed, clock: Clock) -> str:
+    """Who did what, as a sentence without the time."""
+    kind = KINDS.get(deed.kind or "", "").lower()
+    alert = f" the alert “{kind}”" if kind else ""
+    who = deed.by or ("Someone" if deed.what in ("registered", "changed") else None)
+    if deed.what == "opened":
+        text = f"Alert: {kind}."
+    elif deed.what == "resolved" and deed.outcome == "cleared" and deed.by is None:
+        text = f"The alert “{kind}” ended by itself."
+    elif deed.what == "resolved":
+        outcome = OUTCOMES.get(deed.outcome or "", deed.outcome or "")
+        text = f"{who or 'Someone'} closed{alert}: {outcome}."
+    elif deed.what == "silenced" and deed.until is not None:
+        text = f"{who or 'Someone'} silenced{alert} until {clock.when(deed.until)}."
+    elif deed.what == "silence_ended" and deed.by is None:
+        text = f"The silence of{alert} ended."
+    elif deed.what == "maintenance" and deed.until is not None:
+        text = f"{who or 'Someone'} planned maintenance until {clock.when(deed.until)}."
+    elif deed.what in ("learned", "escalated"):
+        text = _DEEDS[deed.what]
+    else:
+        done = _DEEDS.get(deed.what, deed.what)
+        text = f"{who or 'Someone'} {done}{alert if deed.kind else ''}."
+    return f"{text} {deed.note}" if deed.note else text
+
+
+def flags(page: CameraPage, clock: Clock) -> tuple[str, ...]:
+    """What else is to be known at a glance, of open alerts and maintenance."""
+    found = []
+    if page.attended is not None:
+        found.append(f"Maintenance until {clock.when(page.attended.to_at)}")
+    for story in page.firing:
+        record = story.record
+        if record.acknowledged_at is not None:
+            found.append(f"Acknowledged by {record.acknowledged_by}")
+        if record.silenced_until is not None and is_silenced(record, page.now):
+            found.append(f"Silenced until {clock.when(record.silenced_until)}")
+        if story.group is not None:
+            cameras = len(story.group.camera_ids or [])
+            found.append(f"One of {cameras} cameras of {record.track_source} at once")
+    return tuple(dict.fromkeys(found))
+
+
+def _text(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _number(pose: CameraPose, name: str) -> float:
+    if name == "height":
+        return pose.height_m
+    return math.degrees(float(getattr(pose, f"{name}_rad")))

@@ -1,0 +1,142 @@
+"""Lines of the fleet page as its templates take them: words, numbers and drawings, no records."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, tzinfo
+
+from markupsafe import Markup
+
+from service.recalibration.fleet import FleetAlert, FleetCamera, FleetGroup
+from service.web.sparkline import sparkline
+from service.web.words import STATES, ago, clock_time, duration, from_seconds, situation
+
+_URGENT = ("drifting", "out_of_range")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A camera's line. `key` sorts lines as strings, `text` is what a search looks in."""
+
+    id: str
+    name: str
+    state: str
+    word: str
+    words: str
+    flags: tuple[str, ...]
+    training: int | None
+    share: int | None
+    spark: Markup
+    since: str
+    since_clock: str
+    since_words: str
+    last: str
+    last_clock: str
+    last_words: str
+    key: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Banner:
+    """An alert about a tracker."""
+
+    title: str
+    words: str
+    severity: str
+    since: str
+    since_clock: str
+    since_words: str
+    flags: tuple[str, ...]
+    cameras: tuple[tuple[str, str], ...]
+
+
+def rows_of(cameras: Sequence[FleetCamera], now: datetime, zone: tzinfo) -> list[Row]:
+    """The lines of some cameras."""
+    return [_row(camera, now, zone) for camera in cameras]
+
+
+def banners_of(groups: Sequence[FleetGroup], now: datetime, zone: tzinfo) -> list[Banner]:
+    """The alerts about trackers."""
+    return [
+        Banner(
+            title=f"Tracker {group.track_source}:",
+            words=group.alert.reason.replace(f" of the tracker {group.track_source!r}", ""),
+            severity=group.alert.severity,
+            since=group.alert.since.isoformat(),
+            since_clock=clock_time(group.alert.since, zone),
+            since_words=ago(group.alert.since, now),
+            flags=_alert_flags(group.alert, now),
+            cameras=group.cameras,
+        )
+        for group in groups
+    ]
+
+
+def counts_of(cameras: Sequence[FleetCamera]) -> list[tuple[str, str, int]]:
+    """Each state with its word and how many cameras are in it."""
+    count = Counter(camera.state for camera in cameras)
+    return [(state, word, count[state]) for state, word in STATES.items()]
+
+
+def urgent(cameras: Sequence[FleetCamera]) -> int:
+    """How many have moved."""
+    return sum(camera.state in _URGENT for camera in cameras)
+
+
+def _row(camera: FleetCamera, now: datetime, zone: tzinfo) -> Row:
+    last = None if camera.last_track_s is None else from_seconds(camera.last_track_s)
+    since = camera.since
+    share = None
+    if camera.learned is not None:
+        share = round(100 * camera.learned / camera.wanted)
+    return Row(
+        id=camera.camera_id,
+        name=camera.name,
+        state=camera.state,
+        word=STATES[camera.state],
+        words=situation(camera, now),
+        flags=_flags(camera, now),
+        training=None if camera.training is None else round(100 * camera.training.share),
+        share=share,
+        spark=sparkline(camera.history),
+        since="" if since is None else since.isoformat(timespec="seconds"),
+        since_clock="" if since is None else clock_time(since, zone),
+        since_words="" if since is None else ago(since, now),
+        last="" if last is None else last.isoformat(timespec="seconds"),
+        last_clock="" if last is None else clock_time(last, zone),
+        last_words="" if last is None else ago(last, now),
+        key=_key(camera),
+        text=f"{camera.name} {camera.camera_id}".lower(),
+    )
+
+
+def _key(camera: FleetCamera) -> str:
+    """What `recalibration.fleet.order` says, as a string: newest first is what remains to 2**40."""
+    rank, negative_s, name = camera.order
+    return f"{rank}-{2**40 + negative_s:016.1f}-{name}-{camera.camera_id}"
+
+
+def _flags(camera: FleetCamera, now: datetime) -> tuple[str, ...]:
+    flags = []
+    if camera.attended_until is not None:
+        left_s = (camera.attended_until - now).total_seconds()
+        flags.append(f"maintenance for {duration(left_s)} more")
+    if camera.alert is not None:
+        flags += _alert_flags(camera.alert, now)
+    elif camera.state in _URGENT and camera.attended_until is None:
+        flags.append("no alert is open")
+    if len(camera.alerts) > 1:
+        flags.append(f"{len(camera.alerts)} alerts")
+    return tuple(flags)
+
+
+def _alert_flags(alert: FleetAlert, now: datetime) -> tuple[str, ...]:
+    flags = []
+    if alert.acknowledged_by is not None:
+        flags.append(f"seen by {alert.acknowledged_by}")
+    if alert.silenced_until is not None:
+        flags.append(f"silenced for {duration((alert.silenced_until - now).total_seconds())} more")
+    if alert.grouped:
+        flags.append("with its tracker")
+    return tuple(flags)

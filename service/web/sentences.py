@@ -1,0 +1,148 @@
+"""The one sentence at the top of a camera's page: has it moved, how far, since when, how sure."""
+
+import math
+from datetime import UTC, datetime, tzinfo
+
+from models.estimation.numbers import ANGLES
+from service.recalibration.camera_page import CameraPage
+from service.store.tables import EstimateRecord
+from service.web.moments import when
+from service.web.words import duration
+
+# Operators say pan. Height is told apart.
+NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
+Z90 = 1.645  # standard deviations to each side of an interval that holds in 90 of 100 cases
+_SAYS_DEG = 0.1  # less is not worth a word
+
+
+def headline(page: CameraPage, zone: tzinfo) -> str:
+    """The state of a camera in plain words."""
+    estimate, silence = page.pose.estimate, page.silence
+    no_data = page.pose.state == "no_data"
+    quiet = ""
+    if silence is not None and no_data:
+        since = when(datetime.fromtimestamp(silence.last_s, UTC), page.now, zone)
+        quiet = f"No people since {since}: {silence.reason}."
+    if estimate is not None and estimate.drifted:
+        return " ".join(part for part in (_moved(page, estimate, zone), quiet) if part)
+    if no_data:
+        before = "" if estimate is None else "When it was last told, it stood where it should."
+        return f"{quiet} {before}".strip()
+    if page.pose.state == "learning" or estimate is None:
+        return _learning(page)
+    people = (
+        f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
+    )
+    if page.pose.state == "out_of_range":
+        how = moved_words(estimate)
+        edge = "At the edge of what its model was trained for"
+        return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
+    if estimate.drift_streak > 0 or estimate.suspected:
+        how = moved_words(estimate)
+        return f"It may have moved{how and ': it ' + how}. The next people will tell."
+    return f"Standing where it should, as {people}{_sure(estimate)}."
+
+
+def turn_words(estimate: EstimateRecord) -> str:
+    """How far a camera has turned: "turned 5.1° (pan +4.9°, tilt −1.2°)"; empty where untold.
+
+    What is within its own 90 % interval is not named.
+    """
+    angles = [name for name in ("heading", "tilt", "roll") if name in estimate.told]
+    named = [
+        f"{NAMES[name]} {signed(_degrees(estimate, name), 1)}°"
+        for name in angles
+        if abs(_degrees(estimate, name)) >= _says_deg(estimate, name)
+    ]
+    if not angles:
+        return ""
+    detail = f" ({', '.join(named)})" if named else ""
+    return f"turned {math.degrees(estimate.drift_angle_rad):.1f}°{detail}"
+
+
+def height_words(estimate: EstimateRecord) -> str:
+    """How far a camera was raised or lowered: "0.24 m higher"; empty where that is not told."""
+    if "height" not in estimate.told or abs(estimate.drift_height_m) < _height_says_m(estimate):
+        return ""
+    way = "higher" if estimate.drift_height_m > 0 else "lower"
+    return f"{abs(estimate.drift_height_m):.2f} m {way}"
+
+
+def moved_words(estimate: EstimateRecord, since: str = "") -> str:
+    """How a camera has moved, after its name: "turned 5.1° (tilt +5.1°) and is 0.24 m higher"."""
+    turn, height = turn_words(estimate), height_words(estimate)
+    if height and estimate.drifted == ["height"]:
+        return f"is {height} than it should be{since and ', since'}{since}"
+    parts = [f"{turn}{since}" if turn else "", f"is {height}" if height else ""]
+    return " and ".join(part for part in parts if part)
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign, a real minus, and never a minus nought."""
+    text = f"{value:+.{digits}f}"
+    return ("0" + text[2:] if float(text) == 0 else text).replace("-", "\N{MINUS SIGN}")
+
+
+def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
+    """Half the 90 % interval of the angle that a camera has turned by; None where none is told."""
+    told = [name for name in ANGLES if name in estimate.told]
+    if not told:
+        return None
+    drifts = [_degrees(estimate, name) for name in told]
+    sds = [math.degrees(_sd(estimate, name)) for name in told]
+    length = math.hypot(*drifts)
+    if length < max(sds):  # without a direction, the widest
+        return Z90 * max(sds)
+    # By the direction of the turn: the angle is the length of the three drifts, nearly.
+    return Z90 * math.hypot(*(d * sd for d, sd in zip(drifts, sds, strict=True))) / length
+
+
+def _moved(page: CameraPage, estimate: EstimateRecord, zone: tzinfo) -> str:
+    since = ""
+    if estimate.drift_since is not None:
+        since = f" about {when(estimate.drift_since, page.now, zone)}"
+    if any(story.record.kind == "clock" for story in page.firing):
+        how = moved_words(estimate)
+        return (
+            f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
+            f"frame rate looks like that{how and ', or the camera ' + how}{_sure(estimate)}."
+        )
+    words = moved_words(estimate, since)
+    if not words or not set(estimate.drifted) & set(estimate.told):
+        return f"The camera moved{since}; the newest people cannot tell how far."
+    return f"The camera {words}{_sure(estimate)}."
+
+
+def _sure(estimate: EstimateRecord) -> str:
+    parts = []
+    half = angle_half_width_deg(estimate)
+    if half is not None:
+        parts.append(f"±{max(half, 0.1):.1f}°")
+    if "height" in estimate.told and (
+        half is None or abs(estimate.drift_height_m) >= _height_says_m(estimate)
+    ):
+        parts.append(f"±{max(Z90 * estimate.height_sd_m, 0.01):.2f} m")
+    return f"; sure to {' and '.join(parts)}" if parts else ""
+
+
+def _learning(page: CameraPage) -> str:
+    reference = page.pose.reference
+    if not reference.ready:
+        return f"Learning: {reference.tracks} of {reference.wanted} people."
+    return "Waiting for people: too few have come to tell how it stands."
+
+
+def _degrees(estimate: EstimateRecord, name: str) -> float:
+    return math.degrees(float(getattr(estimate, f"drift_{name}_rad")))
+
+
+def _sd(estimate: EstimateRecord, name: str) -> float:
+    return float(getattr(estimate, f"{name}_sd_rad") or 0.0)
+
+
+def _says_deg(estimate: EstimateRecord, name: str) -> float:
+    return max(Z90 * math.degrees(_sd(estimate, name)), _SAYS_DEG)
+
+
+def _height_says_m(estimate: EstimateRecord) -> float:
+    return max(Z90 * estimate.height_sd_m, 0.05)

@@ -1,0 +1,40 @@
+"""A camera's drift of late as a small line, with the limit as another."""
+
+from collections.abc import Sequence
+
+from markupsafe import Markup
+
+_WIDTH, _HEIGHT = 96, 26
+_LEAST_TOP, _MOST_TOP = 1.5, 4.0  # limits that the height stands for
+
+
+def sparkline(history: Sequence[float | None], places: int = 24) -> Markup:
+    """The drift in units of its limit, newest at the right; the dashed line is the limit.
+
+    Hidden from screen readers: what it shows is said in words beside it.
+    """
+    values = [value for value in history if value is not None]
+    top = min(max([_LEAST_TOP, *(1.1 * value for value in values)]), _MOST_TOP)
+    limit = _height(1.0, top)
+    step = _WIDTH / (places - 1)
+    first = places - len(history)
+    runs: list[list[str]] = [[]]
+    for place, value in enumerate(history, start=first):
+        if value is None:
+            runs.append([])
+        else:
+            runs[-1].append(f"{place * step:.0f} {_height(value, top):.1f}")
+    line = "".join("M" + "L".join(run) for run in runs if run)
+    end = ""
+    if history and history[-1] is not None:
+        end = f'<circle cx="{_WIDTH}" cy="{_height(history[-1], top):.1f}" r="2.2"/>'
+    return Markup(
+        f'<svg class="spark" viewBox="-2 0 {_WIDTH + 5} {_HEIGHT}" width="{_WIDTH + 5}" '
+        f'height="{_HEIGHT}" aria-hidden="true">'
+        f'<path class="limit" d="M0 {limit:.1f}H{_WIDTH}"/>'
+        f'<path class="line" d="{line}"/>{end}</svg>'
+    )
+
+
+def _height(value: float, top: float) -> float:
+    return _HEIGHT - 3 - min(value, top) / top * (_HEIGHT - 6)

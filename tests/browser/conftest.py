@@ -1,0 +1,134 @@
+"""A real service and a real browser: Debian's chromium, driven by playwright."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+
+from service.migrate import migrate
+from service.settings import Settings
+from tests.conftest import free_port, wait_for
+
+CHROMIUM = os.environ.get("SUREFOOT_TEST_CHROMIUM") or shutil.which("chromium")
+# Where screenshots of the tests go, if anybody wants to look at them.
+SHOTS = os.environ.get("SUREFOOT_TEST_SHOTS")
+
+
+class Server:
+    """`surefoot serve --workers 0` over a folder of its own; a test may write into its store."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.url = f"http://{settings.host}:{settings.port}"
+        self.log = settings.data_dir.parent / "serve.log"
+        self.http = httpx.Client(base_url=self.url, timeout=30)
+
+    def start(self) -> None:
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "service.cli", "serve"],
+                env=self.settings.as_environment(),
+                stdout=log,
+                stderr=log,
+            )
+        wait_for(self.answers)
+
+    def answers(self) -> bool:
+        assert self.process.poll() is None, self.log.read_text()
+        try:
+            return self.http.get("/healthz").status_code == 200
+        except httpx.TransportError:
+            return False
+
+    def stop(self) -> None:
+        self.http.close()
+        self.process.terminate()
+        self.process.wait(20)
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    made = Settings(data_dir=tmp_path / "data", workers=0, port=free_port())
+    migrate(made)
+    running = Server(made)
+    running.start()
+    yield running
+    running.stop()
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("there is no chromium on this machine (apt install chromium)")
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        # Containers run tests as root, where chromium's sandbox cannot be.
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: Any, server: Server) -> Iterator[Any]:
+    """A page of 1280 x 800; the test fails where it asked another host or a script failed."""
+    context = browser.new_context(base_url=server.url, viewport={"width": 1280, "height": 800})
+    made = context.new_page()
+    made.set_default_timeout(15_000)
+    foreign = no_foreign_requests(made, server.url)
+    errors: list[str] = []
+    made.on("pageerror", lambda error: errors.append(str(error)))
+    made.on(
+        "console",
+        lambda message: "Content Security Policy" in message.text and errors.append(message.text),
+    )
+    yield made
+    context.close()
+    assert foreign == []
+    assert errors == []
+
+
+def no_foreign_requests(page: Any, url: str) -> list[str]:
+    """The list into which goes every request to another host from now on."""
+    foreign: list[str] = []
+
+    def look(request: Any) -> None:
+        asked = urlsplit(request.url)
+        if asked.scheme not in ("data", "blob") and asked.netloc != urlsplit(url).netloc:
+            foreign.append(request.url)
+
+    page.on("request", look)
+    return foreign
+
+
+def axe(page: Any) -> list[str]:
+    """What axe-core finds on a page that is serious or critical, a line each; empty is good."""
+    page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+    return [
+        f"{item['id']}: {node['target']} {node['failureSummary']}"
+        for item in found["violations"]
+        if item["impact"] in ("serious", "critical")
+        for node in item["nodes"]
+    ]
+
+
+def too_wide(page: Any) -> int:
+    """By how many pixels a page is wider than its window."""
+    wide: int = page.evaluate(
+        "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    )
+    return wide
+
+
+def shoot(page: Any, name: str) -> None:
+    """Keep a screenshot, if anybody wants to look at it."""
+    if SHOTS:
+        page.screenshot(path=f"{SHOTS}/{name}.png", full_page=True)

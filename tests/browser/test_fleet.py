@@ -1,0 +1,122 @@
+"""The fleet page in a browser: live, sifted by keyboard, on a phone."""
+
+import time
+
+import pytest
+
+from tests.browser.conftest import axe, shoot, too_wide
+from tests.service.fleet_bench import Fleet, afternoon
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def fleet(server):
+    made = Fleet(server.settings)
+    yield made
+    made.close()
+
+
+def shown(page):
+    return page.locator("li.row:not([hidden]) .who a").all_inner_texts()
+
+
+def test_an_alert_comes_up_by_itself(page, fleet):
+    for name in ("Alpha", "Beta", "Gamma"):
+        fleet.add(name.lower(), name)
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    assert shown(page) == ["Alpha", "Beta", "Gamma"]
+    page.evaluate("window.same = true")
+    fetched = []
+    page.on("request", lambda request: fetched.append(request.url.split("/", 3)[3]))
+    at = time.monotonic()
+    fleet.knock("beta", tilt_deg=4.0)
+    page.locator("#row-beta.drifting").wait_for(timeout=3000)
+    assert time.monotonic() - at < 3
+    assert shown(page) == ["Beta", "Alpha", "Gamma"]
+    assert "turned 4.1° (tilt +4." in page.locator("#row-beta .words").inner_text()
+    assert "Beta: turned" in page.locator("#announce").inner_text()
+    assert page.title().startswith("(1) ")
+    assert page.locator('.chip[data-state="drifting"] b').inner_text() == "1"
+    assert page.evaluate("window.same")  # not loaded anew
+    assert fetched == ["ui/fleet/rows?ids=beta"]
+
+
+def test_a_camera_that_comes_and_one_that_goes(page, fleet, server):
+    fleet.add("alpha", "Alpha")
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    fleet.add("beta", "Beta", state="learning")
+    page.locator("#row-beta").wait_for()
+    assert shown(page) == ["Beta", "Alpha"]
+
+
+def test_it_comes_back_by_itself_and_has_missed_nothing(page, fleet, server):
+    fleet.add("alpha", "Alpha")
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    server.process.kill()
+    server.process.wait(10)
+    page.get_by_text("Reconnecting").wait_for()
+    fleet.knock("alpha")
+    server.start()
+    page.locator("#row-alpha.drifting").wait_for()
+    page.get_by_text("Live").wait_for()
+
+
+def test_what_happened_while_the_page_was_made_is_not_lost(page, fleet, server):
+    fleet.add("alpha", "Alpha")
+    page.goto("/")
+    newest = page.locator('meta[name="newest-event"]').get_attribute("content")
+    fleet.knock("alpha")
+    stream = server.http.stream("GET", f"/events?after={newest}")
+    with stream as answer:
+        line = next(line for line in answer.iter_lines() if line.startswith("event:"))
+    assert line == "event: alert"
+
+
+def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
+    fleet.add("north-1", "North stairs")
+    fleet.add("north-2", "North door", state="learning")
+    fleet.add("quay", "Quay", state="learning")
+    page.goto("/")
+    page.keyboard.press("/")
+    page.keyboard.type("nor")
+    assert shown(page) == ["North door", "North stairs"]
+    assert page.locator("#found").inner_text() == "2 cameras"
+    for _ in range(4):
+        page.keyboard.press("Tab")
+    page.keyboard.press("Space")
+    assert shown(page) == ["North door"]
+    assert page.url.endswith("/?q=nor&state=learning")
+    page.reload()
+    assert shown(page) == ["North door"]
+    assert page.locator(".chip.learning").get_attribute("aria-pressed") == "true"
+    page.locator("#search").focus()
+    page.keyboard.press("Escape")
+    assert shown(page) == ["North door", "Quay"]
+
+
+def test_a_name_is_never_run(page, fleet):
+    name = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    fleet.add("bad", name)
+    page.on("dialog", lambda dialog: pytest.fail(dialog.message))
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    fleet.knock("bad")
+    page.locator("#row-bad.drifting").wait_for()
+    assert shown(page) == [name]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everybody_can_read_it(page, fleet, scheme):
+    afternoon(fleet, 30)
+    page.emulate_media(color_scheme=scheme)
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    assert axe(page) == []
+    shoot(page, f"fleet-{scheme}")
+    for width in (360, 768, 2560):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert too_wide(page) <= 0, width
