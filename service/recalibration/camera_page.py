@@ -41,7 +41,7 @@ class CameraPage:
     """What the page of a camera shows. Lists are newest first, windows in their order.
 
     `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
-    means on the ground; empty where nothing is told.
+    means on the ground; empty where there is none.
     """
 
     now: datetime
@@ -97,7 +97,8 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         session, camera_id, _TRACKS, None if estimate is None else estimate.from_s
     )
     misplaced: tuple[Misplacement, ...] = ()
-    if pose.told:
+    # Of a camera that stands still it would tell of the estimate's noise.
+    if estimate is not None and estimate.told and (estimate.drifted or estimate.drift_streak > 0):
         misplaced = misplacements(camera.intrinsics, pose.pose, camera.prior_pose, DISTANCES_M)
     return CameraPage(
         now=now,

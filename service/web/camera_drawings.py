@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from markupsafe import Markup
 
+from models.geometry.rotation import Array
 from service.recalibration.camera_page import CameraPage
 from service.web.ground_plan import ground_plan_svg
 from service.web.picture import Overlay, ground_of, horizon_path, picture_svg
+
+_POINTS = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +36,7 @@ def draw_camera(page: CameraPage) -> CameraDrawings:
         overlays.append(Overlay(pose=page.pose.pose, kind="served"))
     # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
     ground = ground_of(lens, overlays[-1].pose)
-    feet = [track.uv for track in page.tracks]
+    feet = [_fewer(track.uv) for track in page.tracks]
     people = f"the feet of {len(feet)} people" if feet else "nobody yet"
     both = (
         "the prior pose, dashed, and the served pose, solid" if len(overlays) > 1 else "the prior"
@@ -61,3 +65,9 @@ def draw_camera(page: CameraPage) -> CameraDrawings:
         two_poses=len(overlays) > 1,
         horizon=any(horizon_path(lens, each.pose) for each in overlays),
     )
+
+
+def _fewer(uv: Array) -> Array:
+    """A track with so few points that a hundred of them are drawn in no time."""
+    kept = np.unique(np.linspace(0, len(uv) - 1, min(len(uv), _POINTS)).astype(int))
+    return np.asarray(uv[kept])

@@ -5,9 +5,12 @@ import re
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from PIL import Image
 
-from tests.browser.conftest import axe, shoot, too_wide
-from tests.conftest import CAMERA
+from service.migrate import migrate
+from service.settings import Settings
+from tests.browser.conftest import Server, axe, shoot, too_wide
+from tests.conftest import CAMERA, free_port
 from tests.service.bench import PRIOR, Bench, moved
 from tests.service.street import KNOCKED, Street
 from tests.service.street import PRIOR as STREET_PRIOR
@@ -194,6 +197,37 @@ def test_the_page_is_sound(page, knocked, scheme):
         page.set_viewport_size({"width": width, "height": 800})
         assert too_wide(page) <= 0, width
         assert axe(page) == [], width
+
+
+def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    settings = Settings(
+        data_dir=tmp_path / "data", workers=0, port=free_port(), snapshots=True, window_tracks=20
+    )
+    migrate(settings)
+    Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
+    Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
+    server = Server(settings)
+    server.start()
+    try:
+        server.http.post("/cameras", json=CAMERA).raise_for_status()
+        bench = Bench(server.http, settings)
+        for _ in range(3):
+            bench.see(moved(tilt_deg=5.0))
+        page = browser.new_context(base_url=server.url).new_page()
+        page.goto(URL)
+        page.locator("#still-file").set_input_files(tmp_path / "upright.png")
+        expect(page.locator("#problem-detail")).to_contain_text("1280 x 720")
+        page.keyboard.press("Escape")
+        page.locator("#still-file").set_input_files(tmp_path / "still.png")
+        expect(page.locator(".picture image")).to_have_count(1)
+        assert axe(page) == []
+        shoot(page, "camera-still-image")
+        page.get_by_role("button", name="Remove it").click()
+        expect(page.locator(".picture image")).to_have_count(0)
+        assert server.http.get("/cameras/corner/snapshot").status_code == 404
+    finally:
+        server.stop()
 
 
 def test_a_knocked_street_is_seen_to_be_knocked(page, server):
