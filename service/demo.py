@@ -91,7 +91,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
-    console.print("A street camera, people walking by; later somebody knocks the camera.\n")
+    console.print("A street camera, people walking by; later somebody knocks the camera.")
     with tempfile.TemporaryDirectory(prefix="surefoot-demo-") as folder:
         settings = Settings(
             data_dir=Path(folder),
@@ -102,6 +102,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
             workers=1,
         )
         url = f"http://{settings.host}:{settings.port}"
+        console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")
         with _service(settings), httpx.Client(base_url=url, timeout=30) as http:
             screen, progress = _play(http, console, seed, started)
             won = _close(console, screen, url, time.monotonic() - started)
