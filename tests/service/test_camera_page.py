@@ -60,7 +60,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
     assert "A person at 10 m is now placed 2.4 m too far" in text
     assert 'class="grid served"' in text
     assert text.count('data-act="acknowledge"') == 1
-    assert "beyond 6 sd" in text  # the reason, as the API says it
+    assert "beyond 5 sd" in text  # the reason, as the API says it
 
 
 def test_it_may_have_moved_before_an_alert_says_so(bench):
