@@ -149,14 +149,14 @@ def _highest(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
     count = len(scores)
     highest = np.empty(_RUNS)
     for run in range(_RUNS):
-        taken_for_usual = scores[_blocks(rng, count, count)].mean(axis=0)
-        people = scores[_blocks(rng, count, count)]
-        walked = people[_blocks(rng, count, RUN)]
+        taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
+        people = scores[drawn_blocks(rng, count, count)]
+        walked = people[drawn_blocks(rng, count, RUN)]
         highest[run] = trace(ratios, walked - taken_for_usual).statistic.max()
     return highest
 
 
-def _blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
+def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
     """Indices (wanted,) of parties, some after one another at a time."""
     starts = rng.integers(0, count, -(-wanted // _BLOCK))
     return np.asarray(((starts[:, None] + np.arange(_BLOCK)).ravel() % count)[:wanted])

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.drift.chart import trace
+from models.drift.chart_learning import drawn_blocks
 from models.drift.party_scores import score_parties
 from models.drift.verdict import DriftLimits, drift_between, judge
 from models.estimation.joint.estimate import joint_estimate
@@ -28,7 +28,6 @@ from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
 from models.trajectory import Trajectory
 
-_BLOCK = 3  # parties after one another that the bootstrap keeps together
 _LONGEST = 1200  # parties that a knock is waited for
 _DRAWS = 10
 _LOOKS = (20, 40, 60, 100, 200, 400)  # tracks after which a pose is asked for
@@ -63,7 +62,7 @@ def judge_scene(
         return None
     still = watch.apart(score_parties(learned.seen, watch.usual))
     wanted = round(years * DAYS * tracks_a_day * parties_a_track)
-    walked = still[_blocks(rng, len(still), wanted)]
+    walked = still[drawn_blocks(rng, len(still), wanted)]
     delays = []
     for asked, knock in knocks_of(angles_deg, rng):
         moved = knock.apply(scene.true_pose)
@@ -71,7 +70,7 @@ def judge_scene(
         apart = watch.apart(score_parties(seen, watch.usual))
         if len(apart):
             told = _told_after(learned, seen, limits)
-            drawn = (apart[_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
+            drawn = (apart[drawn_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
             tracks = seen.tracks / len(apart)
             delays += [
                 replace(asked, tracks=min(told, first_alarm(watch, one, tracks))) for one in drawn
@@ -123,8 +122,3 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
 def _parties_a_track(observations: Observations, prior: CameraPose) -> float:
     walkers = walkers_of(observations, candidate_of(prior))
     return max(walkers.parties, 1) / observations.tracks
-
-
-def _blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
-    starts = rng.integers(0, count, -(-wanted // _BLOCK))
-    return np.asarray(((starts[:, None] + np.arange(_BLOCK)).ravel() % count)[:wanted])
