@@ -14,7 +14,8 @@ from models.evaluation.alarms import DAYS, AlarmResults, Delay, knocks_of
 from models.evaluation.study_site import Place, draw_place, observe_feet
 from models.evaluation.watch import Watch, first_alarm, watch_over
 from models.geometry.pose import CameraPose
-from models.simulation.habits import HabitConfig, walk_days
+from models.geometry.rotation import Array
+from models.simulation.habits import HabitConfig, draw_mixes, walk_days
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 
@@ -44,6 +45,8 @@ def live_year(
     place = draw_place(rng)
     habits_seed = int(rng.integers(2**31))
     life = _life(place, place.prior, tracks_a_day, 0, habits_seed)
+    # The first that the life drew: after a knock, too, people take the lanes that they took.
+    mixes = draw_mixes(len(place.lanes), HabitConfig(), np.random.default_rng(habits_seed))
     first: list[Trajectory] = []
     day = 0
     while len(first) < reference_tracks:
@@ -70,7 +73,7 @@ def live_year(
     delays = [
         delay
         for asked, knock in knocks_of(angles_deg, rng)
-        if (delay := _knocked(place, asked, knock.apply(place.prior), watch, day, rng)) is not None
+        if (delay := _knocked(place, mixes, asked, knock.apply(place.prior), watch, day, rng))
     ]
     return AlarmResults(
         name=f"site {site}",
@@ -86,6 +89,7 @@ def live_year(
 
 def _knocked(
     place: Place,
+    mixes: Array,
     asked: Delay,
     moved: CameraPose,
     watch: Watch,
@@ -95,7 +99,8 @@ def _knocked(
     """Tracks until the alarm; None where nobody is seen from the new pose."""
     seen: list[Trajectory] = []
     try:
-        for tracks in _life(place, moved, _LONGEST_TRACKS / 5, day, int(rng.integers(2**31))):
+        seed = int(rng.integers(2**31))
+        for tracks in _life(place, moved, _LONGEST_TRACKS / 5, day, seed, mixes):
             seen += tracks
             if len(seen) >= _LONGEST_TRACKS:
                 break
@@ -114,7 +119,12 @@ def _knocked(
 
 
 def _life(
-    place: Place, pose: CameraPose, tracks_a_day: float, day: int, seed: int
+    place: Place,
+    pose: CameraPose,
+    tracks_a_day: float,
+    day: int,
+    seed: int,
+    mixes: Array | None = None,
 ) -> Iterator[list[Trajectory]]:
     return walk_days(
         place.intrinsics,
@@ -125,4 +135,5 @@ def _life(
         tracks_a_day=tracks_a_day,
         days=range(day, 10**6),
         rng=np.random.default_rng(seed),
+        mixes=mixes,
     )

@@ -17,6 +17,7 @@ from models.drift.party_scores import score_parties
 from models.drift.verdict import DriftLimits, drift_between, judge
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.estimation.joint.reference import FEWEST_WALKERS
 from models.evaluation.alarms import DAYS, AlarmResults, knocks_of
 from models.evaluation.learned import Learned, learn_case
 from models.evaluation.protocol import STILL, draw_case
@@ -31,7 +32,6 @@ from models.trajectory import Trajectory
 _LONGEST = 1200  # parties that a knock is waited for
 _DRAWS = 10
 _LOOKS = (20, 40, 60, 100, 200, 400)  # tracks after which a pose is asked for
-_FEWEST_WALKERS = 5  # as the service has it
 
 
 def judge_scene(
@@ -103,7 +103,7 @@ def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> fl
 def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
     """The largest told drift of the pose by what is seen, in units of its limit."""
     case, flow = learned.case, learned.flow
-    if flow is None or seen.walkers < _FEWEST_WALKERS:
+    if flow is None or seen.walkers < FEWEST_WALKERS:
         return 0.0
     joint = joint_estimate(seen, case.prior_pose, learned.site)
     fused = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, flow)

@@ -67,13 +67,17 @@ def walk_days(
     tracks_a_day: float,
     days: range,
     rng: np.random.Generator,
+    mixes: Array | None = None,
 ) -> Iterator[list[Trajectory]]:
     """The tracks of each day, in time order; day 0 is a Monday, times are seconds from its start.
+
+    Which lanes are taken when is drawn first, unless the `mixes` of `draw_mixes` are given.
 
     Raises:
         DegenerateGeometryError: hardly any walk is seen from the pose.
     """
-    mixes = rng.dirichlet(np.full(len(lanes), habits.mixing), (2, len(habits.parts)))
+    if mixes is None:
+        mixes = draw_mixes(len(lanes), habits, rng)
     for day in days:
         weekend, wet = day % 7 >= 5, rng.uniform() < habits.rain_share
         crowd = rng.uniform() < habits.crowd_share
@@ -99,6 +103,11 @@ def walk_days(
                 for track in walk_site(intrinsics, pose, taken, paced, count, rng)
             ]
         yield sorted(tracks, key=lambda track: float(track.time_s[-1]))
+
+
+def draw_mixes(lanes: int, habits: HabitConfig, rng: np.random.Generator) -> Array:
+    """How people share lanes (2, parts, lanes), on weekdays and weekends, by parts of the day."""
+    return rng.dirichlet(np.full(lanes, habits.mixing), (2, len(habits.parts)))
 
 
 def _mixed(lanes: Sequence[Lane], mix: Array, rng: np.random.Generator) -> list[Lane]:

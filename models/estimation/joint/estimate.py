@@ -16,7 +16,6 @@ from models.geometry.rotation import Array
 
 _STARTS = 2
 _START_TRACKS = 80
-# Beyond these standard deviations tracks do not tell a number: angles in radians, log height.
 _FEWEST_PARTIES = 5
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
