@@ -2,6 +2,7 @@
 
 import math
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -46,11 +47,18 @@ def pose() -> CameraPose:
     )
 
 
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    made = Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1)
+@pytest.fixture(scope="session")
+def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data directory that was just migrated; migrating takes a second, a copy none."""
+    made = Settings(data_dir=tmp_path_factory.mktemp("migrated") / "data")
     migrate(made)
-    return made
+    return made.data_dir
+
+
+@pytest.fixture
+def settings(tmp_path: Path, migrated: Path) -> Settings:
+    shutil.copytree(migrated, tmp_path / "data")
+    return Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1)
 
 
 def track(track_id: str, start_s: float = 1_700_000_000.0, count: int = 20) -> dict[str, Any]:

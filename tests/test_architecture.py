@@ -16,7 +16,7 @@ SERVICE_ROOMS = [
     {"migrate", "recalibration"},
     {"schemas", "jobs", "web"},
     {"routes"},
-    {"app", "protocol_plots", "protocol_tables", "alarm_tables"},
+    {"app", "listener", "local_workers", "protocol_plots", "protocol_tables", "alarm_tables"},
     {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},
