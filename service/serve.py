@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import signal
+import sys
 
 import uvicorn
 
@@ -15,6 +16,7 @@ from service.settings import Settings
 
 log = logging.getLogger("surefoot.serve")
 
+_SWITCH_S = 0.001
 _BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
 
 
@@ -38,6 +40,8 @@ def run_service(settings: Settings) -> None:
         with local_workers(settings):
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # So long waits each step of the loop for threads that compute.
+            sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: None)

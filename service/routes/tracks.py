@@ -55,6 +55,7 @@ def read_batch(
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
         OverloadedError: other large bodies are being read all the time.
     """
+    source = formats.read_source(source, "/source")
     with state.store.read() as session:
         camera = cameras.require_camera(session, camera_id)
     size = (camera.width, camera.height)

@@ -129,6 +129,18 @@ def healthy(address):
     return everything(made).startswith(b"HTTP/1.1 200 ")
 
 
+@pytest.mark.parametrize("given", [b"\xb2", b"9" * 30, b"-1"], ids=["digit", "large", "below"])
+def test_a_last_event_id_that_is_none_opens_a_stream(api, given):
+    made = connect(api, b"GET /events HTTP/1.1\r\nHost: x\r\nLast-Event-ID: " + given + b"\r\n\r\n")
+    found = b""
+    while b": connected" not in found:
+        chunk = made.recv(65536)
+        assert chunk, found
+        found += chunk
+    assert found.startswith(b"HTTP/1.1 200 ")
+    made.close()
+
+
 def test_one_address_has_its_share(settings):
     with in_process(settings, connections_per_address=5) as (address, _):
         kept = [socket.create_connection(address, timeout=10) for _ in range(5)]
