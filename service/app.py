@@ -9,6 +9,7 @@ import anyio.to_thread
 from fastapi import FastAPI
 
 from service.job_queue import JobQueue
+from service.recalibration.quota import Quota
 from service.routes import (
     alerts,
     camera_page,
@@ -59,6 +60,7 @@ def create_app(settings: Settings) -> FastAPI:
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
+            quota=Quota(settings),
             stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
         )
         yield {"app": state}

@@ -68,6 +68,7 @@ class Settings(BaseSettings):
 
     keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
     keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 

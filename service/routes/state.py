@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
+from service.recalibration.quota import Quota
 from service.routes.instruments import Instruments
 from service.settings import Settings
 from service.store.database import Store
@@ -27,6 +28,7 @@ class AppState:
     settings: Settings
     store: Store
     queue: JobQueue
+    quota: Quota
     stream_polls: anyio.CapacityLimiter
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))

@@ -88,6 +88,8 @@ def post_tracks(
     camera_id: str, batch: Annotated[Batch, Depends(read_batch)], state: StateDep
 ) -> ReceiptOut:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk."""
+    with state.store.read() as session:
+        state.quota.check(session, camera_id, batch)
     with state.store.write() as session:
         cameras.require_camera(session, camera_id)
         receipt = tracks.receive_tracks(session, state.queue, camera_id, batch)

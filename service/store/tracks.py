@@ -66,6 +66,12 @@ def count(session: Session, camera_id: str) -> int:
     return session.scalar(query.where(TrackRecord.camera_id == camera_id)) or 0
 
 
+def stored_bytes(session: Session, camera_id: str) -> int:
+    """How many bytes the points and boxes of a camera's tracks have."""
+    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
+
+
 def newest_end_s(session: Session, camera_id: str) -> float | None:
     """When the newest track ended."""
     return session.scalar(
