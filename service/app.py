@@ -11,6 +11,7 @@ from fastapi import FastAPI
 from service.job_queue import JobQueue
 from service.recalibration.quota import Quota
 from service.routes import (
+    activity,
     alerts,
     camera_page,
     cameras,
@@ -84,6 +85,7 @@ def create_app(settings: Settings) -> FastAPI:
         maintenance,
         webhooks,
         events,
+        activity,
         operation,
         metrics,
         fleet,

@@ -74,7 +74,7 @@ def test_so_many_cameras(settings):
 
 
 def test_a_camera_has_its_bytes(settings, monkeypatch):
-    """A track of 20 points has 480 bytes: 0.02 MiB are kept, and half more lies there until older ones go."""
+    """A track of 20 points has 480 bytes: 0.02 MiB are kept, and half more until some go."""
     with client_of(settings, keep_mb=0.02) as client:
         taken = 0
         for n in range(10):
