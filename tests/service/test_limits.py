@@ -3,12 +3,16 @@
 import time
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
+from models.evaluation.scenes import SceneTrack
+from models.trajectory import Trajectory
 from service.app import create_app
 from service.errors import TooManyRequestsError
+from service.replay import post_tracks
 from service.routes.rates import Buckets
 from service.store.database import Store
 from tests.conftest import CAMERA, track
@@ -35,6 +39,17 @@ def test_a_camera_is_told_of_so_often(settings):
         assert client.get("/cameras/corner").json()["tracks"] == 1
         counted = client.get("/metrics").text
         assert 'surefoot_http_refusals_total{code="too_many_requests"} 1.0' in counted
+
+
+def test_a_replay_comes_back_when_it_is_told_to(settings):
+    points = np.array(track("1")["points"])
+    walk = Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+    with client_of(settings, camera_rate=1.0) as client:
+        for n in range(6):  # five at once, and the sixth after a second
+            seen = [SceneTrack(track_id=str(n), trajectory=walk)]
+            assert post_tracks(client, "corner", seen, 0.0)["accepted"] == 1
+        counted = client.get("/metrics").text
+        assert 'surefoot_http_refusals_total{code="too_many_requests"} ' in counted
 
 
 def test_a_caller_asks_so_often_but_health_is_free(settings):
