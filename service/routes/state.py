@@ -35,8 +35,8 @@ class AppState:
     stopping: threading.Event = field(default_factory=threading.Event)
 
 
-def get_state(request: Request) -> AppState:
-    """The application's state."""
+async def get_state(request: Request) -> AppState:
+    """The application's state; a coroutine, since anything else would be given a thread."""
     state: AppState = request.state.app
     return state
 
@@ -68,7 +68,7 @@ async def whole_body(request: Request) -> bytes:
 BodyDep = Annotated[bytes, Depends(whole_body)]
 
 
-def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
+async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
     """The version that a change is meant for.
 
     Raises:
