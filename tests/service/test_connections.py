@@ -45,6 +45,9 @@ def connect(api, text=b""):
     return made
 
 
+LATE = b"HTTP/1.1 408 "
+
+
 def everything(made):
     """All that comes until the other side closes."""
     found = b""
@@ -143,12 +146,20 @@ def test_a_last_event_id_that_is_none_opens_a_stream(api, given):
 
 def test_one_address_has_its_share(settings):
     with in_process(settings, connections_per_address=5) as (address, _):
+        # Of connections that say nothing the oldest makes room, at once.
+        silent = [socket.create_connection(address, timeout=10) for _ in range(7)]
+        assert healthy(address)
         kept = [socket.create_connection(address, timeout=10) for _ in range(5)]
+        for made in kept:
+            made.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert made.recv(65536).startswith(b"HTTP/1.1 200 ")
+        # Five that were answered and are kept open are the address's share.
         assert everything(socket.create_connection(address, timeout=10)).startswith(
             b"HTTP/1.1 503 "
         )
         kept[0].close()
         wait_for(lambda: healthy(address), 10)
+        assert everything(silent[0])[: len(LATE)] in (b"", LATE)
 
 
 def test_answers_do_not_wait_for_acknowledgements(settings):
