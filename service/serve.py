@@ -3,10 +3,12 @@
 import contextlib
 import logging
 import signal
+import sys
 
 import uvicorn
 
 from service.app import create_app
+from service.connections import ConnectionGuard, protocol_factory
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -14,13 +16,22 @@ from service.settings import Settings
 
 log = logging.getLogger("surefoot.serve")
 
+_SWITCH_S = 0.001
+_BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
+
 
 def run_service(settings: Settings) -> None:
     """Migrate, start the workers, serve until SIGTERM or SIGINT, stop cleanly."""
     with contextlib.closing(listen(settings)) as listener:
         migrate(settings)
+        app = create_app(settings)
+        guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
-            create_app(settings),
+            app,
+            loop="asyncio",
+            http=protocol_factory(guard),  # type: ignore[arg-type]
+            ws="none",
+            backlog=_BACKLOG,
             log_level="warning",
             access_log=False,
             timeout_graceful_shutdown=3,
@@ -29,6 +40,8 @@ def run_service(settings: Settings) -> None:
         with local_workers(settings):
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # So long waits each step of the loop for threads that compute.
+            sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: None)

@@ -1,6 +1,5 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
-from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
@@ -10,6 +9,7 @@ from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
 from service.recalibration import cameras, poses
 from service.routes.state import ReadDep, StateDep, WriteDep
+from service.schemas.base import Moment
 from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
@@ -51,8 +51,8 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextRespo
 def history(
     camera_id: str,
     session: ReadDep,
-    from_: Annotated[datetime | None, Query(alias="from")] = None,
-    to: datetime | None = None,
+    from_: Annotated[Moment | None, Query(alias="from")] = None,
+    to: Moment | None = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
     points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
@@ -60,12 +60,6 @@ def history(
 
     With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
     """
-    for name, value in (("from", from_), ("to", to)):
-        if value is not None and value.tzinfo is None:
-            reason = f"a time with its zone is needed, got {value.isoformat()}"
-            raise MalformedError(
-                f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),)
-            )
     if points is not None and limit is not None:
         reason = "either limit or points is taken"
         raise MalformedError(f"points: {reason}", (FieldError(pointer="/points", reason=reason),))

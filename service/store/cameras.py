@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import CameraRecord, PriorPoseRecord
@@ -23,6 +23,11 @@ def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
 def every(session: Session) -> Sequence[CameraRecord]:
     """All cameras."""
     return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
+
+
+def count(session: Session) -> int:
+    """How many cameras there are."""
+    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
 
 
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
