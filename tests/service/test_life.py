@@ -393,7 +393,6 @@ class LifeOfCameras(RuleBasedStateMachine):
         known = self.bodies.setdefault(camera_id, {})
         tag = answer.headers["etag"]
         assert known.setdefault(tag, answer.text) == answer.text, "one ETag, two bodies"
-        assert list(known.values()).count(answer.text) == 1
         if camera_id in self.answered:
             assert (body["estimated"], body["drift"]) == ([], None), "answered, and told again"
 
