@@ -95,7 +95,9 @@ def create_app(settings: Settings) -> FastAPI:
 
 def _service_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ServiceError)
-    return _problem(request, error.status, error.code, error.detail, error.errors)
+    answer = _problem(request, error.status, error.code, error.detail, error.errors)
+    answer.headers.update(error.headers)
+    return answer
 
 
 def _calibration_error(request: Request, error: Exception) -> Response:

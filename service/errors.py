@@ -22,6 +22,11 @@ class ServiceError(Exception):
         self.detail = detail
         self.errors = errors
 
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that go with the answer."""
+        return {}
+
 
 class SwitchedOffError(ServiceError):
     """The operator has not switched on what is asked for."""
@@ -69,3 +74,18 @@ class UnsupportedMediaTypeError(ServiceError):
     """A body of a content type that the path does not take."""
 
     status, code = 415, "unsupported_media_type"
+
+
+class BusyError(ServiceError):
+    """As much of this is under way as is taken at once; it is worth a try later."""
+
+    status, code = 503, "busy"
+
+    def __init__(self, detail: str, retry_after_s: int) -> None:
+        super().__init__(detail)
+        self.retry_after_s = retry_after_s
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to come back."""
+        return {"Retry-After": str(self.retry_after_s)}
