@@ -6,9 +6,8 @@ from http import HTTPStatus
 from typing import TypedDict
 
 from fastapi import FastAPI, Request
-from fastapi.encoders import jsonable_encoder
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from models.errors import CalibrationError
@@ -33,6 +32,8 @@ from service.routes import (
     webhooks,
 )
 from service.routes.instruments import InstrumentMiddleware, Instruments
+from service.routes.origins import OriginMiddleware
+from service.routes.problems import problem, problem_of
 from service.routes.state import AppState
 from service.settings import Settings
 from service.store.database import Store
@@ -87,6 +88,7 @@ def create_app(settings: Settings) -> FastAPI:
     ):
         app.include_router(module.router)
     pages.mount_static(app)
+    app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(CalibrationError, _calibration_error)
@@ -97,13 +99,11 @@ def create_app(settings: Settings) -> FastAPI:
 
 def _service_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ServiceError)
-    answer = _problem(request, error.status, error.code, error.detail, error.errors)
-    answer.headers.update(error.headers)
-    return answer
+    return problem_of(request, error)
 
 
 def _calibration_error(request: Request, error: Exception) -> Response:
-    return _problem(request, 409, "calibration", str(error))
+    return problem(request, 409, "calibration", str(error))
 
 
 def _validation_error(request: Request, error: Exception) -> Response:
@@ -116,32 +116,10 @@ def _validation_error(request: Request, error: Exception) -> Response:
         for item in error.errors()
     )
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
-    return _problem(request, 422, "malformed", detail, errors)
+    return problem(request, 422, "malformed", detail, errors)
 
 
 def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
-    return _problem(request, error.status_code, code, str(error.detail))
-
-
-def _problem(
-    request: Request, status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
-) -> Response:
-    """A problem document (RFC 9457); for who looks for a page, a page."""
-    if pages.wants_page(request):
-        return pages.render(
-            request, "problem.html", status, title=HTTPStatus(status).phrase, detail=detail
-        )
-    content = {
-        "type": "about:blank",
-        "title": HTTPStatus(status).phrase,
-        "status": status,
-        "code": code,
-        "detail": detail,
-    }
-    if errors:
-        content["errors"] = [{"pointer": error.pointer, "reason": error.reason} for error in errors]
-    return JSONResponse(
-        jsonable_encoder(content), status_code=status, media_type="application/problem+json"
-    )
+    return problem(request, error.status_code, code, str(error.detail))

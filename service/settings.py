@@ -2,9 +2,10 @@
 
 import os
 from datetime import UTC, tzinfo
-from ipaddress import IPv4Network, IPv6Network, ip_network
+from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
 from pathlib import Path
 from typing import Literal
+from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import Field, field_validator
@@ -19,6 +20,9 @@ class Settings(BaseSettings):
     data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
     host: str = Field("127.0.0.1", description="address that the API listens on")
     port: int = Field(8080, ge=0, le=65535, description="port that the API listens on")
+    allowed_hosts: str = Field(
+        "", description="names, with commas, that this service is asked by besides its own"
+    )
     workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
 
     recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
@@ -140,6 +144,18 @@ class Settings(BaseSettings):
         return _read_numbers(self.webhook_retry_s)
 
     @property
+    def on_loopback(self) -> bool:
+        """Whether only this machine itself reaches the listener."""
+        return self.host == "localhost" or (is_address(self.host) and loopback(self.host))
+
+    @property
+    def host_names(self) -> frozenset[str]:
+        """Names and addresses that requests may be for; small letters, without ports."""
+        given = {part.strip().lower().strip("[]") for part in self.allowed_hosts.split(",")}
+        public = urlsplit(self.public_url or "").hostname or ""
+        return frozenset({"localhost", self.host.lower(), public, *given} - {""})
+
+    @property
     def database_path(self) -> Path:
         """The SQLite file of the application and its job engine."""
         return self.data_dir / "surefoot.sqlite"
@@ -159,6 +175,20 @@ class Settings(BaseSettings):
         values = self.model_dump(mode="json", exclude_none=True)
         ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
+
+
+def is_address(name: str) -> bool:
+    """Whether a host is an IP address rather than a name."""
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def loopback(address: str) -> bool:
+    """Whether an IP address is this machine's own."""
+    return ip_address(address).is_loopback
 
 
 def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
