@@ -20,6 +20,7 @@ from service.routes import (
     cameras,
     events,
     fleet,
+    login,
     maintenance,
     metrics,
     operation,
@@ -27,10 +28,12 @@ from service.routes import (
     poses,
     registration,
     snapshots,
+    tokens,
     tracks,
     trainings,
     webhooks,
 )
+from service.routes.guard import GuardMiddleware
 from service.routes.instruments import InstrumentMiddleware, Instruments
 from service.routes.origins import OriginMiddleware
 from service.routes.problems import problem, problem_of
@@ -85,9 +88,12 @@ def create_app(settings: Settings) -> FastAPI:
         fleet,
         camera_page,
         registration,
+        login,
+        tokens,
     ):
         app.include_router(module.router)
     pages.mount_static(app)
+    app.add_middleware(GuardMiddleware, settings=settings)
     app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from service.logs import configure_logs
 from service.settings import Settings
+from service.token_commands import app as token_app
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -17,6 +18,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(token_app, name="token")
 
 DataDir = Annotated[Path | None, typer.Option(help="Database and weights live here.")]
 

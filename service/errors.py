@@ -28,6 +28,23 @@ class ServiceError(Exception):
         return {}
 
 
+class UnauthorizedError(ServiceError):
+    """Nobody is known to ask, or with what nobody is let in."""
+
+    status, code = 401, "unauthorized"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """How to be let in."""
+        return {"WWW-Authenticate": 'Bearer realm="surefoot"'}
+
+
+class ForbiddenError(ServiceError):
+    """Who asks is known, and may not do this."""
+
+    status, code = 403, "forbidden"
+
+
 class SwitchedOffError(ServiceError):
     """The operator has not switched on what is asked for."""
 
@@ -76,10 +93,8 @@ class UnsupportedMediaTypeError(ServiceError):
     status, code = 415, "unsupported_media_type"
 
 
-class BusyError(ServiceError):
-    """As much of this is under way as is taken at once; it is worth a try later."""
-
-    status, code = 503, "busy"
+class RetryError(ServiceError):
+    """It is worth a try later."""
 
     def __init__(self, detail: str, retry_after_s: int) -> None:
         super().__init__(detail)
@@ -89,3 +104,15 @@ class BusyError(ServiceError):
     def headers(self) -> dict[str, str]:
         """When to come back."""
         return {"Retry-After": str(self.retry_after_s)}
+
+
+class BusyError(RetryError):
+    """As much of this is under way as is taken at once."""
+
+    status, code = 503, "busy"
+
+
+class TooManyError(RetryError):
+    """More than is taken within a time."""
+
+    status, code = 429, "too_many"

@@ -23,6 +23,7 @@ def run_service(settings: Settings) -> None:
             create_app(settings),
             log_level="warning",
             access_log=False,
+            proxy_headers=False,  # whom to believe is the guard's to know
             timeout_graceful_shutdown=3,
         )
         server = uvicorn.Server(config)

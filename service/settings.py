@@ -8,7 +8,7 @@ from typing import Literal
 from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -22,6 +22,20 @@ class Settings(BaseSettings):
     port: int = Field(8080, ge=0, le=65535, description="port that the API listens on")
     allowed_hosts: str = Field(
         "", description="names, with commas, that this service is asked by besides its own"
+    )
+    auth: Literal["auto", "on", "off"] = Field(
+        "auto", description="whether tokens are needed; auto: unless only this machine is served"
+    )
+    session_hours: float = Field(
+        12.0, gt=0, le=8760, description="hours until a page has to log in again"
+    )
+    proxy_from: str = Field("", description="CIDRs, with commas, of proxies that log people in")
+    proxy_secret: str | None = Field(
+        None, min_length=16, repr=False, description="what such a proxy says in X-Surefoot-Proxy"
+    )
+    proxy_user_header: str = Field("X-Forwarded-User", description="its header of the person")
+    proxy_role_header: str = Field(
+        "X-Forwarded-Role", description="its header of what that may: read, operate or admin"
     )
     workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
 
@@ -120,11 +134,17 @@ class Settings(BaseSettings):
         """The cameras' zone; UTC needs no zone database."""
         return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
 
-    @field_validator("webhook_allow")
+    @field_validator("webhook_allow", "proxy_from")
     @classmethod
     def _networks(cls, value: str) -> str:
         _read_networks(value)
         return value
+
+    @model_validator(mode="after")
+    def _proxies_prove_themselves(self) -> "Settings":
+        if self.proxy_from and self.proxy_secret is None:
+            raise ValueError("proxy_secret: an address alone proves nothing; proxy_from needs it")
+        return self
 
     @field_validator("webhook_retry_s")
     @classmethod
@@ -139,6 +159,11 @@ class Settings(BaseSettings):
         return _read_networks(self.webhook_allow)
 
     @property
+    def proxy_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
+        """Where proxies that log people in ask from."""
+        return _read_networks(self.proxy_from)
+
+    @property
     def webhook_delays_s(self) -> tuple[float, ...]:
         """Seconds from each failed attempt to the next; the last one repeats."""
         return _read_numbers(self.webhook_retry_s)
@@ -147,6 +172,15 @@ class Settings(BaseSettings):
     def on_loopback(self) -> bool:
         """Whether only this machine itself reaches the listener."""
         return self.host == "localhost" or (is_address(self.host) and loopback(self.host))
+
+    @property
+    def auth_on(self) -> bool:
+        """Whether tokens are needed: by themselves wherever others than this machine may ask."""
+        if self.auth != "auto":
+            return self.auth == "on"
+        public = urlsplit(self.public_url or "").hostname or "localhost"
+        here = public == "localhost" or (is_address(public) and loopback(public))
+        return not (self.on_loopback and here) or bool(self.proxy_from)
 
     @property
     def host_names(self) -> frozenset[str]:

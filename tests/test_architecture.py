@@ -14,10 +14,11 @@ SERVICE_ROOMS = [
     {"settings", "errors", "logs"},
     {"formats", "store", "job_queue", "delivery"},
     {"migrate", "recalibration"},
+    {"access"},
     {"schemas", "jobs", "web"},
     {"routes"},
     {"app", "listener", "local_workers", "protocol_plots", "protocol_tables", "alarm_tables"},
-    {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"token_commands", "serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
     {"demo", "replay_protocol"},
     {"cli"},
 ]

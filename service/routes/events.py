@@ -1,6 +1,7 @@
 """`GET /events`: Server-Sent Events out of the store, with resume and heartbeat."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Sequence
 from typing import Annotated
 
@@ -9,6 +10,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.recalibration import operation
+from service.routes.guard import still_let_in
 from service.routes.state import AppState, StateDep
 from service.store.tables import EventRecord
 
@@ -16,6 +18,7 @@ router = APIRouter(tags=["events"])
 
 _POLL_S = 0.5
 _HEARTBEAT_S = 10.0
+_CHECK_S = 5.0
 _BATCH = 500
 
 
@@ -35,8 +38,13 @@ async def events(
     if seen is None:
         seen = await run_in_threadpool(_newest, state)
     silent_s = 0.0
+    checked_s = time.monotonic()
     yield ServerSentEvent(comment="connected", retry=2000)
     while not state.stopping.is_set() and not await request.is_disconnected():
+        if time.monotonic() - checked_s > _CHECK_S:
+            checked_s = time.monotonic()
+            if not await run_in_threadpool(still_let_in, request):
+                return  # logged out, or the token is over
         records = await run_in_threadpool(_after, state, seen)
         for record in records:
             seen = record.id
