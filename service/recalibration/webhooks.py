@@ -12,6 +12,7 @@ from service.delivery.addresses import AddressError, check_url
 from service.delivery.signing import new_secret
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note
 from service.recalibration.outbox import add_delivery, wake
 from service.settings import Settings
 from service.store import webhooks
@@ -78,6 +79,7 @@ def create_webhook(session: Session, spec: WebhookSpec) -> WebhookRecord:
     )
     session.add(record)
     session.flush()
+    _note(session, "added", record)
     return record
 
 
@@ -113,6 +115,7 @@ def change_webhook(
     for name, value in changes.items():
         setattr(record, name, value)
     record.updated_at = now
+    _note(session, "changed", record, sorted(changes))
     if changes.get("enabled") is False:
         record.disabled_reason = _BY_A_PERSON
     elif changes.get("enabled") or "url" in changes:
@@ -138,6 +141,7 @@ def rotate_secret(session: Session, webhook_id: str) -> WebhookRecord:
     now = datetime.now(UTC)
     record.old_secret, record.old_secret_until = record.secret, now + OLD_SECRET_STAYS
     record.secret, record.updated_at = new_secret(), now
+    _note(session, "secret_changed", record)
     return record
 
 
@@ -147,7 +151,9 @@ def remove_webhook(session: Session, webhook_id: str) -> None:
     Raises:
         NotFoundError: there is none of that id.
     """
-    session.delete(_require(session, webhook_id))
+    record = _require(session, webhook_id)
+    _note(session, "removed", record)
+    session.delete(record)
 
 
 def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
@@ -161,6 +167,7 @@ def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
     data = {"webhook_id": record.id, "name": record.name, "text": "This is a test of surefoot."}
     record.held_until = None
     delivery = add_delivery(session, record, "test", data, datetime.now(UTC))
+    _note(session, "tested", record)
     session.flush()
     return DeliveryView(record=delivery, attempts=())
 
@@ -208,8 +215,15 @@ def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> Deli
     record.state, record.tries, record.finished_at = "pending", 0, None
     record.next_attempt_at = record.queued_at = now
     webhook.held_until = None
+    _note(session, "replayed", webhook)
     wake(session, queue, webhook, now)
     return view
+
+
+def _note(session: Session, act: str, record: WebhookRecord, fields: Sequence[str] = ()) -> None:
+    """Keep what was done with a webhook; its URL may be a secret, so its name says which."""
+    details = {"name": record.name, **({"fields": list(fields)} if fields else {})}
+    note(session, f"webhook.{act}", by=None, subject_id=record.id, details=details)
 
 
 def _require(session: Session, webhook_id: str) -> WebhookRecord:

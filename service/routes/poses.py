@@ -9,7 +9,7 @@ from fastapi.responses import PlainTextResponse
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
 from service.recalibration import cameras, poses
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
@@ -78,10 +78,14 @@ def history(
 
 @router.post("/pose/accept")
 def accept(
-    camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: AcceptBody | None = None,
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
-    by = None if body is None else body.by
+    by = name_of(actor, None if body is None else body.by)
     return ServedPoseOut.from_value(
         poses.accept_pose(session, state.queue, state.settings, camera_id, by)
     )
@@ -89,10 +93,14 @@ def accept(
 
 @router.post("/reference/reset")
 def reset(
-    camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: ResetBody | None = None,
 ) -> ServedPoseOut:
     """Say that the camera is back at its prior pose: closes its alerts, learns it anew there."""
-    by = None if body is None else body.by
+    by = name_of(actor, None if body is None else body.by)
     return ServedPoseOut.from_value(
         poses.reset_reference(session, state.queue, state.settings, camera_id, by)
     )

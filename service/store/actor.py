@@ -20,6 +20,12 @@ def set_actor(session: Session, actor: Actor | None) -> None:
     session.info[_KEY] = actor
 
 
+def name_in(session: Session, said: str | None) -> str | None:
+    """Who did it: in whose name a session writes, and where that is not known, who is said."""
+    actor = actor_of(session)
+    return said if actor is None else actor.name
+
+
 def actor_of(session: Session) -> Actor | None:
     """In whose name a session writes; None where nobody is known, or the service acts."""
     actor: Actor | None = session.info.get(_KEY)
