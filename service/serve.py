@@ -7,6 +7,7 @@ import signal
 import uvicorn
 
 from service.app import create_app
+from service.connections import ConnectionGuard, protocol_factory
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -14,13 +15,21 @@ from service.settings import Settings
 
 log = logging.getLogger("surefoot.serve")
 
+_BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
+
 
 def run_service(settings: Settings) -> None:
     """Migrate, start the workers, serve until SIGTERM or SIGINT, stop cleanly."""
     with contextlib.closing(listen(settings)) as listener:
         migrate(settings)
+        app = create_app(settings)
+        guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
-            create_app(settings),
+            app,
+            loop="asyncio",
+            http=protocol_factory(guard),  # type: ignore[arg-type]
+            ws="none",
+            backlog=_BACKLOG,
             log_level="warning",
             access_log=False,
             proxy_headers=False,  # whom to believe is the guard's to know

@@ -13,7 +13,7 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from service.errors import BusyError, FieldError, MalformedError
+from service.errors import FieldError, MalformedError, OverloadedError
 
 MAX_BYTES = 1024 * 1024
 MAX_DEPTH = 32  # brackets or tags in each other; OpenCV itself writes 4
@@ -45,11 +45,13 @@ def read_calibration(body: bytes, timeout_s: float = MAX_SECONDS) -> Calibration
     Raises:
         MalformedError: it is none, says nothing of a camera, what it says has another shape, or it
             broke its reader.
-        BusyError: so many are being read that this one has to wait.
+        OverloadedError: so many are being read that this one has to wait.
     """
     _check(body)
     if not _free.acquire(blocking=False):
-        raise BusyError(f"file: {_AT_ONCE} files are read at once, and so many are", 2)
+        raise OverloadedError(
+            f"file: {_AT_ONCE} files are read at once, and so many are", retry_after_s=2
+        )
     try:
         answer = _ask_reader(body, timeout_s)
     finally:

@@ -12,7 +12,6 @@ from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
-MAX_BODY_BYTES = 32 * 1024 * 1024
 MAX_ID_LENGTH = 200
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0

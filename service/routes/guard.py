@@ -7,18 +7,19 @@ from collections.abc import Callable
 from ipaddress import ip_address
 from urllib.parse import quote
 
+import anyio
+from anyio.to_thread import run_sync
 from fastapi import Request
-from sqlalchemy.exc import OperationalError
-from starlette.concurrency import run_in_threadpool
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
 from service.access.callers import SCOPES, Caller
-from service.errors import ForbiddenError, ServiceError, TooManyError, UnauthorizedError
+from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
+from service.routes.lanes import LOOKUPS
 from service.routes.pages import STATIC_URL
-from service.routes.problems import problem_of
 from service.routes.scopes import Need, need_of
 from service.settings import Settings
 from service.store.database import Store
@@ -43,9 +44,17 @@ class GuardMiddleware:
         self._settings = settings
         self._attempts = Attempts()
         self._used_s: dict[str, float] = {}
+        self._looking = anyio.CapacityLimiter(LOOKUPS - 1)
+        self._keeping = anyio.CapacityLimiter(1)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer why not."""
+        """Pass a request on, or lead to the login.
+
+        Raises:
+            UnauthorizedError: nobody is known to ask.
+            ForbiddenError: who asks may not do this.
+            TooManyRequestsError: too many tokens from there were none.
+        """
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -57,22 +66,20 @@ class GuardMiddleware:
         if self._settings.auth_on and need != "open" and not _is_static(request):
             try:
                 await self._let_in(request, need, parameters)
-            except UnauthorizedError as error:
-                answer = _to_login(request) if _looks_for_page(request) else None
-                await (answer or problem_of(request, error))(scope, receive, send)
-                return
-            except ServiceError as error:
-                await problem_of(request, error)(scope, receive, send)
+            except UnauthorizedError:
+                if not _looks_for_page(request):
+                    raise
+                await _to_login(request)(scope, receive, send)
                 return
         await self._app(scope, receive, send)
 
     async def _let_in(self, request: Request, need: Need, parameters: dict[str, str]) -> None:
         store: Store = request.state.app.store
         find = _finder(request, self._settings)
-        caller = await run_in_threadpool(find, store)
+        caller = await run_sync(find, store, limiter=self._looking)
         if caller is None:
             if "authorization" in request.headers:
-                await run_in_threadpool(refuse, request)
+                await run_sync(refuse, request, limiter=self._keeping)
                 raise UnauthorizedError("Authorization: nobody is let in with this token")
             raise UnauthorizedError("Authorization: Bearer and a token are needed, or a login")
         request.state.caller, request.state.token_id = caller, caller.token_id
@@ -94,7 +101,9 @@ class GuardMiddleware:
     async def _keep_use(self, store: Store, token_id: str) -> None:
         """Keep when a token was used last; a minute or so is near enough."""
         now_s = time.monotonic()
-        if now_s - self._used_s.get(token_id, -_USE_IS_KEPT_EVERY_S) < _USE_IS_KEPT_EVERY_S:
+        last_s = self._used_s.get(token_id, -_USE_IS_KEPT_EVERY_S)
+        # Who keeps one while the store is slow keeps no others waiting.
+        if now_s - last_s < _USE_IS_KEPT_EVERY_S or self._keeping.available_tokens < 1:
             return
         self._used_s[token_id] = now_s
 
@@ -103,9 +112,9 @@ class GuardMiddleware:
                 tokens.note_use(session, token_id)
 
         try:
-            await run_in_threadpool(keep)
-        except OperationalError as error:  # a full disk must not keep readers out
-            log.warning("token_use_not_kept", extra={"error": str(error.orig)})
+            await run_sync(keep, limiter=self._keeping)
+        except (SQLAlchemyError, ServiceError) as error:  # a full disk must not keep readers out
+            log.warning("token_use_not_kept", extra={"error": str(error)})
 
 
 def still_let_in(request: Request) -> bool:
@@ -118,15 +127,20 @@ def refuse(request: Request) -> None:
     """Note that somebody was not let in.
 
     Raises:
-        TooManyError: that has happened too often from there.
+        TooManyRequestsError: that has happened too often from there.
     """
     failure = request.state.attempts.failed(request.state.address)
     if failure.worth_a_line:
         log.warning("login_refused", extra={"address": request.state.address})
-        with request.state.app.store.write() as session:
-            sessions.note_refused(session, request.state.address)
+        try:
+            with request.state.app.store.write() as session:
+                sessions.note_refused(session, request.state.address)
+        except (SQLAlchemyError, ServiceError) as error:
+            log.warning("refusal_not_kept", extra={"error": str(error)})
     if failure.wait_s:
-        raise TooManyError("token: too many were refused from this address", failure.wait_s)
+        raise TooManyRequestsError(
+            "token: too many were refused from this address", retry_after_s=failure.wait_s
+        )
 
 
 def is_proxy(request: Request, settings: Settings) -> bool:

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.access import sessions
-from service.errors import ForbiddenError, TooManyError, UnauthorizedError
+from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
 from service.routes.forms import FormDep
 from service.routes.guard import COOKIE, is_proxy, refuse
 from service.routes.pages import render
@@ -59,15 +59,15 @@ def log_out(caller: CallerDep, session: WriteDep) -> Response:
 
 def _refused(request: Request, wanted: str, error: UnauthorizedError | ForbiddenError) -> Response:
     """The form again, with the reason."""
-    status, reason, headers = error.status, error.detail, {}
+    said: ServiceError = error
     try:
         refuse(request)
-    except TooManyError as waiting:
-        status, reason, headers = waiting.status, waiting.detail, waiting.headers
-    page = render(
-        request, "login.html", status, next=wanted, reason=reason.partition(": ")[2] or reason
-    )
-    page.headers.update(headers)
+    except TooManyRequestsError as waiting:
+        said = waiting
+    reason = said.detail.partition(": ")[2]
+    page = render(request, "login.html", said.status, next=wanted, reason=reason)
+    if said.retry_after_s is not None:
+        page.headers["Retry-After"] = str(round(said.retry_after_s))
     return page
 
 

@@ -7,12 +7,10 @@ to lead to this service. Programs send neither `Origin` nor `Sec-Fetch-Site` and
 import socket
 from urllib.parse import urlsplit
 
-from fastapi import Request
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError
-from service.routes.problems import problem_of
 from service.settings import Settings, is_address, loopback
 
 _SAFE = frozenset(("GET", "HEAD", "OPTIONS"))
@@ -46,7 +44,12 @@ class OriginMiddleware:
         self._public = _origin(settings.public_url or "")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer why not."""
+        """Pass a request on.
+
+        Raises:
+            MisdirectedError: it is for another host.
+            ForeignOriginError: a page of another origin asks.
+        """
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -57,11 +60,7 @@ class OriginMiddleware:
                 MutableHeaders(scope=message)["Cross-Origin-Resource-Policy"] = "same-origin"
             await send(message)
 
-        try:
-            self._check(scope)
-        except ServiceError as error:
-            await problem_of(Request(scope), error)(scope, receive, isolated)
-            return
+        self._check(scope)
         await self._app(scope, receive, isolated)
 
     def _check(self, scope: Scope) -> None:

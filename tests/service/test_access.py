@@ -192,7 +192,7 @@ def test_who_guesses_is_told_to_wait_and_nobody_else(closed, made):
     for _ in range(10):
         assert closed.get("/cameras", headers=bearer("sf_0_0")).status_code == 401
     answer = closed.get("/cameras", headers=bearer("sf_0_0"))
-    problem(answer, 429, "too_many")
+    problem(answer, 429, "too_many_requests")
     assert 0 < int(answer.headers["Retry-After"]) <= 61
     admin = made("admin")
     assert closed.get("/cameras", headers=admin).status_code == 200

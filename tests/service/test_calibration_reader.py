@@ -77,7 +77,7 @@ def test_only_so_many_are_read_at_once(http):
     finally:
         for _ in range(2):
             calibration_file._free.release()
-    problem(answer, 503, "busy")
+    problem(answer, 503, "overloaded")
     assert int(answer.headers["Retry-After"]) > 0
     assert http.post("/ui/calibration", content=GOOD).status_code == 200
 
