@@ -11,14 +11,18 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
+    {"data_dir"},
     {"settings", "errors", "logs"},
     {"formats", "store", "job_queue", "delivery"},
-    {"migrate", "recalibration"},
-    {"schemas", "jobs", "web"},
+    {"recalibration"},
+    {"backup", "schemas", "jobs", "web"},
+    {"migrate"},
     {"routes"},
     {"app", "listener", "local_workers", "protocol_plots", "protocol_tables", "alarm_tables"},
     {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"demo_folder"},
     {"demo", "replay_protocol"},
+    {"commands_data", "commands_studies"},
     {"cli"},
 ]
 MODEL_ROOMS = [

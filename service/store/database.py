@@ -7,14 +7,17 @@ from typing import Any
 from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.orm import Session
 
+from service.data_dir import make_private
 from service.settings import Settings
+
+_WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
 class Store:
     """The database of one data directory. Nothing connects before the first session."""
 
     def __init__(self, settings: Settings) -> None:
-        settings.data_dir.mkdir(parents=True, exist_ok=True)
+        make_private(settings.data_dir)
         self.url = settings.database_url
         self.engine = engine_for(self.url)
 
@@ -54,6 +57,9 @@ def _prepare_sqlite(connection: Any, _: Any) -> None:
     # newest commit, the first write takes the write lock at once.
     connection.isolation_level = "IMMEDIATE"
     connection.execute("PRAGMA busy_timeout=30000")
+    # Of a new file only, before its first page is written: retention gives pages back to the disk.
+    connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
     connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute(f"PRAGMA journal_size_limit={_WAL_BYTES}")
     connection.execute("PRAGMA synchronous=FULL")  # an answer of 202 survives power loss
     connection.execute("PRAGMA foreign_keys=ON")
