@@ -11,8 +11,9 @@ from rich.console import Console
 
 from service.commands_data import DATA_COMMANDS, DataDir
 from service.commands_studies import STUDIES
-from service.data_dir import StartError, be_private
+from service.data_dir import StartError
 from service.logs import configure_logs
+from service.process import be_private
 from service.settings import Settings, wrong_settings
 
 app = typer.Typer(

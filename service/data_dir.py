@@ -25,11 +25,6 @@ class StartError(Exception):
     """What keeps a command from its work: one line that names it and says what to do."""
 
 
-def be_private() -> None:
-    """From now on this process makes files that only its user can read."""
-    os.umask(0o077)
-
-
 def make_private(folder: Path) -> None:
     """Make the data directory, or take the rights of others off what we keep in it.
 
@@ -40,13 +35,17 @@ def make_private(folder: Path) -> None:
     """
     with telling_of(folder):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        ours = {path for pattern in _OURS for path in folder.glob(pattern)}
-        for top in ours:
+        for top in _ours_in(folder):
             for path in (top, *(top.rglob("*") if top.is_dir() else ())):
                 _narrow(path)
-        if all(path in ours for path in folder.iterdir()):
+        if not strangers_in(folder):
             _narrow(folder)
         make_file(folder / DATABASE)
+
+
+def strangers_in(folder: Path) -> list[str]:
+    """The names of what is in a data directory and not ours."""
+    return sorted(path.name for path in set(folder.iterdir()) - _ours_in(folder))
 
 
 def make_file(path: Path) -> None:
@@ -150,6 +149,10 @@ def sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def _ours_in(folder: Path) -> set[Path]:
+    return {path for pattern in _OURS for path in folder.glob(pattern)}
 
 
 def _narrow(path: Path) -> None:

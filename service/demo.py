@@ -29,11 +29,11 @@ from models.trajectory import Trajectory
 from service.data_dir import StartError
 from service.demo_folder import (
     demo_folder,
-    end_like_ctrl_c,
     free_port,
     remove_left_over,
     require_free,
 )
+from service.process import end_like_ctrl_c
 from service.replay import post_tracks
 from service.settings import Settings
 

@@ -3,7 +3,6 @@
 import contextlib
 import fcntl
 import shutil
-import signal
 import socket
 import tempfile
 from collections.abc import Iterator
@@ -35,12 +34,6 @@ def remove_left_over() -> None:
                 shutil.rmtree(folder)
 
 
-def end_like_ctrl_c() -> None:
-    """From now on the end of the terminal, or SIGTERM, ends this process as Ctrl-C does."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupt)
-
-
 def require_free(port: int) -> None:
     """Check that nobody listens on a port of this machine.
 
@@ -64,7 +57,3 @@ def free_port() -> int:
         probe.bind((_HOST, 0))
         port: int = probe.getsockname()[1]
         return port
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt

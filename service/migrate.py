@@ -2,12 +2,9 @@
 
 import fcntl
 import logging
-from importlib.resources import files as package_files
 from pathlib import Path
 
 import alembic.command
-import alembic.config
-from alembic.script import ScriptDirectory
 
 from service.backup.before_migration import copy_before
 from service.backup.placing import finish_restore
@@ -25,6 +22,7 @@ from service.settings import Settings
 from service.store import files
 from service.store.database import Store
 from service.store.faults import telling_of_database
+from service.store.revisions import alembic_config, known_revisions, require_known
 
 log = logging.getLogger("surefoot.migrate")
 
@@ -52,37 +50,8 @@ def migrate(settings: Settings) -> None:
             _make_shrinkable(settings.database_path)
 
 
-def alembic_config(url: str) -> alembic.config.Config:
-    """Alembic's configuration for the migrations that ship with the package."""
-    config = alembic.config.Config()
-    config.set_main_option("script_location", str(package_files("migrations")))
-    config.attributes["url"] = url
-    return config
-
-
-def newest_revision() -> str:
-    """The revision that this release brings a database to."""
-    head = ScriptDirectory.from_config(alembic_config("")).get_current_head()
-    assert head is not None
-    return head
-
-
-def require_known(found: str | None, what: str) -> None:
-    """Check that this release knows a schema's revision.
-
-    Raises:
-        StartError: it does not: a newer release wrote it.
-    """
-    scripts = ScriptDirectory.from_config(alembic_config(""))
-    if found is not None and found not in {script.revision for script in scripts.walk_revisions()}:
-        raise StartError(
-            f"schema: {what} is of revision {found}, newer than this release, which knows up to "
-            f"{newest_revision()}; install the release that wrote it, or restore an older backup"
-        )
-
-
 def _migrate_tables(settings: Settings) -> None:
-    path, head = settings.database_path, newest_revision()
+    path, head = settings.database_path, known_revisions()[0]
     found = files.revision(path)
     require_known(found, str(path))
     if found == head:

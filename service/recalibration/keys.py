@@ -1,5 +1,7 @@
 """The key of a data directory and the secrets that it seals."""
 
+from collections.abc import Sequence
+
 from sqlalchemy.orm import Session
 
 from service.data_dir import KEY_FILE, StartError
@@ -86,18 +88,20 @@ def reseal(session: Session, old: Sealer, new: Sealer) -> int:
     return count
 
 
-def count_openable(session: Session, settings: Settings) -> tuple[int, int]:
-    """How many secrets the key opens, and how many there are; plain ones are not opened."""
-    sealer = sealer_of(settings)
-    opened = total = 0
-    for record in webhooks.every(session):
-        for text in _stored(record):
-            total += 1
-            try:
-                opened += bool(is_sealed(text) and _opened(sealer, record, text))
-            except StartError:
-                continue
-    return opened, total
+def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> int:
+    """Check that a key opens all secrets; returns how many are sealed.
+
+    Args:
+        sealer: with the key.
+        stored: ids of webhooks and their secrets as they are stored.
+
+    Raises:
+        StartError: it does not open one.
+    """
+    sealed = [(webhook_id, text) for webhook_id, text in stored if is_sealed(text)]
+    for webhook_id, text in sealed:
+        sealer.open(text, _purpose(webhook_id))
+    return len(sealed)
 
 
 def _end_rotation(settings: Settings, sealed: list[str]) -> None:

@@ -2,7 +2,7 @@
 
 import contextlib
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from sqlalchemy import text
@@ -81,6 +81,32 @@ def tables(path: Path) -> set[str]:
     with connected(path) as connection:
         rows = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         return {str(row[0]) for row in rows}
+
+
+def weights_of_models(path: Path) -> dict[str, str]:
+    """The hash of each model's weights."""
+    if "models" not in tables(path):
+        return {}
+    with connected(path) as connection:
+        return dict(connection.execute("SELECT id, weights_sha256 FROM models").fetchall())
+
+
+def drop_models(path: Path, model_ids: Sequence[str]) -> None:
+    """Delete models with what they say of tracks; their cameras are trained anew."""
+    with connected(path) as connection:
+        connection.execute("PRAGMA foreign_keys=ON")
+        connection.executemany("DELETE FROM models WHERE id = ?", [(one,) for one in model_ids])
+
+
+def webhook_secrets(path: Path) -> list[tuple[str, str]]:
+    """The secrets of webhooks as they are stored, with the webhooks' ids; of any revision."""
+    if "webhooks" not in tables(path):
+        return []
+    with connected(path) as connection:
+        return connection.execute(
+            "SELECT id, secret FROM webhooks WHERE secret IS NOT NULL UNION ALL "
+            "SELECT id, old_secret FROM webhooks WHERE old_secret IS NOT NULL"
+        ).fetchall()
 
 
 def size(path: Path) -> int:
