@@ -2,12 +2,18 @@
 
 import contextlib
 import logging
+import os
 import signal
+import socket
+import sys
+import threading
+import time
 
 import uvicorn
 
 from service.app import create_app
 from service.connections import ConnectionGuard, protocol_factory
+from service.data_dir import StartError, held_alone, make_private
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -18,9 +24,18 @@ log = logging.getLogger("surefoot.serve")
 _BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
 
 
-def run_service(settings: Settings) -> None:
-    """Migrate, start the workers, serve until SIGTERM or SIGINT, stop cleanly."""
-    with contextlib.closing(listen(settings)) as listener:
+def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
+    """Migrate, start the workers, serve until SIGTERM or SIGINT, stop cleanly.
+
+    With `follow_stdin` it ends when its stdin does, too: who started it holds the other end.
+
+    Raises:
+        StartError: what keeps it from serving, in one line.
+    """
+    if follow_stdin:
+        threading.Thread(target=_stop_at_end_of_stdin, daemon=True).start()
+    make_private(settings.data_dir)
+    with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
         migrate(settings)
         app = create_app(settings)
         guard = ConnectionGuard(settings, app.state.instruments)
@@ -44,3 +59,20 @@ def run_service(settings: Settings) -> None:
                 signal.signal(number, lambda *_: None)
             server.run(sockets=[listener])
     log.info("stopped")
+
+
+def _listen(settings: Settings) -> socket.socket:
+    try:
+        return listen(settings)
+    except OSError as error:
+        raise StartError(
+            f"port: cannot listen on {settings.host}, port {settings.port} ({error.strerror}); "
+            "name others by --host and --port, or SUREFOOT_HOST and SUREFOOT_PORT"
+        ) from error
+
+
+def _stop_at_end_of_stdin() -> None:
+    sys.stdin.buffer.read()
+    while True:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1.0)

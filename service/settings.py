@@ -1,15 +1,17 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
+import base64
 import os
 from datetime import UTC, tzinfo
-from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Literal
-from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from service.data_dir import DATABASE, WEIGHTS
 
 
 class Settings(BaseSettings):
@@ -29,15 +31,26 @@ class Settings(BaseSettings):
     session_hours: float = Field(
         12.0, gt=0, le=8760, description="hours until a page has to log in again"
     )
-    proxy_from: str = Field("", description="CIDRs, with commas, of proxies that log people in")
     proxy_secret: str | None = Field(
-        None, min_length=16, repr=False, description="what such a proxy says in X-Surefoot-Proxy"
+        None,
+        min_length=16,
+        repr=False,
+        description="what a proxy that logs people in says in X-Surefoot-Proxy",
     )
+    proxy_from: str = Field("", description="CIDRs, with commas, that such a proxy asks from")
     proxy_user_header: str = Field("X-Forwarded-User", description="its header of the person")
     proxy_role_header: str = Field(
         "X-Forwarded-Role", description="its header of what that may: read, operate or admin"
     )
     workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
+    secret_key: str | None = Field(
+        None,
+        repr=False,
+        description="32 bytes in base64 that seal webhooks' secrets; unset: secret.key in data_dir",
+    )
+    copy_before_migration: bool = Field(
+        True, description="copy the database before its schema changes; without room: no start"
+    )
 
     recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
     epochs: int | None = Field(
@@ -148,6 +161,13 @@ class Settings(BaseSettings):
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
+    @field_validator("secret_key")
+    @classmethod
+    def _key_of_32_bytes(cls, value: str | None) -> str | None:
+        if value is not None:
+            read_key(value)
+        return value
+
     @field_validator("timezone")
     @classmethod
     def _zone_exists(cls, value: str) -> str:
@@ -171,11 +191,12 @@ class Settings(BaseSettings):
         _read_networks(value)
         return value
 
-    @model_validator(mode="after")
-    def _proxies_prove_themselves(self) -> "Settings":
-        if self.proxy_from and self.proxy_secret is None:
-            raise ValueError("proxy_secret: an address alone proves nothing; proxy_from needs it")
-        return self
+    @field_validator("proxy_from")
+    @classmethod
+    def _proxies_prove_themselves(cls, value: str, info: ValidationInfo) -> str:
+        if value and info.data.get("proxy_secret") is None:
+            raise ValueError("SUREFOOT_PROXY_SECRET is needed, too: an address alone proves little")
+        return value
 
     @field_validator("webhook_retry_s")
     @classmethod
@@ -200,30 +221,9 @@ class Settings(BaseSettings):
         return _read_numbers(self.webhook_retry_s)
 
     @property
-    def on_loopback(self) -> bool:
-        """Whether only this machine itself reaches the listener."""
-        return self.host == "localhost" or (is_address(self.host) and loopback(self.host))
-
-    @property
-    def auth_on(self) -> bool:
-        """Whether tokens are needed: by themselves wherever others than this machine may ask."""
-        if self.auth != "auto":
-            return self.auth == "on"
-        public = urlsplit(self.public_url or "").hostname or "localhost"
-        here = public == "localhost" or (is_address(public) and loopback(public))
-        return not (self.on_loopback and here) or bool(self.proxy_from)
-
-    @property
-    def host_names(self) -> frozenset[str]:
-        """Names and addresses that requests may be for; small letters, without ports."""
-        given = {part.strip().lower().strip("[]") for part in self.allowed_hosts.split(",")}
-        public = urlsplit(self.public_url or "").hostname or ""
-        return frozenset({"localhost", self.host.lower(), public, *given} - {""})
-
-    @property
     def database_path(self) -> Path:
         """The SQLite file of the application and its job engine."""
-        return self.data_dir / "surefoot.sqlite"
+        return self.data_dir / DATABASE
 
     @property
     def database_url(self) -> str:
@@ -233,7 +233,7 @@ class Settings(BaseSettings):
     @property
     def weights_dir(self) -> Path:
         """Folder of weight files, named by their hash."""
-        return self.data_dir / "weights"
+        return self.data_dir / WEIGHTS
 
     def as_environment(self) -> dict[str, str]:
         """This process's environment with these settings in it, for a child process."""
@@ -242,18 +242,33 @@ class Settings(BaseSettings):
         return {**os.environ, **ours}
 
 
-def is_address(name: str) -> bool:
-    """Whether a host is an IP address rather than a name."""
+_SECRETS = ("secret_key", "proxy_secret")
+
+
+def wrong_settings(error: ValidationError) -> list[str]:
+    """One line for each setting that was refused: its variable, what is needed, what was given."""
+    lines = []
+    for item in error.errors(include_url=False):
+        name = ".".join(str(part) for part in item["loc"])
+        reason = item["msg"].removeprefix("Value error, ")
+        given = "" if name in _SECRETS or ", got " in reason else f", got {item['input']!r:.80}"
+        lines.append(f"SUREFOOT_{name.upper()}: {reason}{given}")
+    return lines
+
+
+def read_key(text: str) -> bytes:
+    """The 32 bytes of a key in base64, the plain alphabet or the one for URLs.
+
+    Raises:
+        ValueError: it is not such a key. A passphrase is not: it would be guessed.
+    """
     try:
-        ip_address(name)
+        key = base64.b64decode(text.strip().translate(str.maketrans("-_", "+/")), validate=True)
     except ValueError:
-        return False
-    return True
-
-
-def loopback(address: str) -> bool:
-    """Whether an IP address is this machine's own."""
-    return ip_address(address).is_loopback
+        key = b""
+    if len(key) != 32:
+        raise ValueError("32 bytes in base64 are needed, as `openssl rand -base64 32` prints them")
+    return key
 
 
 def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:

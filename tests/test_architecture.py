@@ -11,11 +11,13 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
+    {"data_dir", "process"},
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue", "delivery"},
-    {"migrate", "recalibration"},
+    {"formats", "store", "job_queue", "delivery", "reach"},
+    {"recalibration"},
     {"access"},
-    {"schemas", "jobs", "web"},
+    {"backup", "schemas", "jobs", "web"},
+    {"migrate"},
     {"routes"},
     {
         "app",
@@ -27,7 +29,9 @@ SERVICE_ROOMS = [
         "alarm_tables",
     },
     {"token_commands", "serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"demo_folder"},
     {"demo", "replay_protocol"},
+    {"commands_data", "commands_studies"},
     {"cli"},
 ]
 MODEL_ROOMS = [

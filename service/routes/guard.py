@@ -18,6 +18,7 @@ from service.access import sessions, tokens
 from service.access.attempts import Attempts
 from service.access.callers import SCOPES, Caller
 from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
+from service.reach import auth_on
 from service.routes.lanes import LOOKUPS
 from service.routes.pages import STATIC_URL
 from service.routes.scopes import Need, need_of
@@ -63,7 +64,7 @@ class GuardMiddleware:
         request.state.address = address_of(request, self._settings)
         request.state.attempts = self._attempts
         need, parameters = need_of(request.method, scope["path"])
-        if self._settings.auth_on and need != "open" and not _is_static(request):
+        if auth_on(self._settings) and need != "open" and not _is_static(request):
             try:
                 await self._let_in(request, need, parameters)
             except UnauthorizedError:

@@ -5,6 +5,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.access import sessions
 from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
+from service.reach import auth_on
 from service.routes.forms import FormDep
 from service.routes.guard import COOKIE, is_proxy, refuse
 from service.routes.pages import render
@@ -17,7 +18,7 @@ router = APIRouter(include_in_schema=False)
 @router.get("/ui/login")
 def show(request: Request, state: StateDep, next: str = "") -> Response:
     """The form that a token is pasted into."""
-    if not state.settings.auth_on:
+    if not auth_on(state.settings):
         return RedirectResponse("/", status_code=303)
     return render(request, "login.html", next=_ours(next))
 
@@ -26,7 +27,7 @@ def show(request: Request, state: StateDep, next: str = "") -> Response:
 def log_in(request: Request, form: FormDep, state: StateDep) -> Response:
     """Begin a session, and go on to where the person wanted to."""
     wanted = _ours(form.one("next"))
-    if not state.settings.auth_on:
+    if not auth_on(state.settings):
         return RedirectResponse("/", status_code=303)
     try:
         with state.store.read() as reading:  # strangers get no write lock

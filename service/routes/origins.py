@@ -11,7 +11,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError
-from service.settings import Settings, is_address, loopback
+from service.reach import host_names, is_address, is_loopback
+from service.settings import Settings
 
 _SAFE = frozenset(("GET", "HEAD", "OPTIONS"))
 _OURS = frozenset(("same-origin", "none"))
@@ -35,10 +36,10 @@ class OriginMiddleware:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
-        self._names = settings.host_names
+        self._names = host_names(settings)
         # A page can be given any name, but no address that it was not fetched from; beyond
         # loopback nobody knows all names and addresses that lead here.
-        self._any_address = not settings.on_loopback
+        self._any_address = not is_loopback(settings.host)
         if self._any_address:
             self._names |= {socket.gethostname().lower()}
         self._public = _origin(settings.public_url or "")
@@ -85,7 +86,7 @@ class OriginMiddleware:
         name = (_split(f"//{host}")[0] or "").rstrip(".")
         if name in self._names:
             return
-        if is_address(name) and (self._any_address or loopback(name)):
+        if is_address(name) and (self._any_address or is_loopback(name)):
             return
         raise MisdirectedError(
             f"Host: this service does not go by {host!r:.80}; SUREFOOT_ALLOWED_HOSTS takes the "

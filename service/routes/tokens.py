@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from service.access import tokens
 from service.access.tokens import MadeToken, TokenSpec
 from service.errors import FieldError, MalformedError
+from service.reach import auth_on
 from service.routes.forms import Form, FormDep
 from service.routes.pages import render
 from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
@@ -43,7 +44,7 @@ def revoke(token_id: str, session: WriteDep, actor: ActorDep) -> None:
 @router.get("/ui/tokens", include_in_schema=False)
 def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Tokens, and a form for another one."""
-    return _page(request, state.settings.auth_on, session)
+    return _page(request, auth_on(state.settings), session)
 
 
 @router.post("/ui/tokens", include_in_schema=False)
@@ -55,8 +56,8 @@ def create_by_form(
         made = tokens.make_token(session, _spec(form), name_of(actor))
     except MalformedError as error:
         session.rollback()
-        return _page(request, state.settings.auth_on, session, typed=form, wrong=error.errors)
-    return _page(request, state.settings.auth_on, session, made=made)
+        return _page(request, auth_on(state.settings), session, typed=form, wrong=error.errors)
+    return _page(request, auth_on(state.settings), session, made=made)
 
 
 @router.post("/ui/tokens/{token_id}/revoke", include_in_schema=False)
@@ -72,7 +73,7 @@ def _every(session: Session) -> list[TokenOut]:
 
 def _page(
     request: Request,
-    auth_on: bool,
+    access_on: bool,
     session: Session,
     *,
     made: MadeToken | None = None,
@@ -87,7 +88,7 @@ def _page(
         made=made,
         typed=typed or Form(),
         wrong={error.pointer[1:]: error.reason for error in wrong},
-        auth_on=auth_on,
+        access_on=access_on,
     )
 
 

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.app import create_app
+from service.reach import auth_on
 from service.routes.scopes import NEEDS, need_of
 from service.store.database import Store
 from tests.conftest import CAMERA, track
@@ -225,4 +226,4 @@ def test_with_access_off_nothing_is_asked(corner):
     ],
 )
 def test_access_is_on_wherever_others_may_ask(settings, changes, on):
-    assert settings.model_copy(update=changes).auth_on is on
+    assert auth_on(settings.model_copy(update=changes)) is on

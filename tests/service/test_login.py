@@ -225,5 +225,5 @@ def test_nobody_else_is_believed_to_be_the_proxy(behind):
 
 
 def test_a_proxy_without_a_secret_is_a_bad_setting(settings):
-    with pytest.raises(ValueError, match="proxy_secret"):
+    with pytest.raises(ValueError, match="PROXY_SECRET"):
         type(settings)(proxy_from="10.0.0.0/8")
