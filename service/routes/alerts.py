@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
-from service.recalibration import alerts, silence
+from service.recalibration import alerts, decisions, silence
 from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.alerts import (
     AcknowledgeBody,
@@ -70,10 +70,14 @@ def silence_one(
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, session: WriteDep, actor: ActorDep) -> AlertDetail:
-    """End an alert with what came of it."""
+def resolve(
+    alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep, actor: ActorDep
+) -> AlertDetail:
+    """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
     by = name_of(actor, body.by)
-    record = alerts.resolve_alert(session, alert_id, body.outcome, body.note, by)
+    record = decisions.resolve_alert(
+        session, state.queue, state.settings, alert_id, body.outcome, body.note, by
+    )
     return _with_acts(session, record)
 
 

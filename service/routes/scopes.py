@@ -61,6 +61,7 @@ _ACTS: dict[Need, tuple[str, ...]] = {
         "PATCH /cameras/{camera_id}/maintenance/{window_id}",
         "DELETE /cameras/{camera_id}/maintenance/{window_id}",
         "POST /cameras/{camera_id}/pose/accept",
+        "POST /cameras/{camera_id}/pose/put-back",
         "POST /cameras/{camera_id}/reference/reset",
         "PUT /cameras/{camera_id}/snapshot",
         "DELETE /cameras/{camera_id}/snapshot",
