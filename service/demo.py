@@ -109,6 +109,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
             epochs=_EPOCHS,
             seed=seed,
             workers=1,
+            auth="off",  # it plays by itself, and with nothing that is anybody's
         )
         url = f"http://{settings.host}:{settings.port}"
         console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")

@@ -11,13 +11,16 @@ import time
 
 import uvicorn
 
+from service.access.tokens import count_tokens
 from service.app import create_app
 from service.connections import ConnectionGuard, protocol_factory
 from service.data_dir import StartError, held_alone, make_private
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
+from service.reach import auth_on, is_loopback
 from service.settings import Settings
+from service.store.database import Store
 
 log = logging.getLogger("surefoot.serve")
 
@@ -37,6 +40,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     make_private(settings.data_dir)
     with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
         migrate(settings)
+        _require_way_in(settings)
         app = create_app(settings)
         guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
@@ -59,6 +63,24 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
                 signal.signal(number, lambda *_: None)
             server.run(sockets=[listener])
     log.info("stopped")
+
+
+def _require_way_in(settings: Settings) -> None:
+    """Refuse to serve strangers by mistake, and to serve nobody at all."""
+    if not auth_on(settings):
+        if not is_loopback(settings.host):
+            log.warning("access_off", extra={"host": settings.host})
+        return
+    if settings.proxy_from:
+        return
+    with contextlib.closing(Store(settings)) as store, store.read() as session:
+        count = count_tokens(session)
+    if not count:
+        raise StartError(
+            "auth: tokens are needed here, and nobody has one; make one by `surefoot token add "
+            "NAME --scope admin` with the same data directory, or let everybody in by "
+            "SUREFOOT_AUTH=off"
+        )
 
 
 def _listen(settings: Settings) -> socket.socket:

@@ -10,7 +10,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from service.data_dir import StartError
 from service.errors import ServiceError
+from service.process import be_private
 from service.settings import Settings
 
 if TYPE_CHECKING:
@@ -52,7 +54,7 @@ def add(
         with store.write() as session:
             made = tokens.make_token(session, spec, _who())
     except ServiceError as error:
-        raise typer.BadParameter(error.detail) from error
+        raise StartError(error.detail) from error
     finally:
         store.close()
     typer.echo(made.text)
@@ -93,7 +95,7 @@ def revoke(
         with store.write() as session:
             name = tokens.revoke_token(session, token_id, _who()).name
     except ServiceError as error:
-        raise typer.BadParameter(error.detail) from error
+        raise StartError(error.detail) from error
     finally:
         store.close()
     typer.echo(f"revoked the token {token_id} of {name}")
@@ -103,6 +105,7 @@ def _store(data_dir: Path | None) -> "Store":
     from service.migrate import migrate
     from service.store.database import Store
 
+    be_private()
     settings = Settings() if data_dir is None else Settings(data_dir=data_dir)
     migrate(settings)
     return Store(settings)
@@ -119,12 +122,12 @@ def _who() -> str:
 def _time_after(text: str) -> datetime:
     match = re.fullmatch(r"(\d{1,5})([hdwy])", text.strip())
     if match is None or int(match[1]) == 0:
-        raise typer.BadParameter(f"expires: a time such as 90d is needed, got {text!r}")
+        raise StartError(f"expires: a time such as 90d is needed, got {text!r}")
     days = int(match[1]) * _UNITS[match[2]]
     try:
         return datetime.now(UTC) + timedelta(days=days)
     except OverflowError as error:
-        raise typer.BadParameter(f"expires: {text!r} is too far away") from error
+        raise StartError(f"expires: {text!r} is too far away") from error
 
 
 def _time(at: datetime | None) -> str:
