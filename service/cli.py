@@ -92,6 +92,10 @@ def replay(
     ] = None,
     hard: Annotated[bool, typer.Option("--hard", help="With --protocol: a far knock.")] = False,
     still: Annotated[bool, typer.Option("--still", help="With --protocol: no knock.")] = False,
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes admin and ingest, if needed."),
+    ] = None,
 ) -> None:
     """Register a recorded camera and post its tracks in time order."""
     import httpx
@@ -102,7 +106,7 @@ def replay(
 
     if protocol is not None:
         name = "hard" if hard else "still" if still else knock or "knock"
-        _replay_protocol(scene_dir, url, protocol, name)
+        _replay_protocol(scene_dir, url, protocol, name, token)
         return
     console = Console()
     try:
@@ -114,6 +118,7 @@ def replay(
                 knock=_knock(knock or "0,0,0"),
                 speed=speed,
                 on_progress=lambda now: bar.update(task, total=now.tracks, completed=now.posted),
+                token=token,
             )
     except (CalibrationError, httpx.HTTPError) as error:
         console.print(f"[red]replay failed:[/] {error}")
@@ -141,7 +146,7 @@ def demo(
     raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
-def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
+def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str, token: str | None) -> None:
     """Put a case of the protocol to a service and print the served pose beside the truth."""
     import httpx
     from rich.progress import Progress
@@ -164,6 +169,7 @@ def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
                 on_progress=lambda what, done, total: bar.update(
                     task, description=what, total=total, completed=done
                 ),
+                token=token,
             )
     except (CalibrationError, httpx.HTTPError, TimeoutError) as error:
         console.print(f"[red]replay failed:[/] {error}")

@@ -30,6 +30,7 @@ log = logging.getLogger("surefoot.access")
 COOKIE = "surefoot_session"
 PROXY_HEADER = "X-Surefoot-Proxy"
 _USE_IS_KEPT_EVERY_S = 60.0
+_TOLD_MORE = "/readyz"  # open, but what is wrong is not for strangers
 _PARTS = "/ui/fleet/"  # of a page: scripts fetch them, and nobody looks at them alone
 
 
@@ -72,7 +73,20 @@ class GuardMiddleware:
                     raise
                 await _to_login(request)(scope, receive, send)
                 return
+        elif scope["path"] == _TOLD_MORE and "authorization" in request.headers:
+            await self._recognise(request)
         await self._app(scope, receive, send)
+
+    async def _recognise(self, request: Request) -> None:
+        """Note who asks where everybody may; with a store that fails, nobody is known."""
+        find = _finder(request, self._settings)
+        try:
+            caller = await run_sync(find, request.state.app.store, limiter=self._looking)
+        except (SQLAlchemyError, ServiceError) as error:
+            log.warning("caller_unknown", extra={"error": str(error)})
+            return
+        if caller is not None and caller.may("read"):
+            request.state.caller, request.state.token_id = caller, caller.token_id
 
     async def _let_in(self, request: Request, need: Need, parameters: dict[str, str]) -> None:
         store: Store = request.state.app.store

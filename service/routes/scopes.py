@@ -10,7 +10,7 @@ from service.routes.camera_page import CHARTS_URL
 Need = Scope | Literal["open"]
 
 _GET: dict[Need, tuple[str, ...]] = {
-    # `/readyz` tells an orchestrator whether to send work here: words on workers and disk, no more.
+    # `/readyz` tells an orchestrator whether to send work here; what is wrong, only who may read.
     "open": ("/healthz", "/readyz", "/ui/login"),
     "read": (
         "/",

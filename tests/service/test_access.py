@@ -227,3 +227,11 @@ def test_with_access_off_nothing_is_asked(corner):
 )
 def test_access_is_on_wherever_others_may_ask(settings, changes, on):
     assert auth_on(settings.model_copy(update=changes)) is on
+
+
+def test_what_is_wrong_is_told_to_who_may_read_alone(closed, made):
+    for headers in ({}, bearer("sf_0_0"), made("ingest")):
+        answer = closed.get("/readyz", headers=headers)
+        assert (answer.status_code, answer.json()["status"]) == (503, "not_ready")
+        assert answer.json()["problems"] == []
+    assert closed.get("/readyz", headers=made("read")).json()["problems"]

@@ -1,9 +1,14 @@
 """Pages of others and names of others: what a browser sends for them is refused."""
 
+import contextlib
+import re
+import sqlite3
+
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.routes.scopes import NEEDS
 from tests.service.conftest import problem
 
 FORM = {"Content-Type": "text/plain"}
@@ -106,3 +111,19 @@ def test_only_names_of_ours_are_served(settings, bound, allowed, host, status):
             problem(answer, 421, "misdirected")
             assert http.get("/readyz", headers={"Host": host}).status_code == 421
         assert http.get("/healthz", headers={"Host": host}).status_code == 200
+
+
+def test_looking_changes_nothing(corner, settings):
+    """What a link or a picture of a page of others can ask for is harmless."""
+    # `/readyz` writes one row anew, to see whether it can; `/events` has no end.
+    paths = {path for method, path in NEEDS if method == "GET"} - {"/readyz", "/events"}
+    before = dump(settings)
+    for path in sorted(paths):
+        answer = corner.get(re.sub(r"{\w+}", "corner", path), headers={"Accept": "text/html"})
+        assert answer.status_code < 500, path
+    assert dump(settings) == before
+
+
+def dump(settings):
+    with contextlib.closing(sqlite3.connect(settings.database_path)) as connection:
+        return list(connection.iterdump())

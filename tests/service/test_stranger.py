@@ -16,6 +16,7 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.app import create_app
 from service.data_dir import StartError
+from service.replay import client_of
 from service.routes.scopes import NEEDS
 from service.settings import Settings
 from service.store.database import Store
@@ -105,6 +106,15 @@ def test_a_token_that_is_revoked_is_let_in_no_more_and_its_stream_ends(closed):
     surefoot(closed.settings, "token", "revoke", token_id)
     assert closed.http.get("/cameras", headers=bearer(made)).status_code == 401
     assert ended.wait(30)
+
+
+def test_a_replay_is_let_in_with_a_token(closed):
+    with Store(closed.settings).write() as session:
+        spec = TokenSpec(name="replay", scopes=("admin", "ingest"))
+        text = tokens.make_token(session, spec, None).text
+    for token, status in ((None, 401), (text, 200)):
+        with client_of(closed.url, token) as http:
+            assert http.get("/cameras").status_code == status
 
 
 def test_it_starts_for_others_only_with_a_way_in(settings):
