@@ -17,6 +17,7 @@ from service.routes import (
     cameras,
     events,
     fleet,
+    login,
     maintenance,
     metrics,
     operation,
@@ -24,13 +25,16 @@ from service.routes import (
     poses,
     registration,
     snapshots,
+    tokens,
     tracks,
     trainings,
     webhooks,
 )
 from service.routes.bodies import BodyMiddleware
+from service.routes.guard import GuardMiddleware
 from service.routes.instruments import InstrumentMiddleware, Instruments
 from service.routes.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
+from service.routes.origins import OriginMiddleware
 from service.routes.problems import ProblemMiddleware, add_problem_handlers
 from service.routes.rates import RateMiddleware
 from service.routes.state import AppState
@@ -89,8 +93,11 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         metrics,
         fleet,
+        login,
         camera_page,
         registration,
+        login,
+        tokens,
     ):
         app.include_router(module.router)
     pages.mount_static(app)
@@ -99,6 +106,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(LaneMiddleware, lanes=lanes)
     app.add_middleware(BodyMiddleware, settings=settings, lanes=lanes)
     app.add_middleware(RateMiddleware, settings=settings)
+    app.add_middleware(GuardMiddleware, settings=settings)
+    app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(ProblemMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.state.instruments = instruments
