@@ -12,6 +12,7 @@ import time
 import uvicorn
 
 from service.app import create_app
+from service.connections import ConnectionGuard, protocol_factory
 from service.data_dir import StartError, held_alone, make_private
 from service.listener import listen
 from service.local_workers import local_workers
@@ -19,6 +20,9 @@ from service.migrate import migrate
 from service.settings import Settings
 
 log = logging.getLogger("surefoot.serve")
+
+_SWITCH_S = 0.001
+_BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
 
 
 def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
@@ -34,8 +38,14 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     make_private(settings.data_dir)
     with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
         migrate(settings)
+        app = create_app(settings)
+        guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
-            create_app(settings),
+            app,
+            loop="asyncio",
+            http=protocol_factory(guard),  # type: ignore[arg-type]
+            ws="none",
+            backlog=_BACKLOG,
             log_level="warning",
             access_log=False,
             timeout_graceful_shutdown=3,
@@ -44,6 +54,8 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         with local_workers(settings):
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # So long waits each step of the loop for threads that compute.
+            sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: None)

@@ -79,9 +79,7 @@ class Settings(BaseSettings):
 
     keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
     keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
-    keep_mb: float = Field(
-        200.0, gt=0, description="MB of tracks kept for each camera: 10 kB for each of keep_tracks"
-    )
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
@@ -118,6 +116,37 @@ class Settings(BaseSettings):
         30.0, gt=0, description="age at which ended deliveries are deleted"
     )
     public_url: str | None = Field(None, description="where people reach this service, for links")
+
+    max_connections: int = Field(1000, ge=1, description="open connections")
+    connections_per_address: int = Field(
+        500, ge=0, description="of them from one address; 0: as many as there may be"
+    )
+    head_timeout_s: float = Field(
+        10.0, gt=0, description="within which the headers of a request must have come"
+    )
+    stall_timeout_s: float = Field(
+        15.0, gt=0, description="within which more of a body must come, or of an answer be taken"
+    )
+    http_at_once: int = Field(8, ge=1, description="reads, and writes, that are worked on at once")
+    http_waiting: int = Field(64, ge=0, description="of each that wait meanwhile; more get a 503")
+    http_wait_s: float = Field(
+        5.0, gt=0, description="longest wait of a request for its turn, and for the store"
+    )
+    max_streams: int = Field(200, ge=1, description="open streams of /events")
+    max_body_mb: float = Field(1.0, gt=0, description="MiB of a body")
+    max_tracks_body_mb: float = Field(32.0, gt=0, description="MiB of a body with tracks")
+    max_snapshot_mb: float = Field(8.0, gt=0, description="MiB of a still image")
+    max_bodies_mb: float = Field(256.0, gt=0, description="MiB of all bodies in memory at once")
+    caller_rate: float = Field(
+        500.0, ge=0, description="requests a second of a token, or an address; 0: any"
+    )
+    camera_rate: float = Field(
+        100.0, ge=0, description="posts of tracks a second for a camera; 0: any"
+    )
+    max_cameras: int = Field(2000, ge=1, description="cameras that may be registered")
+    min_free_mb: float = Field(
+        64.0, ge=0, description="MiB of free disk below which /readyz warns; 0: any"
+    )
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")

@@ -33,7 +33,7 @@ def test_limits_that_are_told_are_the_defaults():
     defaults = Settings()
     retention = PAGE.read_text().split("## Retention")[1].split("## Running")[0]
     told = (
-        f"{defaults.keep_days:g} days, {defaults.keep_tracks:,}, {defaults.keep_mb:g} MB",
+        f"{defaults.keep_days:g} days, {defaults.keep_tracks:,}, {defaults.keep_mb:g} MiB",
         f"| {defaults.keep_estimates:,} |",
         f"| {defaults.keep_trainings} |",
         f"| {defaults.keep_references} of a camera |",

@@ -3,7 +3,7 @@
 from alembic import op
 
 revision = "2026_11_24_parent_indexes"
-down_revision = "2026_11_23_activity"
+down_revision = "2026_11_23_store_probes"
 branch_labels = None
 depends_on = None
 

@@ -40,17 +40,18 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
     """The limits on what is kept of a camera."""
     now = datetime.now(UTC)
     before = now - timedelta(days=settings.keep_days)
-    most_bytes = round(settings.keep_mb * 1e6)
+    most_bytes = round(settings.keep_mb * 2**20)
     yield Limit(
         name="tracks",
         bite=lambda session: tracks.forget(
             session, camera_id, before.timestamp(), settings.keep_tracks, BITE
         ),
     )
-    yield Limit(
-        name="tracks_by_size",
-        bite=lambda session: sizes.forget_tracks(session, camera_id, most_bytes, BITE),
-    )
+    if most_bytes:
+        yield Limit(
+            name="tracks_by_size",
+            bite=lambda session: sizes.forget_tracks(session, camera_id, most_bytes, BITE),
+        )
     yield Limit(
         name="maintenance_windows",
         bite=lambda session: maintenance.forget(session, camera_id, before, BITE),

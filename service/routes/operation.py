@@ -10,8 +10,8 @@ router = APIRouter(tags=["operation"])
 
 
 @router.get("/healthz")
-def health() -> HealthOut:
-    """Whether the process answers."""
+async def health() -> HealthOut:
+    """Whether the process answers; no thread and no connection is needed for it."""
     return HealthOut(status="ok")
 
 

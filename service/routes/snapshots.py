@@ -17,14 +17,14 @@ _DESCRIBED_BODY = {
 }
 
 
-def read_body(
-    camera_id: str, request: Request, body: BodyDep, state: StateDep, session: ReadDep
-) -> Still:
-    """The still image of a request, decoded before the write lock is taken."""
-    cameras.require_camera(session, camera_id)
+def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> Still:
+    """The still image of a request, decoded while no session is open."""
+    with state.store.read() as session:
+        cameras.require_camera(session, camera_id)
     snapshots.require_snapshots(state.settings)
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
-    return read_still(body, media_type)
+    with state.large_bodies.turn(state.settings.http_wait_s):
+        return read_still(body, media_type)
 
 
 @router.put("", openapi_extra=_DESCRIBED_BODY)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import (
@@ -30,6 +30,11 @@ def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
 def every(session: Session) -> Sequence[CameraRecord]:
     """All cameras."""
     return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
+
+
+def count(session: Session) -> int:
+    """How many cameras there are."""
+    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
 
 
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
