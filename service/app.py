@@ -18,6 +18,7 @@ from service.routes import (
     alerts,
     camera_page,
     cameras,
+    documented,
     events,
     fleet,
     maintenance,
@@ -84,6 +85,7 @@ def create_app(settings: Settings) -> FastAPI:
         registration,
     ):
         app.include_router(module.router)
+    documented.document_errors(app)
     pages.mount_static(app)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.add_exception_handler(ServiceError, _service_error)
