@@ -16,7 +16,7 @@ from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
 
 DISK_MB = 400
-_FULL_S, _LONGEST_FULL_S, _READ_ONLY_S, _CLOCK_S = 4.0, 24.0, 6.0, 6.0
+_FULL_S, _LONGEST_FULL_S, _READ_ONLY_S, _CLOCK_S = 4.0, 24.0, 2.0, 6.0
 _WEIGHTS_S = 90.0
 _REFUSAL_S = 30.0
 _REFUSAL_LINES = 3
@@ -79,6 +79,9 @@ def read_only(stand: Stand, ledger: Ledger, _: random.Random) -> None:
             break
         time.sleep(0.2)  # somebody opens an alert
     stand.start()
+    end = time.monotonic() + _REFUSAL_S
+    while stand.refused() == 0 and not stand.answers() and time.monotonic() < end:
+        time.sleep(0.3)
     time.sleep(_READ_ONLY_S)
     _look_for_tracebacks(stand, ledger, before, "read-only disk")
     _mount("-o", "remount,rw", str(stand.disk))

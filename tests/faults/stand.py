@@ -47,7 +47,7 @@ class Stand:
         )
         self.url = f"http://{self.settings.host}:{self.settings.port}"
         self.process: subprocess.Popen[bytes] | None = None
-        self.starts = 0
+        self.starts = self._ends = 0
         self._wanted, self._over = threading.Event(), threading.Event()
         self._environment = self.settings.as_environment() | self._extras()
         self._keeper = threading.Thread(target=self._keep)
@@ -97,7 +97,12 @@ class Stand:
 
     def start(self) -> None:
         """Keep it running from now on."""
+        self._ends = 0
         self._wanted.set()
+
+    def refused(self) -> int:
+        """How often it has ended since it was to be kept running."""
+        return self._ends
 
     def stop(self, *, kill: bool = False) -> None:
         """End it, and leave it so until it is started again."""
@@ -134,6 +139,7 @@ class Stand:
                 )
             self.starts += 1
             self.process.wait()
+            self._ends += 1
             time.sleep(_RESTART_S)
 
     def workers(self) -> list[psutil.Process]:

@@ -8,6 +8,7 @@ import json
 import random
 import traceback
 from collections import Counter
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from typing import Any
@@ -47,9 +48,9 @@ _GOOD: dict[str, dict[str, Any]] = {
     "trainings": {"recipe": "default", "seed": 1},
 }
 # What JSON can say and a store or a clock cannot hold.
-_NASTY_WORDS = ("\x00", "", "9" * 30, "0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00", "é")
-_NASTY: tuple[Any, ...] = (
-    *_NASTY_WORDS,
+NASTY_WORDS = ("\x00", "", "9" * 30, "0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00", "é")
+NASTY: tuple[Any, ...] = (
+    *NASTY_WORDS,
     "\ud800", "a\udfffb", "9" * 400, 10**400, 1e308, -1, None,
     [], {}, True, "\u202e", "x" * 5000,
 )  # fmt: skip
@@ -176,7 +177,7 @@ class Ground:
         self._fill(case, chance)
         random_ = random.Random(chance)
         if case.query and random_.random() < 0.2:
-            case.query[random_.choice(list(case.query))] = random_.choice(_NASTY_WORDS)
+            case.query[random_.choice(list(case.query))] = random_.choice(NASTY_WORDS)
         share = 0.6 if case.path.endswith("/tracks") else 0.2
         if isinstance(case.body, dict) and case.body and random_.random() < share:
             _spoil(case.body, random_)
@@ -220,6 +221,16 @@ def _spoil(place: Any, random_: random.Random) -> None:
         key = random_.choice(list(place) if isinstance(place, dict) else range(len(place)))
         inner = place[key]
         if not isinstance(inner, (dict, list)) or not inner or random_.random() < 0.2:
-            place[key] = random_.choice(_NASTY)
+            place[key] = random_.choice(NASTY)
             return
         place = inner
+
+
+def spoilt(body: Any) -> Iterator[Any]:
+    """A good body with each value that is hard to take in each place; of lists, the first."""
+    if isinstance(body, dict):
+        for key in body:
+            yield from ({**body, key: value} for value in spoilt(body[key]))
+    elif isinstance(body, list) and body:
+        yield from ([value, *body[1:]] for value in spoilt(body[0]))
+    yield from NASTY

@@ -7,20 +7,24 @@ Left out: `/events`, which has no end. The application runs in this process: wha
 shows (half a header, a body that never ends) is not tried here.
 """
 
+import json
 import os
 import sys
+import time
 from collections import Counter
 from traceback import format_exception
 
 import pytest
 import schemathesis
+from fastapi.testclient import TestClient
 from schemathesis.core.failures import ServerError
 from schemathesis.core.media_types import YAML_MEDIA_TYPES
 from schemathesis.engine import events, from_schema
 from schemathesis.hooks import GLOBAL_HOOK_DISPATCHER
 
 from service.app import create_app
-from tests.service.contract import Ground, Watched
+from tests.conftest import CAMERA, track
+from tests.service.contract import NASTY_WORDS, Ground, Watched, spoilt
 
 pytestmark = [
     pytest.mark.slow,
@@ -105,6 +109,43 @@ def test_every_path_answers_as_it_is_documented(watched):
     assert not lines, "\n\n".join(lines)
     paths = {route for route, _, _ in watched.counts}
     assert set(watched.app.openapi()["paths"]) - paths == {"/events"}
+
+
+def test_no_value_in_a_good_body_or_query_is_too_hard_to_take(watched):
+    people = {
+        "source": "a",
+        "started_at": "2026-11-21T00:00:00Z",
+        "frame_rate_hz": 25,
+        "tracks": [track("1", start_s=time.time() - 600)],
+    }
+    silence = {"until": "2026-11-21T00:00:00Z", "reason": "x", "by": "Ada"}
+    bodies = {
+        "/cameras": CAMERA,
+        "/cameras/ok/tracks": people,
+        "/cameras/ok/trainings": {"recipe": "default", "seed": 1},
+        "/cameras/busy/maintenance": {"from": None, "to": silence["until"], "reason": "x"},
+        "/alerts/x/silence": silence,
+        "/alerts/x/resolve": {"outcome": "false_alarm", "note": "x"},
+        "/webhooks": {"url": "http://127.0.0.1:9/"},
+    }
+    broken = set()
+    with TestClient(watched.app, raise_server_exceptions=False) as http:
+        for path, body in bodies.items():
+            for spoiled in spoilt(body):
+                content = json.dumps(spoiled).encode()
+                answer = http.post(
+                    path, content=content, headers={"Content-Type": "application/json"}
+                )
+                if answer.status_code >= 500:
+                    broken.add((path, content[:300], answer.status_code))
+        for path, operations in http.get("/openapi.json").json()["paths"].items():
+            names = [p["name"] for p in operations.get("get", {}).get("parameters", ())]
+            for name in names if path != "/events" else ():
+                for word in NASTY_WORDS:
+                    answer = http.get(path.replace("{camera_id}", "ok"), params={name: word})
+                    if answer.status_code >= 500:
+                        broken.add((path, name, word))
+    assert not broken, "\n".join(map(str, sorted(broken, key=str)))
 
 
 def go(watched, found, config):
