@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_empty_groups
+from service.recalibration.maintenance import note_ends
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
 from service.recalibration.silence import end_silences
@@ -52,6 +53,8 @@ def reconcile_camera(
         camera.estimate_due_at = None
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
+    if note_ends(session, camera_id, datetime.now(UTC)):
+        found.append("maintenance that has come to its end")
     presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
     if presence is not None:
         found.append(presence)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
-from service.recalibration import alerts, silence
+from service.recalibration import alerts, decisions, silence
 from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.alerts import (
     AcknowledgeBody,
@@ -70,9 +70,11 @@ def silence_one(
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, session: WriteDep) -> AlertDetail:
-    """End an alert with what came of it."""
-    record = alerts.resolve_alert(session, alert_id, body.outcome, body.note, body.by)
+def resolve(alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep) -> AlertDetail:
+    """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
+    record = decisions.resolve_alert(
+        session, state.queue, state.settings, alert_id, body.outcome, body.note, body.by
+    )
     return _with_acts(session, record)
 
 

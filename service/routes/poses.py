@@ -7,10 +7,17 @@ from fastapi.responses import PlainTextResponse
 
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
-from service.recalibration import cameras, poses
+from service.recalibration import cameras, decisions, poses
 from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.base import Moment
-from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
+from service.schemas.poses import (
+    AcceptBody,
+    History,
+    HistoryPoint,
+    PutBackBody,
+    ResetBody,
+    ServedPoseOut,
+)
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
@@ -75,9 +82,20 @@ def accept(
     camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
-    by = None if body is None else body.by
+    said = body or AcceptBody()
     return ServedPoseOut.from_value(
-        poses.accept_pose(session, state.queue, state.settings, camera_id, by)
+        decisions.accept_pose(session, state.queue, state.settings, camera_id, said.by, said.note)
+    )
+
+
+@router.post("/pose/put-back")
+def put_back(
+    camera_id: str, state: StateDep, session: WriteDep, body: PutBackBody | None = None
+) -> ServedPoseOut:
+    """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
+    said = body or PutBackBody()
+    return ServedPoseOut.from_value(
+        decisions.put_back(session, state.queue, state.settings, camera_id, said.by, said.note)
     )
 
 
@@ -85,8 +103,8 @@ def accept(
 def reset(
     camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
 ) -> ServedPoseOut:
-    """Say that the camera is back at its prior pose: closes its alerts, learns it anew there."""
-    by = None if body is None else body.by
+    """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
+    said = body or ResetBody()
     return ServedPoseOut.from_value(
-        poses.reset_reference(session, state.queue, state.settings, camera_id, by)
+        decisions.learn_anew(session, state.queue, state.settings, camera_id, said.by, said.note)
     )

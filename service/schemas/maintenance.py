@@ -27,7 +27,7 @@ class WindowPatch(Body):
 
 
 class WindowOut(BaseModel):
-    """A maintenance window."""
+    """A maintenance window: `to` as planned, `ended_at` when it really ended."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
@@ -36,6 +36,7 @@ class WindowOut(BaseModel):
     state: Literal["planned", "under_way", "over"]
     from_: datetime = Field(serialization_alias="from")
     to: datetime
+    ended_at: datetime | None
     reason: str | None
     by: str | None
     created_at: datetime
@@ -45,13 +46,14 @@ class WindowOut(BaseModel):
     def from_record(cls, record: MaintenanceRecord) -> Self:
         """The body of a stored window."""
         now = datetime.now(UTC)
-        begun, over = record.from_at <= now, record.to_at <= now
+        begun, over = record.from_at <= now, record.until <= now
         return cls(
             id=record.id,
             camera_id=record.camera_id,
             state="over" if over else "under_way" if begun else "planned",
             from_=record.from_at,
             to=record.to_at,
+            ended_at=record.ended_at,
             reason=record.reason,
             by=record.requested_by,
             created_at=record.created_at,
