@@ -5,7 +5,7 @@ from datetime import datetime
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
-from service.store.tables import ProbeRecord
+from service.store.probe_tables import ProbeRecord
 
 
 def write(session: Session, now: datetime) -> None:

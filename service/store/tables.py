@@ -390,12 +390,3 @@ class WorkerRecord(Record):
     pid: Mapped[int]
     started_at: Mapped[datetime]
     heartbeat_at: Mapped[datetime]
-
-
-class ProbeRecord(Record):
-    """One row, written anew to see whether the store can be written."""
-
-    __tablename__ = "store_probes"
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    written_at: Mapped[datetime]
