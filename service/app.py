@@ -15,8 +15,10 @@ from service.routes import (
     alerts,
     camera_page,
     cameras,
+    documented,
     events,
     fleet,
+    login,
     maintenance,
     metrics,
     operation,
@@ -24,13 +26,16 @@ from service.routes import (
     poses,
     registration,
     snapshots,
+    tokens,
     tracks,
     trainings,
     webhooks,
 )
 from service.routes.bodies import BodyMiddleware
+from service.routes.guard import GuardMiddleware
 from service.routes.instruments import InstrumentMiddleware, Instruments
 from service.routes.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
+from service.routes.origins import OriginMiddleware
 from service.routes.problems import ProblemMiddleware, add_problem_handlers
 from service.routes.rates import RateMiddleware
 from service.routes.state import AppState
@@ -89,16 +94,22 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         metrics,
         fleet,
+        login,
         camera_page,
         registration,
+        login,
+        tokens,
     ):
         app.include_router(module.router)
+    documented.document_errors(app)
     pages.mount_static(app)
     lanes = Lanes(settings)
     # The last one is outermost.
     app.add_middleware(LaneMiddleware, lanes=lanes)
     app.add_middleware(BodyMiddleware, settings=settings, lanes=lanes)
     app.add_middleware(RateMiddleware, settings=settings)
+    app.add_middleware(GuardMiddleware, settings=settings)
+    app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(ProblemMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.state.instruments = instruments

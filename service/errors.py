@@ -31,6 +31,28 @@ class ServiceError(Exception):
         self.errors = errors
         self.retry_after_s = retry_after_s
 
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that go with the answer."""
+        return {}
+
+
+class UnauthorizedError(ServiceError):
+    """Nobody is known to ask, or with what nobody is let in."""
+
+    status, code = 401, "unauthorized"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """How to be let in."""
+        return {"WWW-Authenticate": 'Bearer realm="surefoot"'}
+
+
+class ForbiddenError(ServiceError):
+    """Who asks is known, and may not do this."""
+
+    status, code = 403, "forbidden"
+
 
 class SwitchedOffError(ServiceError):
     """The operator has not switched on what is asked for."""

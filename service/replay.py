@@ -36,6 +36,7 @@ def replay_scene(
     knock: Knock,
     speed: float,
     on_progress: Callable[[ReplayProgress], None],
+    token: str | None = None,
 ) -> tuple[Scene, ReplayProgress]:
     """Register the scene's camera with its true pose as prior, and post its tracks in time order.
 
@@ -47,7 +48,7 @@ def replay_scene(
         httpx.HTTPError: the service cannot be reached or refuses.
     """
     scene = load_scene(folder)
-    with httpx.Client(base_url=url, timeout=60) as http:
+    with client_of(url, token) as http:
         body = camera_body(scene.scene_id, scene.intrinsics, scene.true_pose)
         answer = http.post("/cameras", json={**body, "frame_rate_hz": scene.frame_rate_hz})
         if answer.status_code != 409:
@@ -70,6 +71,12 @@ def replay_scene(
             progress = ReplayProgress(posted=at + len(rows), tracks=len(tracks), **counts)
             on_progress(progress)
     return scene, progress
+
+
+def client_of(url: str, token: str | None) -> httpx.Client:
+    """A client of a service, with a token where it wants one: of the scopes admin and ingest."""
+    headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+    return httpx.Client(base_url=url, timeout=60, headers=headers)
 
 
 def post_tracks(

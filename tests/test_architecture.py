@@ -11,10 +11,13 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
+    {"data_dir", "process"},
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue", "delivery"},
-    {"migrate", "recalibration"},
-    {"schemas", "jobs", "web"},
+    {"formats", "store", "job_queue", "delivery", "reach"},
+    {"recalibration"},
+    {"access"},
+    {"backup", "schemas", "jobs", "web"},
+    {"migrate"},
     {"routes"},
     {
         "app",
@@ -25,8 +28,10 @@ SERVICE_ROOMS = [
         "protocol_tables",
         "alarm_tables",
     },
-    {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"token_commands", "serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"demo_folder"},
     {"demo", "replay_protocol"},
+    {"commands_data", "commands_studies"},
     {"cli"},
 ]
 MODEL_ROOMS = [

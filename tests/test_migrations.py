@@ -5,12 +5,13 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
-from service.migrate import alembic_config, migrate
+from service.migrate import migrate
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
 from service.store.alerts import AlertFilter
 from service.store.database import Store
+from service.store.revisions import alembic_config
 from service.store.tables import Record
 
 

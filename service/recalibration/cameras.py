@@ -21,6 +21,7 @@ from service.recalibration.references import begin_reference
 from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
+from service.store.actor import name_in
 from service.store.alerts import AlertFilter
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import CameraRecord, PriorPoseRecord
@@ -162,7 +163,7 @@ def change_camera(
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
-            close_pose_alerts(session, camera_id, "accepted", None)
+            close_pose_alerts(session, camera_id, "accepted", name_in(session, None))
         # Tracks seen so far may be of another pose or lens, but not of other people.
         from_s = references.newest(session, camera_id).from_s
         if geometry_changed:
@@ -241,7 +242,7 @@ def add_prior_pose(
             x_m=pose.x_m,
             y_m=pose.y_m,
             origin=origin,
-            trusted_by=by,
+            trusted_by=name_in(session, by),
             created_at=datetime.now(UTC),
         )
     )

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import re
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from functools import partial
 from typing import Annotated, Any, TypeVar
@@ -14,12 +15,14 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.recalibration import operation
+from service.routes.guard import still_let_in
 from service.routes.state import AppState, StateDep
 from service.store.tables import EventRecord
 
 router = APIRouter(tags=["events"])
 _POLL_S = 0.5
 _HEARTBEAT_S = 10.0
+_CHECK_S = 5.0
 _BATCH = 500
 _MAX_ID = 2**63 - 1  # SQLite's
 _ID = re.compile(r"[0-9]{1,30}")
@@ -44,8 +47,13 @@ async def events(
     if seen is None:
         seen = await _ask(state, _newest, state)
     silent_s = 0.0
+    checked_s = time.monotonic()
     yield ServerSentEvent(comment="connected", retry=2000)
     while not state.stopping.is_set() and not await request.is_disconnected():
+        if time.monotonic() - checked_s > _CHECK_S:
+            checked_s = time.monotonic()
+            if not await _ask(state, still_let_in, request):
+                return  # logged out, or the token is over
         try:
             records = await _ask(state, _after, state, seen)
         except SQLAlchemyError as error:

@@ -126,7 +126,8 @@ class LaneMiddleware:
 
 def sessions_at_once(settings: Settings) -> int:
     """How many sessions requests may have at once: a request has one at a time."""
-    return 2 * settings.http_at_once + _OPERATION_AT_ONCE + STREAM_POLLS
+    return 2 * settings.http_at_once + _OPERATION_AT_ONCE + STREAM_POLLS + LOOKUPS
 
 
 STREAM_POLLS = 2  # of all event streams together
+LOOKUPS = 4  # of who asks, before a request has its turn

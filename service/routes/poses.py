@@ -8,7 +8,7 @@ from fastapi.responses import PlainTextResponse
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
 from service.recalibration import cameras, decisions, poses
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.base import Moment
 from service.schemas.poses import (
     AcceptBody,
@@ -20,6 +20,10 @@ from service.schemas.poses import (
 )
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
+
+
+class _YamlResponse(PlainTextResponse):
+    media_type = "application/yaml"
 
 
 @router.get("/pose", response_model=ServedPoseOut)
@@ -38,15 +42,14 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
-@router.get("/pose.yaml", response_class=PlainTextResponse)
+@router.get("/pose.yaml", response_class=_YamlResponse)
 def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
     lens = cameras.view_camera(session, camera_id).intrinsics
     words = (f"state: {view.state}", f"why: {view.reason}")
-    return PlainTextResponse(
+    return _YamlResponse(
         opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
-        media_type="application/yaml",
         headers={
             "ETag": view.etag,
             "Content-Disposition": f'inline; filename="{camera_id}.yaml"',
@@ -79,32 +82,47 @@ def history(
 
 @router.post("/pose/accept")
 def accept(
-    camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: AcceptBody | None = None,
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
     said = body or AcceptBody()
+    by = name_of(actor, said.by)
     return ServedPoseOut.from_value(
-        decisions.accept_pose(session, state.queue, state.settings, camera_id, said.by, said.note)
+        decisions.accept_pose(session, state.queue, state.settings, camera_id, by, said.note)
     )
 
 
 @router.post("/pose/put-back")
 def put_back(
-    camera_id: str, state: StateDep, session: WriteDep, body: PutBackBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: PutBackBody | None = None,
 ) -> ServedPoseOut:
     """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
     said = body or PutBackBody()
+    by = name_of(actor, said.by)
     return ServedPoseOut.from_value(
-        decisions.put_back(session, state.queue, state.settings, camera_id, said.by, said.note)
+        decisions.put_back(session, state.queue, state.settings, camera_id, by, said.note)
     )
 
 
 @router.post("/reference/reset")
 def reset(
-    camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: ResetBody | None = None,
 ) -> ServedPoseOut:
     """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
     said = body or ResetBody()
+    by = name_of(actor, said.by)
     return ServedPoseOut.from_value(
-        decisions.learn_anew(session, state.queue, state.settings, camera_id, said.by, said.note)
+        decisions.learn_anew(session, state.queue, state.settings, camera_id, by, said.note)
     )

@@ -71,7 +71,7 @@ def problem(request: Request, error: ServiceError) -> Response:
     """The answer that tells of an error; nothing in it can keep it from being sent."""
     status, title = error.status, HTTPStatus(error.status).phrase
     request.scope["surefoot_problem"] = error.code  # for the count of refusals
-    headers = {}
+    headers = error.headers
     if error.retry_after_s is not None:
         headers["Retry-After"] = str(max(1, round(error.retry_after_s)))
     if pages.wants_page(request):

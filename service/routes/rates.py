@@ -69,7 +69,8 @@ class RateMiddleware:
 
 
 def _caller(scope: Scope) -> str:
-    token_id = scope.get("state", {}).get("token_id")
-    if token_id is not None:
-        return f"token {token_id}"
-    return f"address {(scope.get('client') or ('unknown',))[0]}"
+    state = scope.get("state", {})
+    if state.get("token_id") is not None:
+        return f"token {state['token_id']}"
+    # The guard knows what a proxy of ours says of where somebody is.
+    return f"address {state.get('address') or (scope.get('client') or ('unknown',))[0]}"

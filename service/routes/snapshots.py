@@ -6,8 +6,9 @@ from fastapi import APIRouter, Depends, Header, Request, Response
 
 from service.formats.still import Still, read_still
 from service.recalibration import cameras, snapshots
-from service.routes.state import BodyDep, ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
 from service.schemas.snapshots import SnapshotOut
+from service.store.actor import set_actor
 
 router = APIRouter(prefix="/cameras/{camera_id}/snapshot", tags=["cameras"])
 
@@ -29,10 +30,14 @@ def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) 
 
 @router.put("", openapi_extra=_DESCRIBED_BODY)
 def put(
-    camera_id: str, still: Annotated[Still, Depends(read_body)], state: StateDep
+    camera_id: str,
+    still: Annotated[Still, Depends(read_body)],
+    state: StateDep,
+    actor: ActorDep,
 ) -> SnapshotOut:
     """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
     with state.store.write() as session:
+        set_actor(session, actor)
         facts = snapshots.put_snapshot(session, camera_id, still)
     return SnapshotOut.model_validate(facts, from_attributes=True)
 

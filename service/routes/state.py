@@ -9,11 +9,13 @@ import anyio
 from fastapi import Depends, Header, Request
 from sqlalchemy.orm import Session
 
+from service.access.callers import Caller
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.recalibration.quota import Quota
 from service.routes.instruments import Instruments
 from service.settings import Settings
+from service.store.actor import Actor, set_actor
 from service.store.database import Store
 from service.store.turns import Turns
 
@@ -50,9 +52,32 @@ def read_session(state: StateDep) -> Iterator[Session]:
         yield session
 
 
-def write_session(state: StateDep) -> Iterator[Session]:
+def get_caller(request: Request) -> Caller | None:
+    """Who asks; None where access is off."""
+    caller: Caller | None = getattr(request.state, "caller", None)
+    return caller
+
+
+CallerDep = Annotated[Caller | None, Depends(get_caller)]
+
+
+def get_actor(caller: CallerDep) -> Actor | None:
+    """In whose name an act is kept, whatever name its body says."""
+    return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
+
+
+ActorDep = Annotated[Actor | None, Depends(get_actor)]
+
+
+def name_of(actor: Actor | None, said: str | None = None) -> str | None:
+    """Who acts: the person who is known; where access is off, whoever the body says."""
+    return said if actor is None else actor.name
+
+
+def write_session(state: StateDep, actor: ActorDep) -> Iterator[Session]:
     """A session that commits before the answer is sent, or not at all."""
     with state.store.write() as session:
+        set_actor(session, actor)
         yield session
 
 

@@ -7,11 +7,14 @@ from typing import Any
 from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.orm import Session
 
+from service.data_dir import make_private
 from service.settings import Settings
 from service.store.turns import Turns
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
 _CONNECTIONS = 15
+
+_WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
 class Store:
@@ -30,7 +33,7 @@ class Store:
         patience_s: float = _PATIENCE_S,
         connections: int = _CONNECTIONS,
     ) -> None:
-        settings.data_dir.mkdir(parents=True, exist_ok=True)
+        make_private(settings.data_dir)
         self.url = settings.database_url
         self.engine = engine_for(self.url, patience_s, connections)
         self.connections = connections
@@ -93,6 +96,9 @@ def _prepare_sqlite(connection: Any, patience_s: float) -> None:
     # newest commit, the first write takes the write lock at once.
     connection.isolation_level = "IMMEDIATE"
     connection.execute(f"PRAGMA busy_timeout={round(patience_s * 1000)}")
+    # Of a new file only, before its first page is written: retention gives pages back to the disk.
+    connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
     connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute(f"PRAGMA journal_size_limit={_WAL_BYTES}")
     connection.execute("PRAGMA synchronous=FULL")  # an answer of 202 survives power loss
     connection.execute("PRAGMA foreign_keys=ON")

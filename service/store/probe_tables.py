@@ -8,7 +8,7 @@ from service.store.tables import Record
 
 
 class ProbeRecord(Record):
-    """One row, written anew each time."""
+    """One row, written anew to see whether the store can be written."""
 
     __tablename__ = "store_probes"
 

@@ -69,8 +69,8 @@ def cut_off(made, text, times, every_s):
 
 
 def test_headers_and_bodies_that_do_not_come_are_cut(api):
-    silent, half = connect(api), connect(api, b"GET /healthz HTTP/1.1\r\nHost: x\r\n")
-    body = connect(api, b"POST /cameras HTTP/1.1\r\nHost: x\r\nContent-Length: 900\r\n\r\n{")
+    silent, half = connect(api), connect(api, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n")
+    body = connect(api, b"POST /cameras HTTP/1.1\r\nHost: [::1]\r\nContent-Length: 900\r\n\r\n{")
     for made in (silent, half, body):
         assert everything(made).startswith(b"HTTP/1.1 408 ")
     # A drip of headers is no progress.
@@ -79,7 +79,7 @@ def test_headers_and_bodies_that_do_not_come_are_cut(api):
 
 
 def test_a_slow_but_moving_body_is_taken(api):
-    head = b"POST /cameras HTTP/1.1\r\nHost: x\r\nContent-Length: 9000\r\nConnection: close\r\n"
+    head = b"POST /cameras HTTP/1.1\r\nHost: [::1]\r\nContent-Length: 9000\r\nConnection: close\r\n"
     made = connect(api, head + b"Content-Type: application/json\r\n\r\n")
     for _ in range(9):
         made.sendall(b" " * 1000)
@@ -102,7 +102,7 @@ def test_the_silent_make_room_and_no_descriptor_is_lost(api):
 def test_a_client_that_takes_no_answer_is_cut(api):
     made = connect(api)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    assert cut_off(made, b"GET /openapi.json HTTP/1.1\r\nHost: x\r\n\r\n", 2000, 0.005)
+    assert cut_off(made, b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n", 2000, 0.005)
 
 
 @contextlib.contextmanager
@@ -128,7 +128,7 @@ def in_process(settings, **more):
 
 def healthy(address):
     made = socket.create_connection(address, timeout=10)
-    made.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+    made.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
     return everything(made).startswith(b"HTTP/1.1 200 ")
 
 
