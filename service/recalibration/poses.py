@@ -14,7 +14,7 @@ from service.recalibration.references import tracks_so_far
 from service.recalibration.state_words import reason_of
 from service.settings import Settings
 from service.store import cameras, estimates, trainings
-from service.store.packing import pose_of_prior
+from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import EstimateRecord
 
 
@@ -87,7 +87,8 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     model_id = None if model is None else model.id
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of, the lens of `pose.yaml` too.
-    served = (standing.state, reason, pose, estimate_id, reference, model_id, camera.version)
+    lens = intrinsics_of(camera)
+    served = (standing.state, reason, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
         standing=standing,

@@ -137,8 +137,7 @@ const ACTS = {
   },
 
   async train() {
-    const body = await asMe();
-    if (body) await put("A training is queued.", "POST", `${path}/trainings`, body);
+    await put("A training is queued.", "POST", `${path}/trainings`, signed());
   },
 
   async cancel({ training }) {
