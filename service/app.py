@@ -9,11 +9,13 @@ import anyio.to_thread
 from fastapi import FastAPI
 
 from service.job_queue import JobQueue
+from service.recalibration.quota import Quota
 from service.routes import (
     activity,
     alerts,
     camera_page,
     cameras,
+    documented,
     events,
     fleet,
     login,
@@ -64,6 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
+            quota=Quota(settings),
             stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
         )
         yield {"app": state}
@@ -98,6 +101,7 @@ def create_app(settings: Settings) -> FastAPI:
         tokens,
     ):
         app.include_router(module.router)
+    documented.document_errors(app)
     pages.mount_static(app)
     lanes = Lanes(settings)
     # The last one is outermost.

@@ -7,7 +7,7 @@ import asyncio
 import math
 import resource
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -78,15 +78,11 @@ class GuardedProtocol(H11Protocol):
         guard = self._guard
         self._address = self.client[0] if self.client else "local"
         if guard.of_address[self._address] >= guard.most_of_address:
-            self._end("address", 503, _BUSY)
-            return
-        if guard.open >= guard.most:
-            # Who keeps silent makes room for who may not.
-            oldest = next(iter(guard.silent), None)
-            if oldest is None:
-                self._end("full", 503, _BUSY)
+            same = (other for other in guard.silent if other._address == self._address)
+            if not self._made_room(same, "address"):
                 return
-            oldest._end("silent", 408, _LATE, abort=True)
+        if guard.open >= guard.most and not self._made_room(iter(guard.silent), "full"):
+            return
         self._counted = True
         guard.open += 1
         guard.of_address[self._address] += 1
@@ -132,6 +128,15 @@ class GuardedProtocol(H11Protocol):
         if self._reader_timer is not None:
             self._reader_timer.cancel()
             self._reader_timer = None
+
+    def _made_room(self, silent: Iterator["GuardedProtocol"], reason: str) -> bool:
+        """End the oldest of those that keep silent, since this one may not; else end this one."""
+        oldest = next(silent, None)
+        if oldest is None:
+            self._end(reason, 503, _BUSY)
+            return False
+        oldest._end("silent", 408, _LATE, abort=True)
+        return True
 
     def _watch(self) -> None:
         """Set the timer for what the client must send next; a drip does not set it anew."""

@@ -15,6 +15,7 @@ from models.geometry.pose import CameraPose
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
+_TRIES, _LONGEST_WAIT_S = 30, 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +82,10 @@ def client_of(url: str, token: str | None) -> httpx.Client:
 def post_tracks(
     http: httpx.Client, camera_id: str, tracks: Sequence[SceneTrack], shift_s: float
 ) -> dict[str, Any]:
-    """Post the foot points of some tracks with their times shifted; returns the receipt."""
+    """Post the foot points of some tracks with their times shifted; returns the receipt.
+
+    Comes back when a busy service says so; a post that is repeated changes nothing.
+    """
     body = {
         "source": _SOURCE,
         "tracks": [
@@ -99,7 +103,12 @@ def post_tracks(
             for track in tracks
         ],
     }
-    answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
+    for _ in range(_TRIES):
+        answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
+        wait_s = float(answer.headers.get("retry-after", "inf"))
+        if answer.status_code not in (429, 503) or wait_s > _LONGEST_WAIT_S:
+            break
+        time.sleep(wait_s)
     answer.raise_for_status()
     receipt: dict[str, Any] = answer.json()
     return receipt

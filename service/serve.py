@@ -24,6 +24,7 @@ from service.store.database import Store
 
 log = logging.getLogger("surefoot.serve")
 
+_SWITCH_S = 0.001
 _BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
 
 
@@ -58,6 +59,8 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         with local_workers(settings):
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # So long waits each step of the loop for threads that compute.
+            sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: None)

@@ -99,9 +99,19 @@ class Settings(BaseSettings):
 
     keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
     keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
+    )
+    keep_alerts_days: float = Field(
+        1825.0, ge=30, description="age at which ended alerts are deleted"
+    )
+    keep_trainings: int = Field(
+        50, ge=2, description="trainings kept for each camera, beside those of its models"
+    )
+    keep_references: int = Field(
+        50, ge=2, description="references and prior poses kept that no estimate is of"
     )
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 

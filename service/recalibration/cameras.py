@@ -8,7 +8,12 @@ from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.errors import ConflictError, NotFoundError, PreconditionFailedError
+from service.errors import (
+    ConflictError,
+    NotFoundError,
+    PreconditionFailedError,
+    TooManyCamerasError,
+)
 from service.job_queue import JobQueue
 from service.recalibration.activity import note
 from service.recalibration.alerts import close_pose_alerts, end_alert, list_alerts
@@ -74,10 +79,16 @@ def register_camera(
 
     Raises:
         ConflictError: the id is taken.
+        TooManyCamerasError: as many are registered as may be.
     """
     camera_id = spec.camera_id or f"camera-{secrets.token_hex(4)}"
     if cameras.find(session, camera_id) is not None:
         raise ConflictError(f"id: {camera_id!r} is taken")
+    if cameras.count(session) >= settings.max_cameras:
+        raise TooManyCamerasError(
+            f"cameras: {settings.max_cameras} are registered already; delete one that is not used, "
+            "or raise SUREFOOT_MAX_CAMERAS"
+        )
     now = datetime.now(UTC)
     record = CameraRecord(
         id=camera_id,

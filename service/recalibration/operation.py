@@ -55,7 +55,10 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     lag_s = 0.0 if due is None else (now - due).total_seconds()
     problems = []
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
-    if free_mb < settings.min_free_mb:
+    full = free_mb < _FULL_MB
+    if full:
+        problems.append(f"store: the disk is full, {free_mb:.1f} MiB are free")
+    elif free_mb < settings.min_free_mb:
         problems.append(f"disk: {free_mb:.0f} MiB are free; {settings.min_free_mb:g} are the least")
     if not alive:
         heard = "none was ever heard of" if silent_s is None else f"silent for {silent_s:.0f} s"
@@ -63,7 +66,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     if lag_s > _LONGEST_LAG_S:
         problems.append(f"queue: tracks wait for {lag_s:.0f} s; {_LONGEST_LAG_S:g} s are the limit")
     return Readiness(
-        store_writable=True,
+        store_writable=not full,
         worker_alive=alive,
         worker_silent_s=silent_s,
         queue_lag_s=lag_s,
@@ -72,6 +75,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
 
 
 _LONGEST_LAG_S = 60.0
+_FULL_MB = 1.0  # a small write, as ours is, may still find room in the file that is there
 
 
 def newest_event_id(session: Session) -> int:

@@ -35,7 +35,7 @@ class Lane:
         """
         if self._free <= 0 and len(self._waiting) >= self._most_waiting:
             raise OverloadedError(
-                f"{self._name}: {self._most_waiting} requests wait already",
+                f"{self._name}: every place is taken, and {self._most_waiting} requests wait",
                 retry_after_s=_COME_BACK_S,
             )
 

@@ -1,6 +1,5 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
-from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
@@ -10,6 +9,7 @@ from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
 from service.recalibration import cameras, decisions, poses
 from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.base import Moment
 from service.schemas.poses import (
     AcceptBody,
     History,
@@ -20,6 +20,10 @@ from service.schemas.poses import (
 )
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
+
+
+class _YamlResponse(PlainTextResponse):
+    media_type = "application/yaml"
 
 
 @router.get("/pose", response_model=ServedPoseOut)
@@ -38,15 +42,14 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
-@router.get("/pose.yaml", response_class=PlainTextResponse)
+@router.get("/pose.yaml", response_class=_YamlResponse)
 def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
     lens = cameras.view_camera(session, camera_id).intrinsics
     words = (f"state: {view.state}", f"why: {view.reason}")
-    return PlainTextResponse(
+    return _YamlResponse(
         opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
-        media_type="application/yaml",
         headers={
             "ETag": view.etag,
             "Content-Disposition": f'inline; filename="{camera_id}.yaml"',
@@ -58,8 +61,8 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextRespo
 def history(
     camera_id: str,
     session: ReadDep,
-    from_: Annotated[datetime | None, Query(alias="from")] = None,
-    to: datetime | None = None,
+    from_: Annotated[Moment | None, Query(alias="from")] = None,
+    to: Moment | None = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
     points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
@@ -67,12 +70,6 @@ def history(
 
     With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
     """
-    for name, value in (("from", from_), ("to", to)):
-        if value is not None and value.tzinfo is None:
-            reason = f"a time with its zone is needed, got {value.isoformat()}"
-            raise MalformedError(
-                f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),)
-            )
     if points is not None and limit is not None:
         reason = "either limit or points is taken"
         raise MalformedError(f"points: {reason}", (FieldError(pointer="/points", reason=reason),))

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from service.access.callers import Caller
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
+from service.recalibration.quota import Quota
 from service.routes.instruments import Instruments
 from service.settings import Settings
 from service.store.actor import Actor, set_actor
@@ -29,14 +30,15 @@ class AppState:
     settings: Settings
     store: Store
     queue: JobQueue
+    quota: Quota
     stream_polls: anyio.CapacityLimiter
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
     stopping: threading.Event = field(default_factory=threading.Event)
 
 
-def get_state(request: Request) -> AppState:
-    """The application's state."""
+async def get_state(request: Request) -> AppState:
+    """The application's state; a coroutine, since anything else would be given a thread."""
     state: AppState = request.state.app
     return state
 
@@ -91,7 +93,7 @@ async def whole_body(request: Request) -> bytes:
 BodyDep = Annotated[bytes, Depends(whole_body)]
 
 
-def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
+async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
     """The version that a change is meant for.
 
     Raises:

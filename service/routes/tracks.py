@@ -10,7 +10,7 @@ from service.formats.batch import DEFAULT_SOURCE
 from service.formats.track import Batch, Clock
 from service.recalibration import cameras, tracks
 from service.routes.state import BodyDep, StateDep
-from service.schemas.tracks import ReceiptOut
+from service.schemas.tracks import DESCRIBED_TRACK, ReceiptOut
 
 router = APIRouter(tags=["tracks"])
 
@@ -28,7 +28,7 @@ _DESCRIBED_BODY = {
                         "source": {"type": "string"},
                         "frame_rate_hz": {"type": "number"},
                         "started_at": {"type": "string", "format": "date-time"},
-                        "tracks": {"type": "array", "items": {"type": "object"}},
+                        "tracks": {"type": "array", "items": DESCRIBED_TRACK},
                     },
                 }
             },
@@ -55,6 +55,7 @@ def read_batch(
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
         OverloadedError: other large bodies are being read all the time.
     """
+    source = formats.read_source(source, "/source")
     with state.store.read() as session:
         camera = cameras.require_camera(session, camera_id)
     size = (camera.width, camera.height)
@@ -87,6 +88,8 @@ def post_tracks(
     camera_id: str, batch: Annotated[Batch, Depends(read_batch)], state: StateDep
 ) -> ReceiptOut:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk."""
+    with state.store.read() as session:
+        state.quota.check(session, camera_id, batch)
     with state.store.write() as session:
         cameras.require_camera(session, camera_id)
         receipt = tracks.receive_tracks(session, state.queue, camera_id, batch)

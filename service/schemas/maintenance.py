@@ -3,17 +3,17 @@
 from datetime import UTC, datetime
 from typing import Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.base import Body, Who
+from service.schemas.base import Body, Moment, Who
 from service.store.alert_tables import MaintenanceRecord
 
 
 class WindowBody(Body):
     """A time in which somebody is at a camera; it begins now, if not told otherwise."""
 
-    from_: AwareDatetime | None = Field(None, alias="from")
-    to: AwareDatetime
+    from_: Moment | None = Field(None, alias="from")
+    to: Moment
     reason: str | None = Field(None, max_length=2000)
     by: Who | None = None
 
@@ -21,8 +21,8 @@ class WindowBody(Body):
 class WindowPatch(Body):
     """What to change of a window; fields left out stay."""
 
-    from_: AwareDatetime | None = Field(None, alias="from")
-    to: AwareDatetime | None = None
+    from_: Moment | None = Field(None, alias="from")
+    to: Moment | None = None
     reason: str | None = Field(None, max_length=2000)
 
 

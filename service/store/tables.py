@@ -62,6 +62,10 @@ def _camera_key() -> Any:
     return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
 
 
+def _prior_pose_key() -> Any:
+    return mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"), index=True)
+
+
 class CameraRecord(Record):
     """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
 
@@ -124,7 +128,7 @@ class SiteReferenceRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     origin: Mapped[str]  # registered, changed, accepted, reset, put_back
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
@@ -200,7 +204,7 @@ class TrainingRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
@@ -227,7 +231,7 @@ class ModelRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     training_id: Mapped[str] = mapped_column(
         ForeignKey("trainings.id", ondelete="CASCADE"), unique=True
     )
@@ -273,10 +277,12 @@ class EstimateRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    model_id: Mapped[str | None] = mapped_column(ForeignKey("models.id", ondelete="SET NULL"))
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    model_id: Mapped[str | None] = mapped_column(
+        ForeignKey("models.id", ondelete="SET NULL"), index=True
+    )
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     reference_id: Mapped[int | None] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE")
+        ForeignKey("site_references.id", ondelete="CASCADE"), index=True
     )
     state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]

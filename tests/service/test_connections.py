@@ -45,6 +45,9 @@ def connect(api, text=b""):
     return made
 
 
+LATE = b"HTTP/1.1 408 "
+
+
 def everything(made):
     """All that comes until the other side closes."""
     found = b""
@@ -129,14 +132,34 @@ def healthy(address):
     return everything(made).startswith(b"HTTP/1.1 200 ")
 
 
+@pytest.mark.parametrize("given", [b"\xb2", b"9" * 30, b"-1"], ids=["digit", "large", "below"])
+def test_a_last_event_id_that_is_none_opens_a_stream(api, given):
+    made = connect(api, b"GET /events HTTP/1.1\r\nHost: x\r\nLast-Event-ID: " + given + b"\r\n\r\n")
+    found = b""
+    while b": connected" not in found:
+        chunk = made.recv(65536)
+        assert chunk, found
+        found += chunk
+    assert found.startswith(b"HTTP/1.1 200 ")
+    made.close()
+
+
 def test_one_address_has_its_share(settings):
     with in_process(settings, connections_per_address=5) as (address, _):
+        # Of connections that say nothing the oldest makes room, at once.
+        silent = [socket.create_connection(address, timeout=10) for _ in range(7)]
+        assert healthy(address)
         kept = [socket.create_connection(address, timeout=10) for _ in range(5)]
+        for made in kept:
+            made.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert made.recv(65536).startswith(b"HTTP/1.1 200 ")
+        # Five that were answered and are kept open are the address's share.
         assert everything(socket.create_connection(address, timeout=10)).startswith(
             b"HTTP/1.1 503 "
         )
         kept[0].close()
         wait_for(lambda: healthy(address), 10)
+        assert everything(silent[0])[: len(LATE)] in (b"", LATE)
 
 
 def test_answers_do_not_wait_for_acknowledgements(settings):

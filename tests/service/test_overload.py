@@ -113,7 +113,7 @@ def test_a_lane_refuses_at_once_what_it_has_no_place_for():
         async with lane.turn():
             waiter = asyncio.create_task(lane.turn().__aenter__())
             await asyncio.sleep(0)
-            with pytest.raises(OverloadedError, match="1 requests wait already"):
+            with pytest.raises(OverloadedError, match="and 1 requests wait"):
                 lane.check()
             with pytest.raises(OverloadedError, match="no turn came within"):
                 await waiter
