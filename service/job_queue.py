@@ -4,20 +4,22 @@ Jobs are rows of the same SQLite file, so enqueueing is part of the caller's tra
 here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs.
 """
 
+import contextlib
 import logging
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
+from dbos._error import DBOSQueueDeduplicatedError  # its public home names it in a docstring only
 from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
+from service.store import engine_jobs
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
-TRAIN_QUEUE, ESTIMATE_QUEUE, HOUSEKEEPING_QUEUE = "train", "estimate", "housekeeping"
-DELIVER_QUEUE = "deliver"
+TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 
@@ -43,19 +45,31 @@ class JobQueue:
         )
 
     def enqueue_estimate(self, session: Session, camera_id: str) -> None:
-        """Queue a look at a camera's new tracks; at most one of a camera runs at once."""
-        self._enqueue(
-            session,
-            {
-                "workflow_name": ESTIMATE_JOB,
-                "queue_name": ESTIMATE_QUEUE,
-                "queue_partition_key": camera_id,
-            },
-            camera_id,
-        )
+        """Queue a look at a camera's new tracks, unless one waits or runs already.
+
+        While one runs, the camera's mark "due" stays: the next round of the upkeep sees it.
+        """
+        options: EnqueueOptions = {
+            "workflow_name": ESTIMATE_JOB,
+            "queue_name": ESTIMATE_QUEUE,
+            "deduplication_id": camera_id,
+        }
+        # On SQLite a refused insert leaves the caller's transaction as it was; another database
+        # would need a savepoint around it.
+        with contextlib.suppress(DBOSQueueDeduplicatedError):
+            self._enqueue(session, options, camera_id)
+
+    def cameras_under_way(self, session: Session) -> set[str]:
+        """The cameras for which an estimate job waits or runs."""
+        return engine_jobs.deduplicated(session, ESTIMATE_QUEUE)
 
     def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
-        """Queue the sending of what a webhook is due; at most one of a webhook runs at once."""
+        """Queue the sending of what a webhook is due, unless a job waits to start that does.
+
+        At most one of a webhook runs at once.
+        """
+        if engine_jobs.waits(session, DELIVER_QUEUE, webhook_id):
+            return
         self._enqueue(
             session,
             {

@@ -7,6 +7,7 @@ import signal
 import uvicorn
 
 from service.app import create_app
+from service.jobs import exits
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -26,7 +27,11 @@ def run_service(settings: Settings) -> None:
             timeout_graceful_shutdown=3,
         )
         server = uvicorn.Server(config)
-        with local_workers(settings):
+
+        def give_up() -> None:
+            server.should_exit = True
+
+        with local_workers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
@@ -34,3 +39,5 @@ def run_service(settings: Settings) -> None:
                 signal.signal(number, lambda *_: None)
             server.run(sockets=[listener])
     log.info("stopped")
+    if workers.refused:
+        raise SystemExit(exits.REFUSED)

@@ -1,14 +1,24 @@
-"""The periodic jobs: reconcile every few seconds, retention every hour."""
+"""The rounds of the upkeep: sweep twice a second, reconcile every few, retention every hour."""
 
 import logging
 
 from service.jobs.context import JobContext
 from service.recalibration import deliveries, upkeep
+from service.recalibration.staleness import StaleWatch
 
 log = logging.getLogger("surefoot.jobs")
 
 
-def run_reconcile(context: JobContext) -> None:
+def run_sweep(context: JobContext) -> None:
+    """Queue a look at cameras that were posted to while they were looked at, or rested."""
+    with context.store.read() as session:
+        overlooked = upkeep.overlooked(session, context.queue)
+    if overlooked:
+        with context.store.write() as session:
+            upkeep.queue_overlooked(session, context.queue, overlooked)
+
+
+def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
     """Enqueue what the store says should be under way; a lost nudge costs seconds."""
     with context.store.read() as session:
         ids = upkeep.camera_ids(session)
@@ -24,6 +34,9 @@ def run_reconcile(context: JobContext) -> None:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
     with context.store.write() as session:
         upkeep.reconcile_alerts(session)
+        changed = stale.watch(session, context.settings)
+    for camera_id, change in changed.items():
+        log.warning("stale", extra={"camera_id": camera_id, "alert": change})
 
 
 def run_retention(context: JobContext) -> None:

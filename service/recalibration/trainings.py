@@ -14,6 +14,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
+from service.recalibration.looking import may_look
 from service.settings import Settings
 from service.store import cameras, events, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
@@ -161,12 +162,18 @@ def camera_step_s(session: Session, camera_id: str) -> float:
     return choose_step_s([trajectory_of(track) for track in newest])
 
 
+def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
+    """Whether a training is to go on: neither cancelled, deleted nor taken over."""
+    record = trainings.find(session, attempt.training_id)
+    return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
+
+
 def report_progress(
     session: Session, attempt: TrainingAttempt, step: int, steps: int, loss: float, eta_s: float
 ) -> bool:
     """Write how far a training is; False tells the worker to stop."""
     record = trainings.find(session, attempt.training_id)
-    if record is None or record.attempt != attempt.attempt or record.cancel_requested:
+    if record is None or not is_wanted(session, attempt):
         return False
     # Twenty events a training are enough for a progress bar.
     tells = steps > 0 and step * 20 // steps != record.step * 20 // steps
@@ -224,11 +231,16 @@ def end_training(
 
 
 def request_estimate(session: Session, queue: JobQueue, camera_id: str) -> None:
-    """Have a camera's tracks looked at; requests that wait already cover this one."""
+    """Have a camera's tracks looked at; requests that wait already cover this one.
+
+    One that rests, or is being looked at, is queued by the upkeep when its time has come.
+    """
     camera = cameras.find(session, camera_id)
     if camera is not None and camera.estimate_due_at is None:
-        camera.estimate_due_at = datetime.now(UTC)
-        queue.enqueue_estimate(session, camera_id)
+        now = datetime.now(UTC)
+        camera.estimate_due_at = now
+        if may_look(camera, now):
+            queue.enqueue_estimate(session, camera_id)
 
 
 def _stop(session: Session, record: TrainingRecord) -> None:

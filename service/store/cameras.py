@@ -1,9 +1,8 @@
 """Statements on cameras and their prior poses."""
 
 from collections.abc import Sequence
-from datetime import datetime
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import CameraRecord, PriorPoseRecord
@@ -45,11 +44,24 @@ def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorP
     ).all()
 
 
-def longest_due(session: Session) -> datetime | None:
-    """Since when the tracks of the camera that waits longest have waited."""
+def due(session: Session) -> Sequence[CameraRecord]:
+    """Cameras that are to be looked at, those first that have been due for longest."""
     return session.scalars(
-        select(CameraRecord.estimate_due_at)
+        select(CameraRecord)
         .where(CameraRecord.estimate_due_at.is_not(None))
-        .order_by(CameraRecord.estimate_due_at)
-        .limit(1)
-    ).first()
+        .order_by(CameraRecord.estimate_due_at, CameraRecord.id)
+    ).all()
+
+
+def failing(session: Session) -> Sequence[CameraRecord]:
+    """Cameras whose last look failed."""
+    return session.scalars(
+        select(CameraRecord)
+        .where(CameraRecord.estimate_failing_since.is_not(None))
+        .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
+    ).all()
+
+
+def count(session: Session) -> int:
+    """How many cameras there are."""
+    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
