@@ -113,7 +113,7 @@ class Settings(BaseSettings):
         21_600.0, gt=1, description="a training that takes longer has failed"
     )
     worker_max_mb: int = Field(
-        1_500, ge=300, description="a worker that grows beyond ends its jobs and is started anew"
+        1_500, ge=50, description="a worker that grows beyond ends its jobs and is started anew"
     )
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 

@@ -1,12 +1,32 @@
 """The rounds of the upkeep: sweep twice a second, reconcile every few, retention every hour."""
 
 import logging
+import time
+from datetime import timedelta
 
 from service.jobs.context import JobContext
 from service.recalibration import deliveries, upkeep
 from service.recalibration.staleness import StaleWatch
 
 log = logging.getLogger("surefoot.jobs")
+_JUMP_S = 2.0
+
+
+class ClockWatch:
+    """Sees that the clock was set back, and has what waits for a time wait no longer for it."""
+
+    def __init__(self) -> None:
+        self._ahead_s = time.time() - time.monotonic()
+
+    def look(self, context: JobContext) -> None:
+        """Compare the clock with the monotonic one, that nobody sets."""
+        ahead_s = time.time() - time.monotonic()
+        back_s, self._ahead_s = self._ahead_s - ahead_s, ahead_s
+        if back_s < _JUMP_S:
+            return
+        with context.store.write() as session:
+            moved = deliveries.follow_clock(session, timedelta(seconds=back_s))
+        log.warning("clock_set_back", extra={"by_s": round(back_s), "deliveries": moved})
 
 
 def run_sweep(context: JobContext) -> None:

@@ -1,4 +1,4 @@
-"""How much memory a worker holds, and keeping the allocator from holding what is free."""
+"""How much memory a process holds, and keeping its allocator from holding what is free."""
 
 import ctypes
 import logging
@@ -18,7 +18,9 @@ def settle_allocator() -> None:
         # Jobs run in changing threads; glibc gives each up to an arena of its own, and keeps in
         # every one what its largest job needed.
         libc.mallopt(_M_ARENA_MAX, 2)
-        # Fixed: left alone it grows to 32 MB, and the arrays of estimates fragment the heap.
+        # Fixed: left alone it grows to 32 MB. Then the buffers that oneDNN makes anew for each
+        # length of walk lie in the heap and split it: a training grew from 435 to 959 MB in 160
+        # steps, of which 600 were free; so it stays at 405.
         libc.mallopt(_M_MMAP_THRESHOLD, _MMAP_FROM_BYTES)
     except (OSError, AttributeError):
         log.info("allocator_unknown")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from service.jobs import engine
 from service.jobs.context import JobContext
-from service.jobs.housekeeping import run_reconcile, run_retention, run_sweep
+from service.jobs.housekeeping import ClockWatch, run_reconcile, run_retention, run_sweep
 from service.jobs.rhythms import run_rhythms
 from service.recalibration.staleness import StaleWatch
 
@@ -22,6 +22,7 @@ log = logging.getLogger("surefoot.worker")
 UPKEEP = "upkeep"
 _TICK_S = 0.25
 _SWEEP_S = 0.5
+_CLOCK_S = 1.0
 _HOUR_S = 3600.0
 _FIRST_HOURLY_S = 120.0  # a service that is restarted every half an hour has its turn too
 
@@ -65,9 +66,10 @@ def _go(context: JobContext) -> None:
 
 
 def _rounds(context: JobContext, now_s: float) -> list[Round]:
-    stale = StaleWatch()
+    stale, clock = StaleWatch(), ClockWatch()
     hourly_s = now_s + _FIRST_HOURLY_S
     return [
+        Round("clock", _CLOCK_S, lambda: clock.look(context), now_s),
         Round("sweep", _SWEEP_S, lambda: run_sweep(context), now_s),
         Round(
             "reconcile",

@@ -15,6 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from service.jobs.memory import settle_allocator
 from service.logs import configure_logs
 
 log = logging.getLogger("surefoot.jobs")
@@ -30,6 +31,7 @@ def main() -> None:
     # Beside this, even the idle class would let a busy machine stop trainings for good.
     with contextlib.suppress(OSError):
         os.nice(order["nice"])
+    settle_allocator()
     configure_logs()
     tells.write(json.dumps(_train(order, tells)) + "\n")
 
