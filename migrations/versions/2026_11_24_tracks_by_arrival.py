@@ -2,8 +2,8 @@
 
 from alembic import op
 
-revision = "2026_11_22_tracks_by_arrival"
-down_revision = "2026_11_22_failing_cameras"
+revision = "2026_11_24_tracks_by_arrival"
+down_revision = "2026_11_24_failing_cameras"
 branch_labels = None
 depends_on = None
 

@@ -3,8 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
-revision = "2026_11_22_failing_cameras"
-down_revision = "2026_11_22_snapshots"
+revision = "2026_11_24_failing_cameras"
+down_revision = "2026_11_23_activity"
 branch_labels = None
 depends_on = None
 

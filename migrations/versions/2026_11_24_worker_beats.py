@@ -3,8 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
-revision = "2026_11_22_worker_beats"
-down_revision = "2026_11_22_tracks_by_arrival"
+revision = "2026_11_24_worker_beats"
+down_revision = "2026_11_24_tracks_by_arrival"
 branch_labels = None
 depends_on = None
 
