@@ -6,6 +6,7 @@ here imports torch; the HTTP process holds a `JobQueue`, the worker process runs
 
 import contextlib
 import logging
+import secrets
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
@@ -20,6 +21,7 @@ APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
+_UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 
@@ -43,6 +45,23 @@ class JobQueue:
             },
             training_id,
         )
+
+    def requeue_training(self, session: Session, camera_id: str, training_id: str) -> bool:
+        """Queue a training again whose job has failed or is gone; False where it is under way."""
+        known = engine_jobs.statuses(session, f"train-{training_id}")
+        if any(status in _UNDER_WAY for status in known):
+            return False
+        self._enqueue(
+            session,
+            {
+                "workflow_name": TRAIN_JOB,
+                "queue_name": TRAIN_QUEUE,
+                "workflow_id": f"train-{training_id}-again-{secrets.token_hex(4)}",
+                "queue_partition_key": camera_id,
+            },
+            training_id,
+        )
+        return True
 
     def enqueue_estimate(self, session: Session, camera_id: str) -> None:
         """Queue a look at a camera's new tracks, unless one waits or runs already.

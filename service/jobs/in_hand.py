@@ -36,10 +36,10 @@ class InHand:
             with self._lock:
                 del self._tasks[id(task)]
 
-    def of_kind(self, kind: str) -> int:
-        """How many tasks of a kind are in hand."""
+    def of_kind(self, *kinds: str) -> int:
+        """How many tasks of some kinds are in hand."""
         with self._lock:
-            return sum(task.kind == kind for task in self._tasks.values())
+            return sum(task.kind in kinds for task in self._tasks.values())
 
     def overdue(self) -> Task | None:
         """A task that has gone on beyond the limit of its kind."""

@@ -65,7 +65,8 @@ def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
     log.info("worker_started", extra={"worker": name, "pid": os.getpid()})
     status = _mind(context, name)
     log.info("worker_stopping", extra={"worker": name})
-    engine.stop(0.0).join(BEAT_S)
+    if status == 0:
+        engine.stop(0.0).join(BEAT_S)
     # A training in hand is parked, not ended (see jobs/train.py); its thread is not waited for.
     logging.shutdown()
     os._exit(status)
@@ -88,7 +89,8 @@ def _mind(context: JobContext, name: str) -> int:
         except SQLAlchemyError as error:  # a full disk, say: the store's trouble, not ours
             log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
         if draining is not None:
-            if not draining.is_alive():
+            # A training beyond its own ceiling is not waited for: it would be minutes.
+            if not draining.is_alive() or not context.in_hand.of_kind(ESTIMATE_JOB, DELIVER_JOB):
                 return exits.FULL
             continue
         if time.monotonic() - trimmed_s > _TRIM_EVERY_S:

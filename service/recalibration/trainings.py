@@ -24,6 +24,7 @@ from service.store.tables import ModelRecord, PriorPoseRecord, TrainingRecord
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
+_ATTEMPTS = 10  # at a training that never comes to an end by itself
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -188,6 +189,21 @@ def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
     """Whether a training is to go on: neither cancelled, deleted nor taken over."""
     record = trainings.find(session, attempt.training_id)
     return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
+
+
+def requeue_lost(session: Session, queue: JobQueue, camera_id: str) -> bool:
+    """Queue those of a camera's trainings again that the engine has lost; whether there were any.
+
+    One that has been taken up again and again fails instead.
+    """
+    found = False
+    for record in trainings.unfinished(session, camera_id):
+        if not queue.requeue_training(session, camera_id, record.id):
+            continue
+        found = True
+        if record.attempt >= _ATTEMPTS:
+            _finish(session, record, "failed", f"given up after {record.attempt} attempts")
+    return found
 
 
 def report_progress(

@@ -13,7 +13,12 @@ from service.recalibration.looking import may_look
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
 from service.recalibration.silence import end_silences
-from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
+from service.recalibration.trainings import (
+    camera_step_s,
+    queue_training,
+    request_estimate,
+    requeue_lost,
+)
 from service.settings import Settings
 from service.store import (
     activity,
@@ -45,6 +50,8 @@ def reconcile_camera(
     if reason is not None:
         queue_training(session, queue, settings, camera_id)
         found.append(reason)
+    if requeue_lost(session, queue, camera_id):
+        found.append("training without a job")
     if camera.estimate_due_at is None and _is_behind(session, settings, camera):
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")

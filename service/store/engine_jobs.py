@@ -12,6 +12,9 @@ _WAITS = text(
     "SELECT 1 FROM workflow_status WHERE queue_name = :queue AND status = 'ENQUEUED' "
     "AND queue_partition_key = :key LIMIT 1"
 )
+_STATUS = text(
+    "SELECT status FROM workflow_status WHERE workflow_uuid = :id OR workflow_uuid LIKE :again"
+)
 
 
 def deduplicated(session: Session, queue: str) -> set[str]:
@@ -22,3 +25,8 @@ def deduplicated(session: Session, queue: str) -> set[str]:
 def waits(session: Session, queue: str, key: str) -> bool:
     """Whether a job of a queue's partition waits to start."""
     return session.scalar(_WAITS, {"queue": queue, "key": key}) is not None
+
+
+def statuses(session: Session, job_id: str) -> list[str]:
+    """The statuses of a job and of those that were queued in its place, `<id>-again-...`."""
+    return list(session.scalars(_STATUS, {"id": job_id, "again": f"{job_id}-again-%"}))

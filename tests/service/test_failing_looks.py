@@ -249,3 +249,28 @@ def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
     let_rest_end(newcomer)
     with context.store.read() as session:
         assert upkeep.overlooked(session, context.queue) == ["corner"]
+
+
+def test_a_training_that_the_engine_lost_is_queued_again_and_at_last_fails(newcomer):
+    context = newcomer.context
+
+    def reconcile():
+        with context.store.write() as session:
+            return upkeep.reconcile_camera(session, context.queue, context.settings, "corner")
+
+    def training():
+        return newcomer.http.get("/cameras/corner/trainings").json()["items"][0]
+
+    assert reconcile() == []  # its job waits
+    spoil_jobs = text("UPDATE workflow_status SET status = 'ERROR' WHERE name = 'train'")
+    with context.store.write() as session:
+        session.execute(spoil_jobs)
+    assert reconcile() == ["training without a job"]
+    assert reconcile() == []
+    with context.store.write() as session:
+        session.execute(spoil_jobs)
+        session.execute(text("UPDATE trainings SET attempt = 10"))
+    assert reconcile() == ["training without a job"]
+    assert training()["state"] == "failed"
+    assert "10 attempts" in training()["error"]
+    assert reconcile() == []

@@ -37,6 +37,9 @@ class Recorder:
     def enqueue_training(self, session, camera_id, training_id):
         self.trainings.append(training_id)
 
+    def requeue_training(self, session, camera_id, training_id):
+        return False
+
     def enqueue_estimate(self, session, camera_id):
         self.estimates.append(camera_id)
 
