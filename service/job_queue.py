@@ -22,6 +22,8 @@ APPLICATION = "surefoot"
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
 _UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
+# Of the engine's tables those that nothing works without.
+ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 

@@ -11,6 +11,7 @@ from typing import IO
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.errors import OverloadedError
 from service.jobs import exits
 from service.recalibration.workforce import note_trouble
 from service.settings import Settings
@@ -134,7 +135,7 @@ class LocalWorkers:
         try:
             with self._store.write() as session:
                 note_trouble(session, name, trouble)
-        except SQLAlchemyError as error:
+        except (SQLAlchemyError, OverloadedError) as error:
             log.warning("trouble_not_noted", extra={"worker": name, "why": str(error)})
 
 

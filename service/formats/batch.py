@@ -1,8 +1,7 @@
 """Requests that carry tracks: JSON, NDJSON and MOTChallenge text."""
 
 import json
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from functools import partial
 from typing import Any, NoReturn
@@ -10,6 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from service.errors import FieldError, MalformedError, TooLargeError
+from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
 from service.formats.track import (
     MAX_ID_LENGTH,
     MAX_TRACKS,
@@ -19,10 +19,13 @@ from service.formats.track import (
     Rejection,
     TrackRejectedError,
     check_track,
+    is_text,
     read_track,
+    track_name,
 )
 
 DEFAULT_SOURCE = "unnamed"
+_FAR_S = 1e12
 
 
 def read_json(body: bytes, clock: Clock, size: tuple[int, int]) -> Batch:
@@ -38,13 +41,13 @@ def read_json(body: bytes, clock: Clock, size: tuple[int, int]) -> Batch:
         TooLargeError: too many tracks.
     """
     try:
-        document = json.loads(body)
+        document = read_document(body)
     except (ValueError, RecursionError) as error:
         raise _malformed("", f"not JSON: {error}") from error
     if not isinstance(document, dict):
         raise _malformed("", f"an object with tracks is needed, got {type(document).__name__}")
     tracks = document.get("tracks")
-    if not isinstance(tracks, list):
+    if not isinstance(tracks, list | TrackTexts):
         raise _malformed("/tracks", "a list of tracks is needed")
     _check_count(len(tracks))
     source = read_source(document.get("source", DEFAULT_SOURCE), "/source")
@@ -53,10 +56,13 @@ def read_json(body: bytes, clock: Clock, size: tuple[int, int]) -> Batch:
         frame_rate_hz=clock.frame_rate_hz if rate is None else read_rate(rate, "/frame_rate_hz"),
         started_at_s=clock.started_at_s if start is None else read_time(start, "/started_at"),
     )
-    return _collect(
-        (index, raw, partial(read_track, raw, source, clock, size))
-        for index, raw in enumerate(tracks)
-    )
+    try:
+        return _collect(
+            (index, raw, partial(read_track, raw, source, clock, size))
+            for index, raw in enumerate(tracks)
+        )
+    except (ValueError, RecursionError) as error:
+        raise _malformed("", f"not JSON: {error}") from error
 
 
 def read_ndjson(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> Batch:
@@ -67,15 +73,18 @@ def read_ndjson(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -
     """
     lines = [line for line in body.split(b"\n") if line.strip()]
     _check_count(len(lines))
-    items: list[tuple[int, Any, Callable[[], IncomingTrack]]] = []
-    for index, line in enumerate(lines):
-        try:
-            raw = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            items.append((index, None, partial(_refuse, f"not JSON: {error}")))
-        else:
-            items.append((index, raw, partial(read_track, raw, source, clock, size)))
-    return _collect(items)
+
+    def items() -> Iterator[tuple[int, Any, Callable[[], IncomingTrack]]]:
+        for index, line in enumerate(lines):
+            try:
+                large = len(line) > MAX_TRACK_CHARS
+                raw = OversizedTrack(characters=len(line)) if large else json.loads(line)
+            except (ValueError, RecursionError) as error:
+                yield index, None, partial(_refuse, f"not JSON: {error}")
+            else:
+                yield index, raw, partial(read_track, raw, source, clock, size)
+
+    return _collect(items())
 
 
 def read_mot(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> Batch:
@@ -116,7 +125,9 @@ def read_mot(body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> B
         if track_id in broken:
             _refuse(broken[track_id])
         array = np.array(rows[track_id], dtype=np.float64).reshape(-1, 5)
-        return check_track(track_id, source, array[np.argsort(array[:, 0], kind="stable")], size)
+        return check_track(
+            track_name(track_id), source, array[np.argsort(array[:, 0], kind="stable")], size
+        )
 
     return _collect(
         (index, {"id": track_id}, partial(read, track_id)) for index, track_id in enumerate(rows)
@@ -129,8 +140,9 @@ def read_source(value: Any, pointer: str) -> str:
     Raises:
         MalformedError: no text of 1 to 200 characters.
     """
-    if not isinstance(value, str) or not 1 <= len(value) <= MAX_ID_LENGTH:
-        raise _malformed(pointer, f"text of 1 to {MAX_ID_LENGTH} characters is needed")
+    if not isinstance(value, str) or not 1 <= len(value) <= MAX_ID_LENGTH or not is_text(value):
+        reason = f"text of 1 to {MAX_ID_LENGTH} characters is needed, none of them NUL or half one"
+        raise _malformed(pointer, reason)
     return value
 
 
@@ -159,7 +171,8 @@ def read_time(value: Any, pointer: str) -> float:
         if moment.tzinfo is None:
             raise _malformed(pointer, f"a time with its zone is needed, got {value!r:.40}")
         return moment.timestamp()
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    # A whole number may be larger than any float.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _FAR_S:
         raise _malformed(pointer, f"RFC 3339 or seconds since 1970 are needed, got {value!r:.40}")
     return float(value)
 
@@ -175,12 +188,16 @@ def _collect(items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]]) -> B
             rejections.append(
                 Rejection(
                     index=index,
-                    track_id=str(name)[:MAX_ID_LENGTH] if known else None,
+                    track_id=_sendable(str(name)[:MAX_ID_LENGTH]) if known else None,
                     code=refused.code,
                     detail=refused.detail,
                 )
             )
     return Batch(tracks=tuple(tracks), rejections=tuple(rejections))
+
+
+def _sendable(text: str) -> str:
+    return text.encode("utf-8", errors="replace").decode()
 
 
 def _refuse(detail: str) -> NoReturn:

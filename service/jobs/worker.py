@@ -10,6 +10,7 @@ import time
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.jobs import engine, exits
 from service.jobs.context import JobContext
@@ -86,7 +87,10 @@ def _mind(context: JobContext, name: str) -> int:
                 return exits.GIVEN_UP
             if lost and draining is None:
                 engine.take_over(lost)
-        except SQLAlchemyError as error:  # a full disk, say: the store's trouble, not ours
+        except (
+            SQLAlchemyError,
+            OverloadedError,
+        ) as error:  # a full disk, say: the store's trouble, not ours
             log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
         if draining is not None:
             # A training beyond its own ceiling is not waited for: it would be minutes.

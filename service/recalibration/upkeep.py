@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_empty_groups
 from service.recalibration.looking import may_look
+from service.recalibration.maintenance import note_ends
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
 from service.recalibration.silence import end_silences
@@ -55,6 +56,8 @@ def reconcile_camera(
     if camera.estimate_due_at is None and _is_behind(session, settings, camera):
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
+    if note_ends(session, camera_id, datetime.now(UTC)):
+        found.append("maintenance that has come to its end")
     presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
     if presence is not None:
         found.append(presence)

@@ -9,10 +9,12 @@ from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.track import Batch, Clock
 from service.recalibration import cameras, tracks
-from service.routes.state import BodyDep, ReadDep, StateDep
+from service.routes.state import BodyDep, StateDep
 from service.schemas.tracks import ReceiptOut
 
 router = APIRouter(tags=["tracks"])
+
+_LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
 
 _DESCRIBED_BODY = {
     "requestBody": {
@@ -41,24 +43,34 @@ def read_batch(
     camera_id: str,
     request: Request,
     body: BodyDep,
-    session: ReadDep,
+    state: StateDep,
     source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
     frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
     started_at: str | None = None,
 ) -> Batch:
-    """The tracks of a request, read before the write lock is taken.
+    """The tracks of a request, read while no session is open.
 
     Raises:
         NotFoundError: there is no such camera.
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
+        OverloadedError: other large bodies are being read all the time.
     """
-    camera = cameras.require_camera(session, camera_id)
+    source = formats.read_source(source, "/source")
+    with state.store.read() as session:
+        camera = cameras.require_camera(session, camera_id)
     size = (camera.width, camera.height)
     clock = Clock(
         frame_rate_hz=frame_rate_hz or camera.frame_rate_hz,
         started_at_s=None if started_at is None else formats.read_time(started_at, "/started_at"),
     )
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if len(body) > _LARGE:
+        with state.large_bodies.turn(state.settings.http_wait_s):
+            return _read(media_type, body, source, clock, size)
+    return _read(media_type, body, source, clock, size)
+
+
+def _read(media_type: str, body: bytes, source: str, clock: Clock, size: tuple[int, int]) -> Batch:
     if media_type == "application/json":
         return formats.read_json(body, clock, size)
     if media_type == "application/x-ndjson":
@@ -76,6 +88,8 @@ def post_tracks(
     camera_id: str, batch: Annotated[Batch, Depends(read_batch)], state: StateDep
 ) -> ReceiptOut:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk."""
+    with state.store.read() as session:
+        state.quota.check(session, camera_id, batch)
     with state.store.write() as session:
         cameras.require_camera(session, camera_id)
         receipt = tracks.receive_tracks(session, state.queue, camera_id, batch)

@@ -24,6 +24,11 @@ def every(session: Session) -> Sequence[CameraRecord]:
     return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
 
 
+def count(session: Session) -> int:
+    """How many cameras there are."""
+    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
+
+
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
     """The pose that a camera is trusted to have had last."""
     return session.scalars(
@@ -60,8 +65,3 @@ def failing(session: Session) -> Sequence[CameraRecord]:
         .where(CameraRecord.estimate_failing_since.is_not(None))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()
-
-
-def count(session: Session) -> int:
-    """How many cameras there are."""
-    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0

@@ -124,7 +124,8 @@ class SiteReferenceRecord(Record):
     It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
     is unset. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
-    `changed_s` when it started.
+    `changed_s` when it started. `answer` is what a person said last of how the camera stands:
+    estimates of before `answered_at` say nothing of it any more.
     """
 
     __tablename__ = "site_references"
@@ -132,7 +133,7 @@ class SiteReferenceRecord(Record):
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    origin: Mapped[str]  # registered, changed, accepted, reset
+    origin: Mapped[str]  # registered, changed, accepted, reset, put_back
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
     to_s: Mapped[float | None]
@@ -144,6 +145,9 @@ class SiteReferenceRecord(Record):
     doubt: Mapped[str]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
+    answer: Mapped[str | None]  # put_back, false_alarm
+    answered_by: Mapped[str | None]
+    answered_at: Mapped[datetime | None]
     created_at: Mapped[datetime]
     ready_at: Mapped[datetime | None]
 

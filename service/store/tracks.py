@@ -53,17 +53,23 @@ class StillBounds:
 
 def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
     """Insert tracks; one that is already stored stays as it is. Returns how many are new."""
-    added = 0
-    for row in rows:
-        result = session.execute(insert(TrackRecord).values(row).on_conflict_do_nothing())
-        added += int(result.rowcount)  # type: ignore[attr-defined]
-    return added
+    if not rows:
+        return 0
+    # One statement for all of them: others wait for the lock meanwhile.
+    statement = insert(TrackRecord.__table__).on_conflict_do_nothing()  # type: ignore[arg-type]
+    return session.connection().execute(statement, rows).rowcount
 
 
 def count(session: Session, camera_id: str) -> int:
     """How many tracks are stored."""
     query = select(func.count()).select_from(TrackRecord)
     return session.scalar(query.where(TrackRecord.camera_id == camera_id)) or 0
+
+
+def stored_bytes(session: Session, camera_id: str) -> int:
+    """How many bytes the points and boxes of a camera's tracks have."""
+    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
 
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
