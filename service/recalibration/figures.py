@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from service.recalibration.camera_state import PoseState, Standing, standings
 from service.recalibration.outbox import is_silenced
 from service.settings import Settings
-from service.store import cameras, events, figures, tracks, webhooks
+from service.store import cameras, events, figures, unseen, webhooks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,7 @@ def take_figures(session: Session, settings: Settings) -> Figures:
     now = datetime.now(UTC)
     unseen_s = {
         camera_id: max((now - at).total_seconds(), 0.0)
-        for camera_id, (_, at) in tracks.unseen_since(session).items()
+        for camera_id, (_, at) in unseen.since(session).items()
     }
     workers = figures.workers(session)
     return Figures(

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store import cameras, events, probes, tracks, workers
+from service.store import cameras, events, probes, unseen, workers
 from service.store.database import Store
 from service.store.failures import failure_of
 from service.store.tables import EventRecord
@@ -45,7 +45,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
             troubles = workers.troubles(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
-            unseen = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
+            came = {camera_id: at for camera_id, (_, at) in unseen.since(session).items()}
     except (SQLAlchemyError, OverloadedError) as error:
         known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
         said = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
@@ -62,7 +62,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     silent_s = None if heartbeat is None else abs((now - heartbeat).total_seconds())
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     # Who fails is named below, and rests between its tries: it does not hold up the queue.
-    waits_s = _oldest_s([at for camera, at in unseen.items() if camera not in failing], now)
+    waits_s = _oldest_s([at for camera, at in came.items() if camera not in failing], now)
     problems = []
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
     full = free_mb < _FULL_MB
@@ -90,7 +90,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         store_writable=not full,
         worker_alive=alive,
         worker_silent_s=silent_s,
-        queue_lag_s=_oldest_s(list(unseen.values()), now),
+        queue_lag_s=_oldest_s(list(came.values()), now),
         failing_cameras=len(failing),
         ready=not problems,
         problems=(*problems, *named),

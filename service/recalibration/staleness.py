@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.recalibration.alerts import end_alert, open_alert
 from service.settings import Settings
-from service.store import alerts, cameras, tracks
+from service.store import alerts, cameras, unseen
 from service.store.tables import CameraRecord
 
 KIND = "stale"
@@ -37,9 +37,9 @@ class StaleWatch:
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
         """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
         now_s = time.monotonic()
-        unseen = tracks.unseen_since(session)
+        oldest = unseen.since(session)
         self._waiting = {
-            camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in unseen.items()
+            camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
         }
         firing = alerts.firing_cameras(session, KIND)
         found = {}

@@ -24,7 +24,6 @@ from service.store.tables import ModelRecord, PriorPoseRecord, TrainingRecord
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
-_ATTEMPTS = 10  # at a training that never comes to an end by itself
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -142,7 +141,7 @@ def begin_training(
     if record is None or record.state not in trainings.UNFINISHED:
         return None
     if record.cancel_requested:
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
         return None
     camera = cameras.find(session, record.camera_id)
     assert camera is not None
@@ -191,21 +190,6 @@ def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
     return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
 
 
-def requeue_lost(session: Session, queue: JobQueue, camera_id: str) -> bool:
-    """Queue those of a camera's trainings again that the engine has lost; whether there were any.
-
-    One that has been taken up again and again fails instead.
-    """
-    found = False
-    for record in trainings.unfinished(session, camera_id):
-        if not queue.requeue_training(session, camera_id, record.id):
-            continue
-        found = True
-        if record.attempt >= _ATTEMPTS:
-            _finish(session, record, "failed", f"given up after {record.attempt} attempts")
-    return found
-
-
 def report_progress(
     session: Session, attempt: TrainingAttempt, step: int, steps: int, loss: float, eta_s: float
 ) -> bool:
@@ -237,7 +221,7 @@ def publish_model(
     if record is None or record.attempt != attempt.attempt or record.state != "running":
         return
     if record.cancel_requested:
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
         return
     session.add(
         ModelRecord(
@@ -255,7 +239,7 @@ def publish_model(
     )
     record.metrics = metrics
     record.step, record.eta_s = record.steps, 0.0
-    _finish(session, record, "succeeded")
+    finish(session, record, "succeeded")
     request_estimate(session, queue, record.camera_id)
 
 
@@ -265,7 +249,7 @@ def end_training(
     """Mark this attempt as failed or cancelled; another attempt's record stays as it is."""
     record = trainings.find(session, attempt.training_id)
     if record is not None and record.attempt == attempt.attempt and record.state == "running":
-        _finish(session, record, state, error)
+        finish(session, record, state, error)
 
 
 def request_estimate(session: Session, queue: JobQueue, camera_id: str) -> None:
@@ -284,10 +268,11 @@ def request_estimate(session: Session, queue: JobQueue, camera_id: str) -> None:
 def _stop(session: Session, record: TrainingRecord) -> None:
     record.cancel_requested = True
     if record.state == "queued":
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
 
 
-def _finish(session: Session, record: TrainingRecord, state: str, error: str | None = None) -> None:
+def finish(session: Session, record: TrainingRecord, state: str, error: str | None = None) -> None:
+    """End a training, and tell of it."""
     record.state = state
     record.error = error
     record.finished_at = datetime.now(UTC)

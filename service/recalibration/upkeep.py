@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_empty_groups
 from service.recalibration.looking import may_look
+from service.recalibration.lost_trainings import requeue_lost
 from service.recalibration.maintenance import note_ends
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
@@ -18,7 +19,6 @@ from service.recalibration.trainings import (
     camera_step_s,
     queue_training,
     request_estimate,
-    requeue_lost,
 )
 from service.settings import Settings
 from service.store import (

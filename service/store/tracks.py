@@ -137,25 +137,6 @@ def newest_pk(session: Session, camera_id: str) -> int | None:
     )
 
 
-def unseen_since(session: Session) -> dict[str, tuple[int, datetime]]:
-    """The oldest track of each camera that no estimate job has looked at, and when it came."""
-    first = (
-        select(func.min(TrackRecord.id))
-        .where(
-            TrackRecord.camera_id == CameraRecord.id,
-            TrackRecord.id > func.coalesce(CameraRecord.looked_at_pk, -1),
-        )
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )
-    rows = session.execute(
-        select(CameraRecord.id, TrackRecord.id, TrackRecord.received_at).join(
-            TrackRecord, TrackRecord.id == first
-        )
-    )
-    return {camera_id: (pk, received_at) for camera_id, pk, received_at in rows}
-
-
 def window(session: Session, bounds: WindowBounds) -> Sequence[TrackRecord]:
     """The tracks of a window in the order of their ends."""
     return session.scalars(
