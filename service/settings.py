@@ -58,7 +58,10 @@ class Settings(BaseSettings):
     )
     seed: int = Field(0, ge=0, description="seed of trainings and bootstraps")
     trainings_at_once: int = Field(1, ge=1, description="over all workers")
-    training_threads: int = Field(1, ge=1, description="CPU threads of a worker process")
+    training_nice: int = Field(
+        19, ge=0, le=19, description="how much a training yields to all else; 0: not at all"
+    )
+    training_threads: int = Field(1, ge=1, description="CPU threads of a training")
 
     window_tracks: int = Field(400, ge=5, description="newest tracks that an estimate uses")
     window_days: float = Field(
@@ -171,6 +174,24 @@ class Settings(BaseSettings):
     )
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
+    estimate_rest: float = Field(
+        1.0, ge=0, le=60, description="a camera rests so many times as long as its last look took"
+    )
+    stale_after_s: float = Field(
+        600.0, gt=1, description="tracks that wait for longer make their camera's alert `stale`"
+    )
+    stale_failures: int = Field(3, ge=1, description="and so many looks in a row that fail")
+    estimate_limit_s: float = Field(
+        600.0, gt=1, description="a look at a camera that takes longer hangs: its worker is ended"
+    )
+    delivery_limit_s: float = Field(300.0, gt=60, description="the same of a delivery job")
+    upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a round of the upkeep")
+    training_limit_s: float = Field(
+        21_600.0, gt=1, description="a training that takes longer has failed"
+    )
+    worker_max_mb: int = Field(
+        1_500, ge=50, description="a worker that grows beyond ends its jobs and is started anew"
+    )
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
     @field_validator("secret_key")

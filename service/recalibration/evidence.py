@@ -1,8 +1,8 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -10,7 +10,6 @@ from sqlalchemy.orm import Session
 from models.drift.chart import RUN, DriftChart, Reading, read_chart
 from models.drift.chart_packing import chart_from_bytes
 from models.drift.party_scores import Usual, score_parties
-from models.errors import CheckpointError
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -29,6 +28,7 @@ from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.changes import change_among
+from service.recalibration.lacks import Lacks
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, tracks, trainings
@@ -40,8 +40,6 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
 )
-
-log = logging.getLogger("surefoot.recalibration")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +82,8 @@ class Finding:
     """What the evidence comes to. `tracks` are those after the `change`, where one was found.
 
     `fused` is to be served. `reading` is what the drift chart says of all the tracks, those before
-    the change too, long before a pose can say how far; None where there is no chart.
+    the change too, long before a pose can say how far; None where there is no chart. `lacks` names
+    what should be there beside the served pose and failed.
     """
 
     joint: JointEstimate
@@ -93,6 +92,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    lacks: tuple[str, ...] = ()
 
     @property
     def newest_pk(self) -> int:
@@ -150,7 +150,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         return None
     lens, prior = evidence.intrinsics, evidence.prior
     seen, change = evidence.tracks, None
-    reading = None
+    reading, lacks = None, Lacks(evidence.camera_id)
     if evidence.site is None:
         joint = joint_estimate(
             observations, prior, assumed_reference(observations, prior, evidence.walk)
@@ -158,24 +158,27 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         fused = by_speeds_alone(joint, prior)
     else:
         site = reference_from_bytes(evidence.site)
-        flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
-        chart = _chart_of(evidence)
+        flow, chart = _paths_of(evidence, lacks)
         if flow is not None and chart is not None:
-            reading = _read(evidence, observations, flow, chart)
+            reading = lacks.unless_failed(
+                "chart", partial(_read, evidence, observations, flow, chart)
+            )
         ends_s = np.array([track.ended_s for track in seen])
-        found, observations, joint = change_among(observations, ends_s, lens, prior, site, flow)
+        among = partial(change_among, observations, ends_s, lens, prior, site)
+        changed = None if flow is None else lacks.unless_failed("flow_map", partial(among, flow))
+        found, observations, joint = changed or among(None)
         if found is not None:
             change = seen[found]
             seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
-        if flow is None:
-            fused = by_speeds_alone(joint, prior)
-        else:
-            fused = fused_estimate(observations, lens, prior, joint, flow)
+        fused = by_speeds_alone(joint, prior)
+        if flow is not None and changed is not None:
+            by_map = partial(fused_estimate, observations, lens, prior, joint, flow)
+            fused = lacks.unless_failed("flow_map", by_map) or fused
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
     if len(predictions) >= FEWEST_TRACKS:
-        averaged = averaged_estimate(predictions, seed)
+        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
     return Finding(
         joint=joint,
         fused=fused,
@@ -183,21 +186,21 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         reading=reading,
         tracks=seen,
         change=change,
+        lacks=tuple(lacks.said),
     )
 
 
-def _chart_of(evidence: Evidence) -> DriftChart | None:
-    """The drift chart; None where there is none, or one of another release.
+def _paths_of(evidence: Evidence, lacks: Lacks) -> tuple[FlowReference | None, DriftChart | None]:
+    """The flow map and its chart, of which the pose needs neither; None where there is none.
 
-    The pose judges the camera until the next growth of the map brings a new one.
+    One of another release cannot be read: the next growth of the map brings new ones.
     """
-    if evidence.chart is None:
-        return None
-    try:
-        return chart_from_bytes(evidence.chart)
-    except CheckpointError as error:
-        log.warning("chart_unreadable", extra={"camera_id": evidence.camera_id, "why": str(error)})
-        return None
+    flow, chart = None, None
+    if evidence.flow is not None:
+        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+    if flow is not None and evidence.chart is not None:
+        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
+    return flow, chart
 
 
 def _read(
