@@ -65,6 +65,12 @@ class MalformedError(ServiceError):
     status, code = 422, "malformed"
 
 
+class NothingTakenError(ServiceError):
+    """A body of tracks of which none could be taken; `errors` has the reason of each."""
+
+    status, code = 422, "nothing_taken"
+
+
 class UnsupportedMediaTypeError(ServiceError):
     """A body of a content type that the path does not take."""
 

@@ -33,6 +33,9 @@ class Settings(BaseSettings):
     window_days: float = Field(
         7.0, gt=0, description="age of the oldest of them, before the newest"
     )
+    max_ahead_s: float = Field(
+        60.0, ge=0, description="seconds that a track's times may be ahead of our clock"
+    )
     no_data_after_h: float = Field(
         24.0, gt=0, description="hours without a track until no_data, whatever the rhythm"
     )
@@ -66,8 +69,10 @@ class Settings(BaseSettings):
         100, ge=0, description="newest tracks that it leaves out: a move may be unnoticed"
     )
 
-    keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
-    keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
+    keep_days: float = Field(30.0, gt=0, description="days from a track's arrival to its deletion")
+    keep_tracks: int = Field(
+        20_000, ge=5, description="tracks kept for each camera: the last to arrive"
+    )
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 

@@ -64,9 +64,9 @@ def reconcile_alerts(session: Session) -> None:
 
 def forget_old(session: Session, settings: Settings, camera_id: str) -> int:
     """Apply the limits on what is stored of a camera; returns tracks deleted."""
-    before_s = time.time() - settings.keep_days * 86_400
-    deleted = tracks.forget(session, camera_id, before_s, settings.keep_tracks)
-    maintenance.forget(session, camera_id, datetime.fromtimestamp(before_s, UTC))
+    before = datetime.now(UTC) - timedelta(days=settings.keep_days)
+    deleted = tracks.forget(session, camera_id, before, settings.keep_tracks)
+    maintenance.forget(session, camera_id, before)
     estimates.forget(session, camera_id, settings.keep_estimates)
     for model in trainings.superseded_models(session, camera_id, _KEPT_MODELS):
         session.delete(model)

@@ -264,26 +264,34 @@ def predictions(
     ).all()
 
 
-def forget(session: Session, camera_id: str, before_s: float, keep: int) -> int:
-    """Delete tracks that ended before a time, and all but the newest so many. Returns how many."""
-    surplus = (
-        select(TrackRecord.id)
-        .where(TrackRecord.camera_id == camera_id)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .offset(keep)
-    )
-    result = session.execute(
-        delete(TrackRecord).where(
-            TrackRecord.camera_id == camera_id,
-            (TrackRecord.ended_s < before_s) | TrackRecord.id.in_(surplus),
-        )
-    )
+def forget(session: Session, camera_id: str, before: datetime, keep: int) -> int:
+    """Delete what the limits on age and number say. Returns how many."""
+    outlived = _outlived(camera_id, before, keep)
+    result = session.execute(delete(TrackRecord).where(outlived))
     return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     """Those of the given tracks that are still stored."""
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
+
+
+def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
+    """Whether a track is to be deleted: it came before a time, or so many have come after it.
+
+    By its arrival, not by its own times: what was recorded years ago and is posted today has been
+    acknowledged today, and stays as long as what was walked today.
+    """
+    surplus = (
+        select(TrackRecord.id)
+        .where(TrackRecord.camera_id == camera_id)
+        .order_by(TrackRecord.id.desc())
+        .offset(keep)
+    )
+    return and_(
+        TrackRecord.camera_id == camera_id,
+        (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus),
+    )
 
 
 def _newest_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from models.geometry.pose import CameraPose
-from service.formats.track import Batch, Clock, read_track
+from service.formats.track import Batch, Clock, Limits, read_track
 from service.recalibration import upkeep
 from service.recalibration.cameras import add_prior_pose
 from service.recalibration.looking import begin_look, end_look
@@ -70,7 +70,8 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         for k, point in enumerate(raw["points"]):
             point[0] = start_s + n + step_s * k
         clock = Clock(frame_rate_hz=None, started_at_s=None)
-        batch.append(read_track(raw, "t", clock, (1280, 720)))
+        limits = Limits(width=1280, height=720, now_s=time.time(), max_ahead_s=60.0)
+        batch.append(read_track(raw, "t", clock, limits))
     return receive_tracks(session, Recorder(), "corner", Batch(tracks=tuple(batch), rejections=()))
 
 
@@ -141,13 +142,16 @@ def test_tracks_of_another_step_ask_for_another_model(session, queue, settings):
     assert begin(session, settings).plan.walk.step_s == 1.0
 
 
-def test_retention_keeps_the_newest_and_the_young(session, settings):
-    put_tracks(session, 12)
-    put_tracks(session, 3, start_s=time.time() - 40 * 86_400, first=500)
-    limited = settings.model_copy(update={"keep_days": 30.0, "keep_tracks": 10})
-    assert upkeep.forget_old(session, limited, "corner") == 5
+def test_retention_keeps_the_last_to_arrive_and_the_young(session, settings):
+    put_tracks(session, 3, first=500)
+    for record in session.query(TrackRecord):
+        record.received_at -= timedelta(days=31)
+    put_tracks(session, 2)
+    put_tracks(session, 10, start_s=1_700_000_000.0, first=2)  # recorded in 2023, posted now
+    limited = settings.model_copy(update={"keep_days": 30.0, "keep_tracks": 11})
+    assert upkeep.forget_old(session, limited, "corner") == 4
     kept = sorted(int(r.track_id) for r in session.query(TrackRecord))
-    assert kept == list(range(2, 12))
+    assert kept == list(range(1, 12))
 
 
 def test_events_are_kept_up_to_a_number(session, settings):
