@@ -52,7 +52,9 @@ class Settings(BaseSettings):
     drift_sigmas: float = Field(5.0, gt=0, description="a told drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
-    drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
+    drift_people: int = Field(
+        12, ge=1, description="and so without so many of the newest people: none alarms alone"
+    )
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 
     silence_max_days: float = Field(30.0, gt=0, description="longest silence of an alert")

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from service.recalibration.attendance import Attendance, attendance_by
-from service.recalibration.estimates import drift_limits
+from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
 from service.recalibration.poses import PoseState, counting_beside, state_by
 from service.recalibration.presence import is_no_data

@@ -291,7 +291,7 @@ class EstimateRecord(Record):
     drift_heading_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
     suspected: Mapped[bool]  # the score test says that the camera has moved
-    drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
+    drift_streak: Mapped[int]  # 1: beyond the limits; -1: below the share that clears
     drifted: Mapped[list[str]]  # of those: what has been beyond since it began
     drift_since: Mapped[datetime | None]
     raw: Mapped[dict[str, Any]]

@@ -1,6 +1,7 @@
 """A camera with a reference, about whose tracks a test makes up what they come to."""
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -11,7 +12,7 @@ from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
 from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import Finding, gather
+from service.recalibration.evidence import Finding, asked_enough, gather
 from service.recalibration.trainings import begin_training, publish_model
 from service.store import events, references, trainings
 from service.store.database import Store
@@ -59,10 +60,12 @@ class Bench:
         weak=(),
         change=None,
         paths=False,
+        earlier: CameraPose | None = None,
     ):
         """Post people, who come to a pose, and bring the estimate up to date.
 
-        With `paths` they tell its heading too.
+        With `paths` they tell its heading too. Without the newest of them, they come to the
+        `earlier` one: the same, if it is not said.
         """
         first = self.count
         self.count += people
@@ -95,9 +98,15 @@ class Bench:
                     reason="",
                     raw=np.append(values, pose.heading_rad) + 0.01,
                 )
+            before = fused
+            if earlier is not None:
+                apart = [earlier.tilt_rad, earlier.roll_rad, math.log(earlier.height_m)]
+                values = np.array([*apart, earlier.heading_rad])
+                before = replace(fused, values=values)
             finding = Finding(
                 joint=joint,
                 fused=fused,
+                earlier=before if asked_enough(evidence) else None,
                 averaged=None,
                 reading=None,
                 tracks=evidence.tracks,
