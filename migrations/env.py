@@ -2,6 +2,7 @@
 
 from alembic import context
 
+import service.store.activity_tables  # noqa: F401 - its tables are among Record's
 import service.store.alert_tables  # noqa: F401 - its tables are among Record's
 import service.store.delivery_tables  # noqa: F401 - its tables are among Record's
 import service.store.snapshot_tables  # noqa: F401 - its tables are among Record's

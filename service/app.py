@@ -15,6 +15,7 @@ from models.errors import CalibrationError
 from service.errors import FieldError, ServiceError
 from service.job_queue import JobQueue
 from service.routes import (
+    activity,
     alerts,
     camera_page,
     cameras,
@@ -77,6 +78,7 @@ def create_app(settings: Settings) -> FastAPI:
         maintenance,
         webhooks,
         events,
+        activity,
         operation,
         metrics,
         fleet,

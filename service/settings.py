@@ -76,6 +76,9 @@ class Settings(BaseSettings):
         20_000, ge=5, description="tracks kept for each camera: the last to arrive"
     )
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
+    keep_activity_days: float = Field(
+        1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
+    )
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
     snapshots: bool = Field(

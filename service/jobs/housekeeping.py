@@ -37,6 +37,7 @@ def run_retention(context: JobContext) -> None:
             log.info("tracks_deleted", extra={"camera_id": camera_id, "tracks": deleted})
     with context.store.write() as session:
         upkeep.forget_events(session, context.settings)
+        upkeep.forget_activity(session, context.settings)
         deliveries.forget_deliveries(session, context.settings)
         for path in upkeep.unused_weights(session, context.settings.weights_dir):
             path.unlink(missing_ok=True)

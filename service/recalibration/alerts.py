@@ -8,12 +8,13 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
+from service.recalibration.activity import note as note_activity
 from service.recalibration.groups import group_with
 from service.recalibration.outbox import json_time, queue_alert
 from service.recalibration.references import begin_window_anew
 from service.settings import Settings
-from service.store import acts, alerts, events, maintenance, tracks
-from service.store.alert_tables import AlertActRecord
+from service.store import activity, alerts, events, maintenance, tracks
+from service.store.activity_tables import ActivityRecord
 from service.store.alerts import AlertFilter
 from service.store.tables import AlertRecord
 
@@ -71,8 +72,10 @@ def open_alert(
         )
         session.add(record)
         session.flush()
+        _keep_act(session, record, "opened", None)
     group = group_with(session, settings, record)
     if group is not None:
+        _keep_act(session, group, "opened", None)
         _tell(session, group, "opened")
     if change is not None:
         _tell(session, record, change)
@@ -127,9 +130,10 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
     return record
 
 
-def acts_of(session: Session, alert_id: str) -> Sequence[AlertActRecord]:
-    """What was done with an alert and by whom, oldest first."""
-    return acts.of_alert(session, alert_id)
+def acts_of(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
+    """What was done with an alert since it opened, oldest first."""
+    entries = activity.of_subject(session, alert_id)
+    return [entry for entry in entries if entry.what != "alert.opened"]
 
 
 def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
@@ -230,16 +234,18 @@ def _keep_act(
     outcome: str | None = None,
     note: str | None = None,
 ) -> None:
-    kept = AlertActRecord(
-        alert_id=record.id,
-        act=act,
+    note_activity(
+        session,
+        f"alert.{act}",
         by=by,
+        camera_id=record.camera_id,
+        subject_id=record.id,
+        kind=record.kind,
         until=until,
         outcome=outcome,
-        note=note,
-        at=datetime.now(UTC),
+        text=note,
+        details={"severity": record.severity, "reason": record.reason},
     )
-    acts.add(session, kept)
 
 
 def _tell(session: Session, record: AlertRecord, change: str) -> None:

@@ -15,8 +15,8 @@ from service.recalibration.poses import PoseView, view_pose
 from service.recalibration.presence import Silence, silence_of
 from service.recalibration.snapshots import snapshot_facts
 from service.settings import Settings
-from service.store import acts, alerts, cameras, events, maintenance, tracks, trainings
-from service.store.alert_tables import AlertActRecord, MaintenanceRecord
+from service.store import alerts, cameras, events, maintenance, tracks, trainings
+from service.store.alert_tables import MaintenanceRecord
 from service.store.alerts import AlertFilter
 from service.store.packing import trajectory_of
 from service.store.snapshots import SnapshotFacts
@@ -29,10 +29,9 @@ DISTANCES_M = (5.0, 10.0, 20.0, 40.0, 80.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertStory:
-    """An alert, what was done with it, and the group that it belongs to, if it does."""
+    """An alert, and the group that it belongs to, if it does."""
 
     record: AlertRecord
-    acts: tuple[AlertActRecord, ...]
     group: AlertRecord | None
 
 
@@ -112,7 +111,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
-        deeds=deeds_of(session, camera_id, found),
+        deeds=deeds_of(session, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,
@@ -120,11 +119,9 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
 
 
 def _stories(session: Session, found: Sequence[AlertRecord]) -> tuple[AlertStory, ...]:
-    told = acts.of_alerts(session, [record.id for record in found])
     return tuple(
         AlertStory(
             record=record,
-            acts=tuple(act for act in told if act.alert_id == record.id),
             group=None if record.group_id is None else alerts.find(session, record.group_id),
         )
         for record in found

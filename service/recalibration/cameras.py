@@ -10,6 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError, NotFoundError, PreconditionFailedError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note
 from service.recalibration.alerts import close_pose_alerts, end_alert, list_alerts
 from service.recalibration.references import begin_reference
 from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
@@ -96,6 +97,7 @@ def register_camera(
     add_prior_pose(session, camera_id, spec.prior_pose, "registered", None)
     begin_reference(session, camera_id, "registered", from_s=None)
     queue_training(session, queue, settings, camera_id)
+    note(session, "camera.registered", by=None, camera_id=camera_id)
     return view_camera(session, camera_id)
 
 
@@ -158,6 +160,8 @@ def change_camera(
         renew_prior_pose(
             session, queue, settings, camera_id, pose, "changed", from_s=from_s, by=None
         )
+    fields = [field for field in change.__slots__ if getattr(change, field) is not None]
+    note(session, "camera.changed", by=None, camera_id=camera_id, details={"fields": fields})
     session.flush()
     return view_camera(session, camera_id)
 
@@ -173,6 +177,8 @@ def remove_camera(session: Session, camera_id: str, etag: str) -> None:
     _check_etag(view, etag)
     for alert in list_alerts(session, AlertFilter(state="firing", camera_id=camera_id), _MANY):
         end_alert(session, camera_id, alert.kind, "camera_removed")
+    details = {"name": view.record.name}
+    note(session, "camera.removed", by=None, camera_id=camera_id, details=details)
     session.delete(view.record)
 
 

@@ -1,13 +1,11 @@
-"""Who did what when at a camera: alerts, poses, references and maintenance in one story."""
+"""Who did what when at a camera, for its page."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy.orm import Session
 
-from service.store import acts, cameras, maintenance, references
-from service.store.tables import AlertRecord
+from service.store import activity
 
 _MOST = 40
 
@@ -16,7 +14,7 @@ _MOST = 40
 class Deed:
     """What was done; `by` is None where the service did it by itself, or nobody said a name.
 
-    `what` is the act or the origin of a pose or reference. `kind` is the alert's, `until` of a
+    `what` is as the log has it (`recalibration.activity`). `kind` is the alert's, `until` of a
     silence or of maintenance, `outcome` of an alert.
     """
 
@@ -29,43 +27,17 @@ class Deed:
     note: str | None = None
 
 
-def deeds_of(session: Session, camera_id: str, of: Sequence[AlertRecord]) -> tuple[Deed, ...]:
-    """What was done at a camera and with some alerts, newest first.
-
-    An act that made several records is told once: accepting a pose ends alerts and begins a
-    reference.
-    """
-    kinds = {record.id: record.kind for record in of}
-    deeds = [
+def deeds_of(session: Session, camera_id: str) -> tuple[Deed, ...]:
+    """What was done last at a camera, newest first."""
+    return tuple(
         Deed(
-            at=act.at,
-            what=act.act,
-            by=act.by,
-            kind=kinds[act.alert_id],
-            until=act.until,
-            outcome=act.outcome,
-            note=act.note,
+            at=entry.at,
+            what=entry.what,
+            by=entry.by,
+            kind=entry.kind,
+            until=entry.until,
+            outcome=entry.outcome,
+            note=entry.note,
         )
-        for act in acts.of_alerts(session, list(kinds))
-    ]
-    deeds += [Deed(at=record.opened_at, what="opened", by=None, kind=record.kind) for record in of]
-    deeds += [
-        Deed(at=prior.created_at, what=prior.origin, by=prior.trusted_by)
-        for prior in cameras.prior_poses(session, camera_id, _MOST)
-    ]
-    for reference in references.of_camera(session, camera_id, _MOST):
-        if reference.origin == "reset":
-            deeds.append(Deed(at=reference.created_at, what="reset", by=reference.requested_by))
-        if reference.ready_at is not None:
-            deeds.append(Deed(at=reference.ready_at, what="learned", by=None))
-    deeds += [
-        Deed(
-            at=window.created_at,
-            what="maintenance",
-            by=window.requested_by,
-            until=window.to_at,
-            note=window.reason,
-        )
-        for window in maintenance.of_camera(session, camera_id)
-    ]
-    return tuple(sorted(deeds, key=lambda deed: deed.at, reverse=True)[:_MOST])
+        for entry in activity.newest(session, camera_id, _MOST)
+    )

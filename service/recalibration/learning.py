@@ -23,6 +23,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
@@ -128,6 +129,8 @@ def keep_reference(
     record.offsets = learned.offsets
     record.doubt = site.doubt
     record.ready_at = datetime.now(UTC)
+    details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
+    note(session, "reference.learned", by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,

@@ -9,7 +9,9 @@ from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note
 from service.recalibration.cameras import require_camera
+from service.recalibration.outbox import json_time
 from service.recalibration.references import forget_streak
 from service.recalibration.trainings import request_estimate
 from service.settings import Settings
@@ -61,6 +63,7 @@ def open_window(
     )
     session.add(record)
     session.flush()
+    _note(session, "planned", record, by)
     open_ = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
     if from_at <= now and not open_:
         forget_streak(session, camera_id)  # an open alert ends by its own rules
@@ -98,6 +101,7 @@ def change_window(
     _check(from_at, to_at, now, settings)
     record.from_at, record.to_at, record.updated_at = from_at, to_at, now
     record.reason = record.reason if change.reason is None else change.reason
+    _note(session, "changed", record, None)
     session.flush()
     request_estimate(session, queue, camera_id)
     return record
@@ -115,11 +119,27 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
     if record.to_at <= now:
         raise ConflictError(f"to: the window ended at {record.to_at.isoformat()} already")
     if record.from_at >= now:
+        _note(session, "withdrawn", record, None)
         session.delete(record)
     else:
+        _note(session, "ended", record, None)
         record.to_at = record.updated_at = now
     session.flush()
     request_estimate(session, queue, camera_id)
+
+
+def _note(session: Session, act: str, record: MaintenanceRecord, by: str | None) -> None:
+    """Keep what was said of a window; its times as they are then."""
+    note(
+        session,
+        f"maintenance.{act}",
+        by=by,
+        camera_id=record.camera_id,
+        subject_id=record.id,
+        until=record.to_at,
+        text=record.reason,
+        details={"from": json_time(record.from_at), "to": json_time(record.to_at)},
+    )
 
 
 def _require(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord:

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import CameraPose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note as note_activity
 from service.recalibration.alerts import close_pose_alerts
 from service.recalibration.attendance import Attendance, attendance_of
 from service.recalibration.cameras import renew_prior_pose, require_camera
@@ -149,6 +150,7 @@ def accept_pose(
     if not view.told:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     close_pose_alerts(session, camera_id, "accepted", by)
+    note_activity(session, "pose.accepted", by=by, camera_id=camera_id)
     from_s = tracks.newest_end_s(session, camera_id)
     renew_prior_pose(
         session, queue, settings, camera_id, view.pose, "accepted", from_s=from_s, by=by
@@ -166,6 +168,7 @@ def reset_reference(
     """
     require_camera(session, camera_id)
     close_pose_alerts(session, camera_id, "put_back", by)
+    note_activity(session, "reference.reset", by=by, camera_id=camera_id)
     from_s = tracks.newest_end_s(session, camera_id)
     begin_reference(session, camera_id, "reset", from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)

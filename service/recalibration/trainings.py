@@ -14,6 +14,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note
 from service.settings import Settings
 from service.store import cameras, events, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
@@ -64,6 +65,27 @@ def queue_training(
     session.flush()
     queue.enqueue_training(session, camera_id, record.id)
     _tell(session, record)
+    return record
+
+
+def request_training(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    recipe: str | None,
+    seed: int | None,
+    by: str | None,
+) -> TrainingRecord:
+    """Queue a training that a person asks for.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    if cameras.find(session, camera_id) is None:
+        raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
+    record = queue_training(session, queue, settings, camera_id, recipe, seed)
+    note(session, "training.requested", by=by, camera_id=camera_id, subject_id=record.id)
     return record
 
 
@@ -241,6 +263,14 @@ def _finish(session: Session, record: TrainingRecord, state: str, error: str | N
     record.state = state
     record.error = error
     record.finished_at = datetime.now(UTC)
+    note(
+        session,
+        f"training.{state}",
+        by=None,
+        camera_id=record.camera_id,
+        subject_id=record.id,
+        text=error,
+    )
     _tell(session, record)
 
 

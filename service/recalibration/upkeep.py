@@ -15,6 +15,7 @@ from service.recalibration.silence import end_silences
 from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
 from service.settings import Settings
 from service.store import (
+    activity,
     cameras,
     estimates,
     events,
@@ -30,6 +31,7 @@ from service.store.tables import CameraRecord
 _STEP_RATIO = 1.3
 _DUE_LOST_S = 30.0
 _KEPT_MODELS = 2
+_ENTRIES_AT_ONCE = 5_000
 
 
 def reconcile_camera(
@@ -76,6 +78,12 @@ def forget_old(session: Session, settings: Settings, camera_id: str) -> int:
 def forget_events(session: Session, settings: Settings) -> None:
     """Apply the limit on events."""
     events.forget(session, settings.keep_events)
+
+
+def forget_activity(session: Session, settings: Settings) -> int:
+    """Apply the limit on the log of what was done, a bit at a time; returns entries deleted."""
+    before = datetime.now(UTC) - timedelta(days=settings.keep_activity_days)
+    return activity.forget(session, before, _ENTRIES_AT_ONCE)
 
 
 def unused_weights(session: Session, folder: Path) -> list[Path]:

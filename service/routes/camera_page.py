@@ -17,6 +17,7 @@ from service.routes.state import ReadDep, StateDep
 from service.web import camera_words
 from service.web.camera_drawings import draw_camera
 from service.web.camera_words import Clock
+from service.web.deed_words import deed_words
 from service.web.moments import next_morning
 from service.web.sentences import headline
 from service.web.words import STATES
@@ -48,7 +49,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         numbers=camera_words.number_rows(page.camera.prior_pose, page.pose.pose, estimate),
         misplaced=camera_words.misplaced_words(page.misplaced),
         flags=camera_words.flags(page, clock),
-        deeds=[(deed, camera_words.deed_words(deed, clock)) for deed in page.deeds],
+        deeds=[(deed, deed_words(deed, clock)) for deed in page.deeds],
         words=camera_words,
         states=STATES,
         chart_facts=_chart_facts(page),

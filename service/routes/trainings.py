@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from service.recalibration import cameras, trainings
+from service.recalibration import trainings
 from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.trainings import TrainingBody, TrainingList, TrainingOut
 
@@ -17,9 +17,8 @@ def request(
 ) -> TrainingOut:
     """Queue a training at the camera's prior pose."""
     body = body or TrainingBody()
-    cameras.require_camera(session, camera_id)
-    record = trainings.queue_training(
-        session, state.queue, state.settings, camera_id, body.recipe, body.seed
+    record = trainings.request_training(
+        session, state.queue, state.settings, camera_id, body.recipe, body.seed, body.by
     )
     return TrainingOut.from_record(record)
 

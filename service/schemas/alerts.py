@@ -8,7 +8,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Who
-from service.store.alert_tables import AlertActRecord
+from service.store.activity_tables import ActivityRecord
 from service.store.tables import AlertRecord
 
 
@@ -79,14 +79,18 @@ class AlertOut(BaseModel):
 class ActOut(BaseModel):
     """What somebody did with an alert; without a name, the service by itself."""
 
-    model_config = ConfigDict(from_attributes=True)
-
     at: datetime
     act: Literal["acknowledged", "silenced", "silence_ended", "escalated", "resolved"]
     by: str | None
     until: datetime | None
     outcome: str | None
     note: str | None
+
+    @classmethod
+    def from_record(cls, record: ActivityRecord) -> Self:
+        """The body of an entry of the log."""
+        values = {name: getattr(record, name) for name in cls.model_fields if name != "act"}
+        return cls.model_validate({**values, "act": record.what.removeprefix("alert.")})
 
 
 class AlertDetail(AlertOut):
@@ -95,10 +99,10 @@ class AlertDetail(AlertOut):
     acts: list[ActOut] = []
 
     @classmethod
-    def from_records(cls, record: AlertRecord, acts: Sequence[AlertActRecord]) -> Self:
+    def from_records(cls, record: AlertRecord, acts: Sequence[ActivityRecord]) -> Self:
         """The body of a stored alert with its acts."""
         body = cls.from_record(record)
-        body.acts = [ActOut.model_validate(act) for act in acts]
+        body.acts = [ActOut.from_record(act) for act in acts]
         return body
 
 

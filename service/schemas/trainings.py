@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, Field
 
-from service.schemas.base import Body
+from service.schemas.base import Body, Who
 from service.store.tables import TrainingRecord
 
 
@@ -15,6 +15,7 @@ class TrainingBody(Body):
 
     recipe: Literal["default", "paper"] | None = None
     seed: int | None = Field(None, ge=0, lt=2**31)
+    by: Who | None = None
 
 
 class ProgressOut(BaseModel):

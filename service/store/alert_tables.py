@@ -1,4 +1,4 @@
-"""Records beside alerts: what was done with them, and what keeps a camera from having any."""
+"""Records beside alerts: what keeps a camera from having any."""
 
 from datetime import datetime
 from typing import Any
@@ -7,26 +7,6 @@ from sqlalchemy import JSON, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.tables import Record
-
-
-class AlertActRecord(Record):
-    """What somebody, or the service where `by` is None, did with an alert.
-
-    `until` is of a silence, `outcome` of an end; `note` has the words that were given.
-    """
-
-    __tablename__ = "alert_acts"
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    alert_id: Mapped[str] = mapped_column(ForeignKey("alerts.id", ondelete="CASCADE"))
-    act: Mapped[str]  # acknowledged, silenced, silence_ended, escalated, resolved
-    by: Mapped[str | None]
-    until: Mapped[datetime | None]
-    outcome: Mapped[str | None]
-    note: Mapped[str | None]
-    at: Mapped[datetime]
-
-    __table_args__ = (Index(None, "alert_id", "id"),)
 
 
 class MaintenanceRecord(Record):

@@ -8,7 +8,6 @@ from datetime import datetime, tzinfo
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
 from service.recalibration.camera_page import CameraPage
-from service.recalibration.deeds import Deed
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
 from service.web.moments import when
@@ -29,16 +28,6 @@ OUTCOMES = {
     "camera_removed": "camera removed",
 }
 _UNCHANGED_M = 0.05
-_DEEDS = {
-    "registered": "registered the camera",
-    "changed": "changed the lens or the prior pose",
-    "accepted": "accepted the new pose as the prior pose",
-    "reset": "said that the camera is back at its prior pose; it is learned anew",
-    "learned": "The reference was learned.",
-    "acknowledged": "acknowledged",
-    "silence_ended": "ended the silence",
-    "escalated": "It grew: critical now.",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,32 +107,6 @@ def _off_words(one: Misplacement) -> str:
     if abs(one.farther_m) > 0.7 * one.off_m and one.off_m >= _UNCHANGED_M:
         way = " too far" if one.farther_m > 0 else " too near"
     return f"{one.off_m:.1f} m{way or ' off'}"
-
-
-def deed_words(deed: Deed, clock: Clock) -> str:
-    """Who did what, as a sentence without the time."""
-    kind = KINDS.get(deed.kind or "", "").lower()
-    alert = f" the alert “{kind}”" if kind else ""
-    who = deed.by or ("Someone" if deed.what in ("registered", "changed") else None)
-    if deed.what == "opened":
-        text = f"Alert: {kind}."
-    elif deed.what == "resolved" and deed.outcome == "cleared" and deed.by is None:
-        text = f"The alert “{kind}” ended by itself."
-    elif deed.what == "resolved":
-        outcome = OUTCOMES.get(deed.outcome or "", deed.outcome or "")
-        text = f"{who or 'Someone'} closed{alert}: {outcome}."
-    elif deed.what == "silenced" and deed.until is not None:
-        text = f"{who or 'Someone'} silenced{alert} until {clock.when(deed.until)}."
-    elif deed.what == "silence_ended" and deed.by is None:
-        text = f"The silence of{alert} ended."
-    elif deed.what == "maintenance" and deed.until is not None:
-        text = f"{who or 'Someone'} planned maintenance until {clock.when(deed.until)}."
-    elif deed.what in ("learned", "escalated"):
-        text = _DEEDS[deed.what]
-    else:
-        done = _DEEDS.get(deed.what, deed.what)
-        text = f"{who or 'Someone'} {done}{alert if deed.kind else ''}."
-    return f"{text} {deed.note}" if deed.note else text
 
 
 def flags(page: CameraPage, clock: Clock) -> tuple[str, ...]:
