@@ -28,6 +28,7 @@ from service.routes import (
     poses,
     registration,
     snapshots,
+    sources,
     tracks,
     trainings,
     webhooks,
@@ -71,6 +72,7 @@ def create_app(settings: Settings) -> FastAPI:
     for module in (
         cameras,
         tracks,
+        sources,
         poses,
         snapshots,
         trainings,

@@ -41,6 +41,12 @@ class ConflictError(ServiceError):
     status, code = 409, "conflict"
 
 
+class TooManySourcesError(ServiceError):
+    """A camera has as many sources of tracks as it may have."""
+
+    status, code = 409, "too_many_sources"
+
+
 class PreconditionFailedError(ServiceError):
     """`If-Match` names another version than the stored one."""
 

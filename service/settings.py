@@ -49,6 +49,11 @@ class Settings(BaseSettings):
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
     )
+    max_sources: int = Field(8, ge=1, description="sources that may post tracks for one camera")
+    source_silent_h: float = Field(
+        6.0, gt=0, description="hours of silence after which another source takes over"
+    )
+
     drift_sigmas: float = Field(5.0, gt=0, description="a told drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")

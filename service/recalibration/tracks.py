@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
+from service.recalibration.sources import note_source
 from service.recalibration.trainings import request_estimate
 from service.store import tracks
 from service.store.packing import pack
@@ -23,7 +24,9 @@ class Receipt:
     left_out: int
 
 
-def receive_tracks(session: Session, queue: JobQueue, camera_id: str, batch: Batch) -> Receipt:
+def receive_tracks(
+    session: Session, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 8
+) -> Receipt:
     """Store the good tracks of a request and have them looked at, in one transaction.
 
     A track is known by (camera, source, id, start time): one that is stored already stays, and
@@ -31,6 +34,7 @@ def receive_tracks(session: Session, queue: JobQueue, camera_id: str, batch: Bat
 
     Raises:
         NothingTakenError: there were tracks, and none of them could be taken.
+        TooManySourcesError: the source is new, and the camera has as many as it may have.
     """
     if batch.rejections and not batch.tracks:
         raise _nothing_taken(batch)
@@ -51,6 +55,9 @@ def receive_tracks(session: Session, queue: JobQueue, camera_id: str, batch: Bat
             for track in batch.tracks
         ],
     )
+    for source in sorted({track.source for track in batch.tracks}):
+        stored = added if source == batch.tracks[0].source else 0
+        note_source(session, camera_id, source, stored, max_sources)
     if added:
         request_estimate(session, queue, camera_id)
     return Receipt(

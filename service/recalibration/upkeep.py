@@ -12,6 +12,7 @@ from service.recalibration.alerts import end_empty_groups
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
 from service.recalibration.silence import end_silences
+from service.recalibration.sources import watch_sources
 from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
 from service.settings import Settings
 from service.store import (
@@ -52,6 +53,9 @@ def reconcile_camera(
         camera.estimate_due_at = None
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
+    source = watch_sources(session, queue, settings, camera_id, datetime.now(UTC))
+    if source is not None:
+        found.append(source)
     presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
     if presence is not None:
         found.append(presence)

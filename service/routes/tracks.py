@@ -96,5 +96,7 @@ def post_tracks(
     """
     with state.store.write() as session:
         cameras.require_camera(session, camera_id)
-        receipt = tracks.receive_tracks(session, state.queue, camera_id, batch)
+        receipt = tracks.receive_tracks(
+            session, state.queue, camera_id, batch, max_sources=state.settings.max_sources
+        )
     return ReceiptOut.from_value(receipt)

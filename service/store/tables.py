@@ -114,7 +114,8 @@ class SiteReferenceRecord(Record):
     """What estimators say while a camera is known to be at its prior pose; the newest counts.
 
     It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
-    is unset. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
+    is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
+    said. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
     `changed_s` when it started.
     """
@@ -124,7 +125,8 @@ class SiteReferenceRecord(Record):
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    origin: Mapped[str]  # registered, changed, accepted, reset
+    origin: Mapped[str]  # registered, changed, accepted, reset, source
+    source: Mapped[str | None]
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
     to_s: Mapped[float | None]
@@ -322,9 +324,9 @@ class AlertRecord(Record):
         ForeignKey("alerts.id", ondelete="SET NULL"), index=True
     )
     track_source: Mapped[str | None]
-    kind: Mapped[str]  # drift, no_data, out_of_range, clock
+    kind: Mapped[str]  # drift, no_data, out_of_range, clock, tracker
     state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference, rhythm, group
+    source: Mapped[str]  # estimate, reference, rhythm, group, tracks
     told: Mapped[bool] = mapped_column(default=False)
     severity: Mapped[str]  # warning, critical
     reason: Mapped[str]

@@ -19,6 +19,7 @@ KINDS = {
     "clock": "The clock looks wrong",
     "out_of_range": "Beyond the model's range",
     "no_data": "No people come",
+    "tracker": "Another tracker posts",
 }
 OUTCOMES = {
     "put_back": "put back",

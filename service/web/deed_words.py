@@ -10,6 +10,8 @@ _DONE = {
     "camera.removed": "removed the camera",
     "pose.accepted": "accepted the new pose as the prior pose",
     "reference.reset": "said that the camera is back at its prior pose; it is learned anew",
+    "source.used": "said whose tracks count; the reference is learned anew",
+    "source.removed": "removed a source of tracks with its tracks",
     "alert.acknowledged": "acknowledged {alert}",
     "alert.silenced": "silenced {alert} until {until}",
     "alert.silence_ended": "ended the silence of {alert}",
@@ -34,6 +36,7 @@ _UNASKED = ("cleared", "camera_removed")
 _BY_ITSELF = {
     "alert.resolved": "The alert “{kind}” ended: {outcome}",
     "alert.silence_ended": "The silence of {alert} ended",
+    "source.used": "Another source's tracks count; the reference is learned anew",
 }
 
 
