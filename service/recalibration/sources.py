@@ -84,6 +84,13 @@ def list_sources(session: Session, settings: Settings, camera_id: str) -> list[S
     ]
 
 
+def rival_sources(session: Session, settings: Settings, camera_id: str) -> tuple[SourceView, ...]:
+    """The sources of a camera; none where there is but one, which nobody has to choose."""
+    if len(sources.of_camera(session, camera_id)) < 2:
+        return ()
+    return tuple(list_sources(session, settings, camera_id))
+
+
 def use_source(
     session: Session,
     queue: JobQueue,

@@ -69,6 +69,9 @@ def test_another_source_moves_nothing_and_is_told(known):
     known.reconcile()
     known.look()
     assert known.pose() == before
+    page = known.http.get("/ui/cameras/corner").text
+    assert 'data-act="use-source" data-source="stranger"' in page
+    assert "tracker-1.2</strong>: its tracks count" in page
     after = known.reference()
     assert (after.id, after.data, after.source) == (reference.id, reference.data, "tracker-1.2")
     (alert,) = known.alerts(state="firing")
