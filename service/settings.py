@@ -49,7 +49,7 @@ class Settings(BaseSettings):
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
     )
-    max_sources: int = Field(8, ge=1, description="sources that may post tracks for one camera")
+    max_sources: int = Field(16, ge=1, description="sources that may post tracks for one camera")
     source_silent_h: float = Field(
         6.0, gt=0, description="hours of silence after which another source takes over"
     )

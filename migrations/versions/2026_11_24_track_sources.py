@@ -22,6 +22,8 @@ _COUNTING = """
     )
     WHERE id IN (SELECT max(id) FROM site_references GROUP BY camera_id)
 """
+# Those of a source are found in them without a look at the tracks.
+_INDEXES = (["camera_id", "ended_s"], ["camera_id", "received_at", "ended_s"])
 
 
 def upgrade() -> None:
@@ -43,11 +45,20 @@ def upgrade() -> None:
     )
     with op.batch_alter_table("site_references") as batch:
         batch.add_column(sa.Column("source", sa.String(), nullable=True))
+    for columns in _INDEXES:
+        _replace_index(columns, [*columns, "source"])
     op.execute(_SOURCES)
     op.execute(_COUNTING)
 
 
 def downgrade() -> None:
+    for columns in _INDEXES:
+        _replace_index([*columns, "source"], columns)
     with op.batch_alter_table("site_references") as batch:
         batch.drop_column("source")
     op.drop_table("track_sources")
+
+
+def _replace_index(old: list[str], new: list[str]) -> None:
+    op.drop_index(op.f("_".join(["ix_tracks", *old])), "tracks")
+    op.create_index(op.f("_".join(["ix_tracks", *new])), "tracks", new)

@@ -25,7 +25,7 @@ class Receipt:
 
 
 def receive_tracks(
-    session: Session, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 8
+    session: Session, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 16
 ) -> Receipt:
     """Store the good tracks of a request and have them looked at, in one transaction.
 

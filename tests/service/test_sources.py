@@ -116,6 +116,7 @@ def test_an_update_of_the_detector_takes_over_once_the_old_one_is_silent(known):
     assert known.sources()["tracker-1.3"]["counts"]
 
 
+@pytest.mark.slow
 def test_it_does_not_take_over_where_the_camera_is_in_doubt(known):
     known.walk(KNOCKED, 40)
     assert known.look()["state"] == "drifting"
@@ -128,6 +129,7 @@ def test_it_does_not_take_over_where_the_camera_is_in_doubt(known):
     assert known.look()["state"] == "drifting"
 
 
+@pytest.mark.slow
 def test_two_trackers_that_both_post_stay_beside_each_other(known):
     known.source = "tracker-1.3"
     known.walk(PRIOR, WANTED + 10)
@@ -165,10 +167,10 @@ def test_names_at_random_do_not_fill_the_table(corner):
         body = {"source": name, "tracks": [track("1")]}
         return corner.post("/cameras/corner/tracks", json=body)
 
-    for number in range(8):
+    for number in range(16):
         assert post(f"s{number}").status_code == 202
     document = problem(post("one more"), 409, "too_many_sources")
-    assert "at most 8 a camera" in document["detail"]
+    assert "at most 16 a camera" in document["detail"]
     assert post("s3").json()["duplicates"] == 1
     assert corner.delete(f"{URL}/s5").status_code == 204
     assert post("one more").status_code == 202
