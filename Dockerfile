@@ -13,6 +13,8 @@ RUN python -m venv /opt/surefoot \
 FROM python:3.11-slim
 RUN useradd --system --uid 10001 --home-dir /data --create-home surefoot
 COPY --from=build /opt/surefoot /opt/surefoot
+# Others than the container reach it, so that it starts once somebody has a token; see Access in
+# service/README.md: docker run --rm -v surefoot:/data IMAGE surefoot token add NAME --scope admin
 ENV PATH=/opt/surefoot/bin:$PATH \
     SUREFOOT_DATA_DIR=/data \
     SUREFOOT_HOST=0.0.0.0 \

@@ -2,9 +2,11 @@
 
 from alembic import context
 
+import service.store.access_tables  # noqa: F401 - its tables are among Record's
 import service.store.activity_tables  # noqa: F401 - its tables are among Record's
 import service.store.alert_tables  # noqa: F401 - its tables are among Record's
 import service.store.delivery_tables  # noqa: F401 - its tables are among Record's
+import service.store.probe_tables  # noqa: F401 - its tables are among Record's
 import service.store.snapshot_tables  # noqa: F401 - its tables are among Record's
 import service.store.source_tables  # noqa: F401 - its tables are among Record's
 from service.settings import Settings

@@ -2,25 +2,23 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from http import HTTPStatus
 from typing import TypedDict
 
-from fastapi import FastAPI, Request
-from fastapi.encoders import jsonable_encoder
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, Response
-from starlette.exceptions import HTTPException
+import anyio
+import anyio.to_thread
+from fastapi import FastAPI
 
-from models.errors import CalibrationError
-from service.errors import FieldError, ServiceError
 from service.job_queue import JobQueue
+from service.recalibration.quota import Quota
 from service.routes import (
     activity,
     alerts,
     camera_page,
     cameras,
+    documented,
     events,
     fleet,
+    login,
     maintenance,
     metrics,
     operation,
@@ -29,14 +27,23 @@ from service.routes import (
     registration,
     snapshots,
     sources,
+    tokens,
     tracks,
     trainings,
     webhooks,
 )
+from service.routes.bodies import BodyMiddleware
+from service.routes.guard import GuardMiddleware
 from service.routes.instruments import InstrumentMiddleware, Instruments
+from service.routes.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
+from service.routes.origins import OriginMiddleware
+from service.routes.problems import ProblemMiddleware, add_problem_handlers
+from service.routes.rates import RateMiddleware
 from service.routes.state import AppState
 from service.settings import Settings
 from service.store.database import Store
+
+_SPARE_THREADS = 8
 
 
 class LifespanState(TypedDict):
@@ -51,12 +58,17 @@ def create_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[LifespanState]:
-        store = Store(settings)
+        at_once = sessions_at_once(settings)
+        # A request is in one thread at a time; some are left for what needs no turn.
+        anyio.to_thread.current_default_thread_limiter().total_tokens = at_once + _SPARE_THREADS
+        store = Store(settings, settings.http_wait_s, at_once)
         state = AppState(
             settings=settings,
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
+            quota=Quota(settings),
+            stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
         )
         yield {"app": state}
         state.stopping.set()
@@ -84,64 +96,24 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         metrics,
         fleet,
+        login,
         camera_page,
         registration,
+        login,
+        tokens,
     ):
         app.include_router(module.router)
+    documented.document_errors(app)
     pages.mount_static(app)
+    lanes = Lanes(settings)
+    # The last one is outermost.
+    app.add_middleware(LaneMiddleware, lanes=lanes)
+    app.add_middleware(BodyMiddleware, settings=settings, lanes=lanes)
+    app.add_middleware(RateMiddleware, settings=settings)
+    app.add_middleware(GuardMiddleware, settings=settings)
+    app.add_middleware(OriginMiddleware, settings=settings)
+    app.add_middleware(ProblemMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
-    app.add_exception_handler(ServiceError, _service_error)
-    app.add_exception_handler(CalibrationError, _calibration_error)
-    app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(HTTPException, _http_error)
+    app.state.instruments = instruments
+    add_problem_handlers(app)
     return app
-
-
-def _service_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, ServiceError)
-    return _problem(request, error.status, error.code, error.detail, error.errors)
-
-
-def _calibration_error(request: Request, error: Exception) -> Response:
-    return _problem(request, 409, "calibration", str(error))
-
-
-def _validation_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)
-    errors = tuple(
-        FieldError(
-            pointer="".join(f"/{part}" for part in item["loc"] if part != "body"),
-            reason=f"{item['msg']}, got {item.get('input')!r:.80}",
-        )
-        for item in error.errors()
-    )
-    detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
-    return _problem(request, 422, "malformed", detail, errors)
-
-
-def _http_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
-    return _problem(request, error.status_code, code, str(error.detail))
-
-
-def _problem(
-    request: Request, status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
-) -> Response:
-    """A problem document (RFC 9457); for who looks for a page, a page."""
-    if pages.wants_page(request):
-        return pages.render(
-            request, "problem.html", status, title=HTTPStatus(status).phrase, detail=detail
-        )
-    content = {
-        "type": "about:blank",
-        "title": HTTPStatus(status).phrase,
-        "status": status,
-        "code": code,
-        "detail": detail,
-    }
-    if errors:
-        content["errors"] = [{"pointer": error.pointer, "reason": error.reason} for error in errors]
-    return JSONResponse(
-        jsonable_encoder(content), status_code=status, media_type="application/problem+json"
-    )

@@ -1,4 +1,4 @@
-"""The command line: serve, worker, migrate, replay, demo, evaluate and the other studies."""
+"""The command line: serve, worker, replay and demo; what concerns data and studies is beside it."""
 
 import math
 import sys
@@ -6,10 +6,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 
+from service.commands_data import DATA_COMMANDS, DataDir
+from service.commands_studies import STUDIES
+from service.data_dir import StartError
 from service.logs import configure_logs
-from service.settings import Settings
+from service.process import be_private
+from service.settings import Settings, wrong_settings
+from service.token_commands import app as token_app
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -18,7 +24,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-DataDir = Annotated[Path | None, typer.Option(help="Database and weights live here.")]
+app.add_typer(token_app, name="token")
+
+FollowStdin = Annotated[bool, typer.Option(help="End when stdin ends.")]
 
 Recipe = Annotated[str | None, typer.Option(help="Recipe of new trainings: default or paper.")]
 
@@ -30,12 +38,15 @@ def serve(
     port: Annotated[int | None, typer.Option(help="Port to listen on.")] = None,
     workers: Annotated[int | None, typer.Option(min=0, help="Local worker processes.")] = None,
     recipe: Recipe = None,
+    follow_stdin: FollowStdin = False,
 ) -> None:
     """Serve the API and run the local workers, until SIGTERM."""
     from service.serve import run_service
 
     configure_logs()
-    run_service(_settings(data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe))
+    be_private()
+    settings = _settings(data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe)
+    run_service(settings, follow_stdin=follow_stdin)
 
 
 @app.command()
@@ -44,13 +55,14 @@ def worker(
         str, typer.Option(help="Stable and its own: by it a worker finds its unfinished jobs.")
     ] = "standalone",
     data_dir: DataDir = None,
-    follow_stdin: Annotated[bool, typer.Option(help="End when stdin ends.")] = False,
+    follow_stdin: FollowStdin = False,
 ) -> None:
     """Run a worker alone, beside an API that runs elsewhere on this machine."""
     from service.jobs.worker import WorkerRunningError, run_worker
     from service.migrate import migrate as run_migrations
 
     configure_logs()
+    be_private()
     settings = _settings(data_dir=data_dir)
     if not follow_stdin:  # `serve` has migrated already
         run_migrations(settings)
@@ -58,16 +70,6 @@ def worker(
         run_worker(settings, name, follow_stdin)
     except WorkerRunningError as error:
         raise typer.BadParameter(str(error)) from error
-
-
-@app.command()
-def migrate(data_dir: DataDir = None) -> None:
-    """Bring the database to the newest revision."""
-    from service.migrate import migrate as run_migrations
-
-    settings = _settings(data_dir=data_dir)
-    run_migrations(settings)
-    Console().print(f"{settings.database_path} is at the newest revision")
 
 
 @app.command()
@@ -90,6 +92,10 @@ def replay(
     ] = None,
     hard: Annotated[bool, typer.Option("--hard", help="With --protocol: a far knock.")] = False,
     still: Annotated[bool, typer.Option("--still", help="With --protocol: no knock.")] = False,
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes admin and ingest, if needed."),
+    ] = None,
 ) -> None:
     """Register a recorded camera and post its tracks in time order."""
     import httpx
@@ -100,7 +106,7 @@ def replay(
 
     if protocol is not None:
         name = "hard" if hard else "still" if still else knock or "knock"
-        _replay_protocol(scene_dir, url, protocol, name)
+        _replay_protocol(scene_dir, url, protocol, name, token)
         return
     console = Console()
     try:
@@ -112,6 +118,7 @@ def replay(
                 knock=_knock(knock or "0,0,0"),
                 speed=speed,
                 on_progress=lambda now: bar.update(task, total=now.tracks, completed=now.posted),
+                token=token,
             )
     except (CalibrationError, httpx.HTTPError) as error:
         console.print(f"[red]replay failed:[/] {error}")
@@ -134,125 +141,12 @@ def demo(
     """Simulate a street, knock its camera, and watch the alert come: half a minute on 2 cores."""
     from service.demo import run_demo
 
+    be_private()
     stays = sys.stdin.isatty() if stay is None else stay
     raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
-@app.command()
-def evaluate(
-    scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
-    seeds: Annotated[int, typer.Option(min=1, help="How many knocks a scene.")] = 12,
-    knocks: Annotated[
-        str, typer.Option(help="Of still, knock, hard, pan, hard-pan; with commas.")
-    ] = "knock",
-    regressors: Annotated[
-        bool, typer.Option(help="Train regressors too: minutes for each scene.")
-    ] = False,
-    processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
-    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("evaluation.json"),
-    plots: Annotated[Path | None, typer.Option(help="Folder for PNG plots.")] = None,
-    alarms: Annotated[
-        bool, typer.Option("--alarms", help="Still and delay instead: the drift chart's alarms.")
-    ] = False,
-    tracks_a_day: Annotated[
-        float, typer.Option(min=1, help="With --alarms: how many people a camera sees.")
-    ] = 200.0,
-    alarms_a_year: Annotated[
-        float, typer.Option(min=0.001, help="With --alarms: false ones allowed.")
-    ] = 1.0,
-) -> None:
-    """Knock the cameras of recorded scenes and measure every estimator: the protocol."""
-    from models.errors import CalibrationError
-    from service.alarm_study import AlarmPlan, run_scene_alarms
-    from service.evaluate import run_protocol
-
-    try:
-        if alarms:
-            plan = AlarmPlan(
-                alarms_a_year=alarms_a_year,
-                tracks_a_day=tracks_a_day,
-                reference_tracks=0,
-                days=365,
-            )
-            run_scene_alarms(scenes, seeds=seeds, plan=plan, processes=processes, output=output)
-            return
-        run_protocol(
-            scenes,
-            seeds=seeds,
-            knocks=knocks.split(","),
-            regressors=regressors,
-            processes=processes,
-            output=output,
-            plots=plots,
-        )
-    except CalibrationError as error:
-        Console(stderr=True).print(f"[red]evaluate failed:[/] {error}")
-        raise typer.Exit(1) from error
-
-
-@app.command()
-def flow_study(
-    sites: Annotated[int, typer.Option(min=1, help="How many simulated sites.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
-    processes: Annotated[int, typer.Option(min=1, help="Sites at once, a core each.")] = 2,
-    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("flow-study.json"),
-) -> None:
-    """Simulated sites: how well a flow map tells a knock, and what a new path does to a pose."""
-    from service.flow_study import run_flow_study
-
-    run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
-
-
-@app.command()
-def alarm_study(
-    sites: Annotated[int, typer.Option(min=1, help="How many simulated cameras.")] = 60,
-    days: Annotated[int, typer.Option(min=7, help="How long each lives.")] = 365,
-    tracks_a_day: Annotated[float, typer.Option(min=1, help="People it sees.")] = 60.0,
-    reference_tracks: Annotated[int, typer.Option(min=20, help="Of its reference.")] = 200,
-    alarms_a_year: Annotated[float, typer.Option(min=0.001, help="False ones allowed.")] = 1.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
-    processes: Annotated[int, typer.Option(min=1, help="Cameras at once, a core each.")] = 2,
-    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("alarm-study.json"),
-) -> None:
-    """Simulated camera-years of people's habits: false alarms, and tracks until true ones."""
-    from service.alarm_study import AlarmPlan, run_alarm_study
-
-    plan = AlarmPlan(
-        alarms_a_year=alarms_a_year,
-        tracks_a_day=tracks_a_day,
-        reference_tracks=reference_tracks,
-        days=days,
-    )
-    run_alarm_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
-
-
-@app.command()
-def centred(
-    scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
-    recipe: Annotated[str, typer.Option(help="Recipe: default or paper.")] = "default",
-    seeds: Annotated[str, typer.Option(help="Seeds, with commas.")] = "0",
-    speeds: Annotated[str, typer.Option(help="Training speeds in m/s, with commas.")] = "1.4",
-    epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
-    processes: Annotated[int, typer.Option(min=1, help="Trainings at once, a core each.")] = 1,
-    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("centred.json"),
-    plot: Annotated[Path | None, typer.Option(help="PNG of errors over training speed.")] = None,
-) -> None:
-    """The paper's own experiment: train around each scene's true pose, average, print errors."""
-    from service.centred import run_centred
-
-    run_centred(
-        scenes,
-        recipe=recipe,
-        seeds=[int(seed) for seed in seeds.split(",")],
-        speeds_mps=[float(speed) for speed in speeds.split(",")],
-        epochs=epochs,
-        processes=processes,
-        output=output,
-        plot=plot,
-    )
-
-
-def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
+def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str, token: str | None) -> None:
     """Put a case of the protocol to a service and print the served pose beside the truth."""
     import httpx
     from rich.progress import Progress
@@ -275,6 +169,7 @@ def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str) -> None:
                 on_progress=lambda what, done, total: bar.update(
                     task, description=what, total=total, completed=done
                 ),
+                token=token,
             )
     except (CalibrationError, httpx.HTTPError, TimeoutError) as error:
         console.print(f"[red]replay failed:[/] {error}")
@@ -299,9 +194,23 @@ def _knock(text: str) -> "Any":
     )
 
 
+for _command in (*DATA_COMMANDS, *STUDIES):
+    app.command()(_command)
+
+
 def main() -> None:
-    """Entry point of the `surefoot` command."""
-    app()
+    """Entry point of the `surefoot` command; what an operator can mend is told in a line."""
+    try:
+        app()
+    except StartError as error:
+        typer.echo(f"surefoot: {error}", err=True)
+        raise SystemExit(1) from None
+    except ValidationError as error:
+        if error.title != Settings.__name__:
+            raise
+        for line in wrong_settings(error):
+            typer.echo(f"surefoot: {line}", err=True)
+        raise SystemExit(2) from None
 
 
 if __name__ == "__main__":

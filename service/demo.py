@@ -2,11 +2,8 @@
 
 import math
 import os
-import signal
-import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -29,6 +26,14 @@ from models.geometry.rotation import angle_between
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
+from service.data_dir import StartError
+from service.demo_folder import (
+    demo_folder,
+    free_port,
+    remove_left_over,
+    require_free,
+)
+from service.process import end_like_ctrl_c
 from service.replay import post_tracks
 from service.settings import Settings
 
@@ -91,19 +96,25 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
+    port = port or free_port()
+    remove_left_over()
+    require_free(port)
+    end_like_ctrl_c()
     console.print("A street camera, people walking by; later somebody knocks the camera.")
-    with tempfile.TemporaryDirectory(prefix="surefoot-demo-") as folder:
+    with demo_folder() as folder:
         settings = Settings(
-            data_dir=Path(folder),
-            port=port or _free_port(),
+            data_dir=folder,
+            port=port,
             recipe="default",
             epochs=_EPOCHS,
             seed=seed,
             workers=1,
+            auth="off",  # it plays by itself, and with nothing that is anybody's
         )
         url = f"http://{settings.host}:{settings.port}"
         console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")
-        with _service(settings), httpx.Client(base_url=url, timeout=30) as http:
+        with _service(settings) as service, httpx.Client(base_url=url, timeout=30) as http:
+            _wait_ready(http, service, started)
             screen, progress = _play(http, console, seed, started)
             won = _close(console, screen, url, time.monotonic() - started)
             if picture is not None:
@@ -129,7 +140,6 @@ def _play(
     )
     clock_s = time.time() - _BETWEEN_S * sum(count for _, _, count in parts)
     with Live(get_renderable=lambda: screen.table(progress), console=console) as live:
-        _wait_ready(http, started)
         training = progress.add_task("beside it, a regressor is trained", total=None)
         http.post("/cameras", json=_camera()).raise_for_status()
         for number, (words, pose, count) in enumerate(parts):
@@ -237,8 +247,10 @@ def _camera() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _wait_ready(http: httpx.Client, started: float) -> None:
+def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: float) -> None:
     while True:
+        if service.poll() is not None:
+            raise StartError(f"demo: its service ended with {service.returncode}, see above")
         try:
             if http.get("/readyz").status_code == 200:
                 return
@@ -249,23 +261,24 @@ def _wait_ready(http: httpx.Client, started: float) -> None:
 
 
 @contextmanager
-def _service(settings: Settings) -> Iterator[None]:
+def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
     log_path = settings.data_dir / "serve.log"
     with log_path.open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "serve"],
+            [sys.executable, "-m", "service.cli", "serve", "--follow-stdin"],
             env=settings.as_environment(),
+            stdin=subprocess.PIPE,  # its other end closes when we end, in whatever way
             stdout=log,
             stderr=log,
             start_new_session=True,  # Ctrl-C is ours to pass on
         )
         try:
-            yield
+            yield process
         except Exception:
             Console(stderr=True).print(log_path.read_text()[-4000:], markup=False)
             raise
         finally:
-            process.send_signal(signal.SIGTERM)
+            process.terminate()
             process.wait(20)
 
 
@@ -301,10 +314,3 @@ def _served(pose: dict[str, Any]) -> Sequence[str]:
 
 def _clock(moment: str | None) -> str:
     return "an unknown time" if moment is None else f"{datetime.fromisoformat(moment):%H:%M:%S}"
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

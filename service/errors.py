@@ -12,15 +12,46 @@ class FieldError:
 
 
 class ServiceError(Exception):
-    """An error with an HTTP status and a stable code; the message is the detail."""
+    """An error with an HTTP status and a stable code; the message is the detail.
+
+    `retry_after_s` tells when to come back, where that helps.
+    """
 
     status = 500
     code = "internal"
 
-    def __init__(self, detail: str, errors: tuple[FieldError, ...] = ()) -> None:
+    def __init__(
+        self,
+        detail: str,
+        errors: tuple[FieldError, ...] = (),
+        retry_after_s: float | None = None,
+    ) -> None:
         super().__init__(detail)
         self.detail = detail
         self.errors = errors
+        self.retry_after_s = retry_after_s
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that go with the answer."""
+        return {}
+
+
+class UnauthorizedError(ServiceError):
+    """Nobody is known to ask, or with what nobody is let in."""
+
+    status, code = 401, "unauthorized"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """How to be let in."""
+        return {"WWW-Authenticate": 'Bearer realm="surefoot"'}
+
+
+class ForbiddenError(ServiceError):
+    """Who asks is known, and may not do this."""
+
+    status, code = 403, "forbidden"
 
 
 class SwitchedOffError(ServiceError):
@@ -81,3 +112,39 @@ class UnsupportedMediaTypeError(ServiceError):
     """A body of a content type that the path does not take."""
 
     status, code = 415, "unsupported_media_type"
+
+
+class TooManyCamerasError(ServiceError):
+    """As many cameras are registered as may be."""
+
+    status, code = 409, "too_many_cameras"
+
+
+class TooManyRequestsError(ServiceError):
+    """More requests than a token, an address or a camera may make."""
+
+    status, code = 429, "too_many_requests"
+
+
+class QuotaError(ServiceError):
+    """More bytes of a camera are stored than may be, until the next retention."""
+
+    status, code = 429, "quota_exceeded"
+
+
+class OverloadedError(ServiceError):
+    """More is asked for at once than can be worked on; nothing was done."""
+
+    status, code = 503, "overloaded"
+
+
+class StoreUnavailableError(ServiceError):
+    """The store cannot be read or written now; nothing was stored."""
+
+    status, code = 503, "store_unavailable"
+
+
+class StorageFullError(ServiceError):
+    """The disk is full; nothing was stored."""
+
+    status, code = 507, "storage_full"

@@ -18,6 +18,8 @@ APPLICATION = "surefoot"
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, HOUSEKEEPING_QUEUE = "train", "estimate", "housekeeping"
 DELIVER_QUEUE = "deliver"
+# Of the engine's tables those that nothing works without.
+ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 

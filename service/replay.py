@@ -15,6 +15,7 @@ from models.geometry.pose import CameraPose
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
+_TRIES, _LONGEST_WAIT_S = 30, 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +36,7 @@ def replay_scene(
     knock: Knock,
     speed: float,
     on_progress: Callable[[ReplayProgress], None],
+    token: str | None = None,
 ) -> tuple[Scene, ReplayProgress]:
     """Register the scene's camera with its true pose as prior, and post its tracks in time order.
 
@@ -46,7 +48,7 @@ def replay_scene(
         httpx.HTTPError: the service cannot be reached or refuses.
     """
     scene = load_scene(folder)
-    with httpx.Client(base_url=url, timeout=60) as http:
+    with client_of(url, token) as http:
         body = camera_body(scene.scene_id, scene.intrinsics, scene.true_pose)
         answer = http.post("/cameras", json={**body, "frame_rate_hz": scene.frame_rate_hz})
         if answer.status_code != 409:
@@ -71,10 +73,19 @@ def replay_scene(
     return scene, progress
 
 
+def client_of(url: str, token: str | None) -> httpx.Client:
+    """A client of a service, with a token where it wants one: of the scopes admin and ingest."""
+    headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+    return httpx.Client(base_url=url, timeout=60, headers=headers)
+
+
 def post_tracks(
     http: httpx.Client, camera_id: str, tracks: Sequence[SceneTrack], shift_s: float
 ) -> dict[str, Any]:
-    """Post the foot points of some tracks with their times shifted; returns the receipt."""
+    """Post the foot points of some tracks with their times shifted; returns the receipt.
+
+    Comes back when a busy service says so; a post that is repeated changes nothing.
+    """
     body = {
         "source": _SOURCE,
         "tracks": [
@@ -92,7 +103,12 @@ def post_tracks(
             for track in tracks
         ],
     }
-    answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
+    for _ in range(_TRIES):
+        answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
+        wait_s = float(answer.headers.get("retry-after", "inf"))
+        if answer.status_code not in (429, 503) or wait_s > _LONGEST_WAIT_S:
+            break
+        time.sleep(wait_s)
     document: dict[str, Any] = answer.json()
     if document.get("code") == "nothing_taken":  # too short, all of them: the next may be longer
         return {"accepted": 0, "duplicates": 0, "rejected": document["errors"]}

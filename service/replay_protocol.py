@@ -20,7 +20,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, angle_between
 from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
-from service.replay import camera_body
+from service.replay import camera_body, client_of
 
 _SOURCE = "surefoot-protocol"
 _BATCH_TRACKS = 500  # a whole half of most scenes: one estimate of all, as offline
@@ -53,6 +53,7 @@ def replay_protocol(
     seed: int,
     knock: str,
     on_progress: Callable[[str, int, int], None],
+    token: str | None = None,
 ) -> ProtocolReplay:
     """Register a camera for one case, let it learn its reference, and show it the knocked tracks.
 
@@ -62,6 +63,7 @@ def replay_protocol(
         seed: of the case: who walks before the knock, and the knock.
         knock: how far it may go, a name in `models.evaluation.protocol.RANGES`.
         on_progress: is told what is waited for, how much there is, and how much is wanted.
+        token: for a service that wants one: of the scopes admin and ingest.
 
     Raises:
         httpx.HTTPError: the service cannot be reached or refuses.
@@ -77,7 +79,7 @@ def replay_protocol(
         )
     camera_id = f"{case.scene_id}-{knock}-{seed}"
     shifts = _shifts(case)
-    with httpx.Client(base_url=url, timeout=60) as http:
+    with client_of(url, token) as http:
         body = camera_body(camera_id, case.intrinsics, case.prior_pose)
         http.post("/cameras", json={**body, "reference_tracks": wanted}).raise_for_status()
         lost = _post(http, camera_id, case.reference, "r", shifts[0], case.intrinsics)

@@ -1,5 +1,6 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
+import base64
 import os
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Network, IPv6Network, ip_network
@@ -7,8 +8,10 @@ from pathlib import Path
 from typing import Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from service.data_dir import DATABASE, WEIGHTS
 
 
 class Settings(BaseSettings):
@@ -19,7 +22,35 @@ class Settings(BaseSettings):
     data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
     host: str = Field("127.0.0.1", description="address that the API listens on")
     port: int = Field(8080, ge=0, le=65535, description="port that the API listens on")
+    allowed_hosts: str = Field(
+        "", description="names, with commas, that this service is asked by besides its own"
+    )
+    auth: Literal["auto", "on", "off"] = Field(
+        "auto", description="whether tokens are needed; auto: unless only this machine is served"
+    )
+    session_hours: float = Field(
+        12.0, gt=0, le=8760, description="hours until a page has to log in again"
+    )
+    proxy_secret: str | None = Field(
+        None,
+        min_length=16,
+        repr=False,
+        description="what a proxy that logs people in says in X-Surefoot-Proxy",
+    )
+    proxy_from: str = Field("", description="CIDRs, with commas, that such a proxy asks from")
+    proxy_user_header: str = Field("X-Forwarded-User", description="its header of the person")
+    proxy_role_header: str = Field(
+        "X-Forwarded-Role", description="its header of what that may: read, operate or admin"
+    )
     workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
+    secret_key: str | None = Field(
+        None,
+        repr=False,
+        description="32 bytes in base64 that seal webhooks' secrets; unset: secret.key in data_dir",
+    )
+    copy_before_migration: bool = Field(
+        True, description="copy the database before its schema changes; without room: no start"
+    )
 
     recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
     epochs: int | None = Field(
@@ -78,11 +109,21 @@ class Settings(BaseSettings):
 
     keep_days: float = Field(30.0, gt=0, description="days from a track's arrival to its deletion")
     keep_tracks: int = Field(
-        20_000, ge=5, description="tracks kept for each camera: the last to arrive"
+        20_000, ge=5, description="tracks kept of a camera: the last to arrive"
     )
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
+    )
+    keep_alerts_days: float = Field(
+        1825.0, ge=30, description="age at which ended alerts are deleted"
+    )
+    keep_trainings: int = Field(
+        50, ge=2, description="trainings kept for each camera, beside those of its models"
+    )
+    keep_references: int = Field(
+        50, ge=2, description="references and prior poses kept that no estimate is of"
     )
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
@@ -108,8 +149,46 @@ class Settings(BaseSettings):
     )
     public_url: str | None = Field(None, description="where people reach this service, for links")
 
+    max_connections: int = Field(1000, ge=1, description="open connections")
+    connections_per_address: int = Field(
+        500, ge=0, description="of them from one address; 0: as many as there may be"
+    )
+    head_timeout_s: float = Field(
+        10.0, gt=0, description="within which the headers of a request must have come"
+    )
+    stall_timeout_s: float = Field(
+        15.0, gt=0, description="within which more of a body must come, or of an answer be taken"
+    )
+    http_at_once: int = Field(8, ge=1, description="reads, and writes, that are worked on at once")
+    http_waiting: int = Field(64, ge=0, description="of each that wait meanwhile; more get a 503")
+    http_wait_s: float = Field(
+        5.0, gt=0, description="longest wait of a request for its turn, and for the store"
+    )
+    max_streams: int = Field(200, ge=1, description="open streams of /events")
+    max_body_mb: float = Field(1.0, gt=0, description="MiB of a body")
+    max_tracks_body_mb: float = Field(32.0, gt=0, description="MiB of a body with tracks")
+    max_snapshot_mb: float = Field(8.0, gt=0, description="MiB of a still image")
+    max_bodies_mb: float = Field(256.0, gt=0, description="MiB of all bodies in memory at once")
+    caller_rate: float = Field(
+        500.0, ge=0, description="requests a second of a token, or an address; 0: any"
+    )
+    camera_rate: float = Field(
+        100.0, ge=0, description="posts of tracks a second for a camera; 0: any"
+    )
+    max_cameras: int = Field(2000, ge=1, description="cameras that may be registered")
+    min_free_mb: float = Field(
+        64.0, ge=0, description="MiB of free disk below which /readyz warns; 0: any"
+    )
+
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
+
+    @field_validator("secret_key")
+    @classmethod
+    def _key_of_32_bytes(cls, value: str | None) -> str | None:
+        if value is not None:
+            read_key(value)
+        return value
 
     @field_validator("timezone")
     @classmethod
@@ -128,10 +207,17 @@ class Settings(BaseSettings):
         """The cameras' zone; UTC needs no zone database."""
         return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
 
-    @field_validator("webhook_allow")
+    @field_validator("webhook_allow", "proxy_from")
     @classmethod
     def _networks(cls, value: str) -> str:
         _read_networks(value)
+        return value
+
+    @field_validator("proxy_from")
+    @classmethod
+    def _proxies_prove_themselves(cls, value: str, info: ValidationInfo) -> str:
+        if value and info.data.get("proxy_secret") is None:
+            raise ValueError("SUREFOOT_PROXY_SECRET is needed, too: an address alone proves little")
         return value
 
     @field_validator("webhook_retry_s")
@@ -147,6 +233,11 @@ class Settings(BaseSettings):
         return _read_networks(self.webhook_allow)
 
     @property
+    def proxy_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
+        """Where proxies that log people in ask from."""
+        return _read_networks(self.proxy_from)
+
+    @property
     def webhook_delays_s(self) -> tuple[float, ...]:
         """Seconds from each failed attempt to the next; the last one repeats."""
         return _read_numbers(self.webhook_retry_s)
@@ -154,7 +245,7 @@ class Settings(BaseSettings):
     @property
     def database_path(self) -> Path:
         """The SQLite file of the application and its job engine."""
-        return self.data_dir / "surefoot.sqlite"
+        return self.data_dir / DATABASE
 
     @property
     def database_url(self) -> str:
@@ -164,13 +255,42 @@ class Settings(BaseSettings):
     @property
     def weights_dir(self) -> Path:
         """Folder of weight files, named by their hash."""
-        return self.data_dir / "weights"
+        return self.data_dir / WEIGHTS
 
     def as_environment(self) -> dict[str, str]:
         """This process's environment with these settings in it, for a child process."""
         values = self.model_dump(mode="json", exclude_none=True)
         ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
+
+
+_SECRETS = ("secret_key", "proxy_secret")
+
+
+def wrong_settings(error: ValidationError) -> list[str]:
+    """One line for each setting that was refused: its variable, what is needed, what was given."""
+    lines = []
+    for item in error.errors(include_url=False):
+        name = ".".join(str(part) for part in item["loc"])
+        reason = item["msg"].removeprefix("Value error, ")
+        given = "" if name in _SECRETS or ", got " in reason else f", got {item['input']!r:.80}"
+        lines.append(f"SUREFOOT_{name.upper()}: {reason}{given}")
+    return lines
+
+
+def read_key(text: str) -> bytes:
+    """The 32 bytes of a key in base64, the plain alphabet or the one for URLs.
+
+    Raises:
+        ValueError: it is not such a key. A passphrase is not: it would be guessed.
+    """
+    try:
+        key = base64.b64decode(text.strip().translate(str.maketrans("-_", "+/")), validate=True)
+    except ValueError:
+        key = b""
+    if len(key) != 32:
+        raise ValueError("32 bytes in base64 are needed, as `openssl rand -base64 32` prints them")
+    return key
 
 
 def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:

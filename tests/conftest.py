@@ -21,6 +21,9 @@ from models.geometry.pose import CameraPose
 from service.migrate import migrate
 from service.settings import Settings
 
+# The name that starlette's TestClient asks by.
+os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
+
 CAMERA: dict[str, Any] = {
     "id": "corner",
     "name": "The corner",

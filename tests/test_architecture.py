@@ -11,14 +11,27 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
+    {"data_dir", "process"},
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue", "delivery"},
-    {"migrate", "recalibration"},
-    {"schemas", "jobs", "web"},
+    {"formats", "store", "job_queue", "delivery", "reach"},
+    {"recalibration"},
+    {"access"},
+    {"backup", "schemas", "jobs", "web"},
+    {"migrate"},
     {"routes"},
-    {"app", "listener", "local_workers", "protocol_plots", "protocol_tables", "alarm_tables"},
-    {"serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {
+        "app",
+        "connections",
+        "listener",
+        "local_workers",
+        "protocol_plots",
+        "protocol_tables",
+        "alarm_tables",
+    },
+    {"token_commands", "serve", "replay", "evaluate", "flow_study", "alarm_study", "centred"},
+    {"demo_folder"},
     {"demo", "replay_protocol"},
+    {"commands_data", "commands_studies"},
     {"cli"},
 ]
 MODEL_ROOMS = [

@@ -1,13 +1,13 @@
 """Requests that carry tracks as JSON and NDJSON, and what all forms have in common."""
 
 import json
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from functools import partial
 from typing import Any, NoReturn
 
 from service.errors import FieldError, MalformedError, TooLargeError
+from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
 from service.formats.track import (
     MAX_ID_LENGTH,
     MAX_TRACKS,
@@ -17,10 +17,12 @@ from service.formats.track import (
     Limits,
     Rejection,
     TrackRejectedError,
+    is_text,
     read_track,
 )
 
 DEFAULT_SOURCE = "unnamed"
+_FAR_S = 1e12
 
 
 def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
@@ -36,13 +38,13 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
         TooLargeError: too many tracks.
     """
     try:
-        document = json.loads(body)
+        document = read_document(body)
     except (ValueError, RecursionError) as error:
         raise malformed("", f"not JSON: {error}") from error
     if not isinstance(document, dict):
         raise malformed("", f"an object with tracks is needed, got {type(document).__name__}")
     tracks = document.get("tracks")
-    if not isinstance(tracks, list):
+    if not isinstance(tracks, list | TrackTexts):
         raise malformed("/tracks", "a list of tracks is needed")
     check_count(len(tracks))
     source = read_source(document.get("source", DEFAULT_SOURCE), "/source")
@@ -51,10 +53,13 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
         frame_rate_hz=clock.frame_rate_hz if rate is None else read_rate(rate, "/frame_rate_hz"),
         started_at_s=clock.started_at_s if start is None else read_time(start, "/started_at"),
     )
-    return collect(
-        (index, raw, partial(read_track, raw, source, clock, limits))
-        for index, raw in enumerate(tracks)
-    )
+    try:
+        return collect(
+            (index, raw, partial(read_track, raw, source, clock, limits))
+            for index, raw in enumerate(tracks)
+        )
+    except (ValueError, RecursionError) as error:
+        raise malformed("", f"not JSON: {error}") from error
 
 
 def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch:
@@ -65,15 +70,18 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
     """
     lines = [line for line in body.split(b"\n") if line.strip()]
     check_count(len(lines))
-    items: list[tuple[int, Any, Callable[[], IncomingTrack]]] = []
-    for index, line in enumerate(lines):
-        try:
-            raw = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            items.append((index, None, partial(refuse, f"not JSON: {error}")))
-        else:
-            items.append((index, raw, partial(read_track, raw, source, clock, limits)))
-    return collect(items)
+
+    def items() -> Iterator[tuple[int, Any, Callable[[], IncomingTrack]]]:
+        for index, line in enumerate(lines):
+            try:
+                large = len(line) > MAX_TRACK_CHARS
+                raw = OversizedTrack(characters=len(line)) if large else json.loads(line)
+            except (ValueError, RecursionError) as error:
+                yield index, None, partial(refuse, f"not JSON: {error}")
+            else:
+                yield index, raw, partial(read_track, raw, source, clock, limits)
+
+    return collect(items())
 
 
 def read_source(value: Any, pointer: str) -> str:
@@ -82,8 +90,9 @@ def read_source(value: Any, pointer: str) -> str:
     Raises:
         MalformedError: no text of 1 to 200 characters.
     """
-    if not isinstance(value, str) or not 1 <= len(value) <= MAX_ID_LENGTH:
-        raise malformed(pointer, f"text of 1 to {MAX_ID_LENGTH} characters is needed")
+    if not isinstance(value, str) or not 1 <= len(value) <= MAX_ID_LENGTH or not is_text(value):
+        reason = f"text of 1 to {MAX_ID_LENGTH} characters is needed, none of them NUL or half one"
+        raise malformed(pointer, reason)
     return value
 
 
@@ -112,7 +121,8 @@ def read_time(value: Any, pointer: str) -> float:
         if moment.tzinfo is None:
             raise malformed(pointer, f"a time with its zone is needed, got {value!r:.40}")
         return moment.timestamp()
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    # A whole number may be larger than any float.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _FAR_S:
         raise malformed(pointer, f"RFC 3339 or seconds since 1970 are needed, got {value!r:.40}")
     return float(value)
 
@@ -131,12 +141,16 @@ def collect(
             rejections.append(
                 Rejection(
                     index=index,
-                    track_id=str(name)[:MAX_ID_LENGTH] if known else None,
+                    track_id=_sendable(str(name)[:MAX_ID_LENGTH]) if known else None,
                     code=refused.code,
                     detail=refused.detail,
                 )
             )
     return Batch(tracks=tuple(tracks), rejections=tuple(rejections), left_out=left_out)
+
+
+def _sendable(text: str) -> str:
+    return text.encode("utf-8", errors="replace").decode()
 
 
 def refuse(detail: str) -> NoReturn:

@@ -1,29 +1,31 @@
-"""Calibrations as OpenCV's FileStorage keeps them, in YAML, XML or JSON."""
+"""Calibrations as OpenCV's FileStorage keeps them: checked here, read in a process of its own.
 
+OpenCV's parser is C++ that a file can crash, so that it never runs in the process of the API: see
+`calibration_reader`.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
-from models.geometry.rotation import Array
-from service.errors import FieldError, MalformedError
-
-if TYPE_CHECKING:
-    import cv2
+from service.errors import FieldError, MalformedError, OverloadedError
 
 MAX_BYTES = 1024 * 1024
-# What tutorials, calib3d's samples and ROS call things.
-_NAMES = {
-    "matrix": ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "intrinsics", "M"),
-    "distortion": (
-        "distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "distCoeffs",
-        "dist_coeff", "distortion", "D", "D1",
-    ),
-    "rotation": ("R", "rotation", "rotation_matrix", "rotationMatrix", "rvec", "rvecs"),
-    "translation": ("t", "T", "translation", "translation_vector", "tvec", "tvecs"),
-    "width": ("image_width", "image_Width", "width"),
-    "height": ("image_height", "image_Height", "height"),
-}  # fmt: skip
+MAX_DEPTH = 32  # brackets or tags in each other; OpenCV itself writes 4
+MAX_INDENT = 200  # columns, by which YAML nests, too
+MAX_SECONDS = 10.0
+MAX_ANSWER_BYTES = 64 * 1024
+_AT_ONCE = 2
+_READER = "service.formats.calibration_reader"
+
+_OPENING = re.compile(rb"(?P<open>[\[{]|<[A-Za-z_])|(?P<close>[\]}]|</|/>)")
+_INDENT = re.compile(rb"^[ \t\-?:]*", re.MULTILINE)
+_free = threading.BoundedSemaphore(_AT_ONCE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,84 +39,69 @@ class CalibrationFile:
     size: tuple[int, int] | None
 
 
-def read_calibration(body: bytes) -> CalibrationFile:
+def read_calibration(body: bytes, timeout_s: float = MAX_SECONDS) -> CalibrationFile:
     """The calibration in a file of OpenCV's.
 
     Raises:
-        MalformedError: it is none, says nothing of a camera, or what it says has another shape.
+        MalformedError: it is none, says nothing of a camera, what it says has another shape, or it
+            broke its reader.
+        OverloadedError: so many are being read that this one has to wait.
     """
-    import cv2  # 40 MB that few registrations need
-
-    text = body.decode("utf-8", errors="replace").strip()
-    if len(body) > MAX_BYTES or not text or "\0" in text:
-        raise _malformed(f"an OpenCV file of at most {MAX_BYTES // 1024} KiB is needed")
+    _check(body)
+    if not _free.acquire(blocking=False):
+        raise OverloadedError(
+            f"file: {_AT_ONCE} files are read at once, and so many are", retry_after_s=2
+        )
     try:
-        storage = cv2.FileStorage(text + "\n", cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        try:
-            if not storage.isOpened():
-                raise _malformed("this is no OpenCV YAML, XML or JSON")
-            return _read(storage)
-        finally:
-            storage.release()
-    except (cv2.error, SystemError) as error:
-        raise _malformed("this is no OpenCV YAML, XML or JSON") from error
+        answer = _ask_reader(body, timeout_s)
+    finally:
+        _free.release()
+    if "refused" in answer:
+        raise _malformed(str(answer["refused"]))
+    parts = {name: None if value is None else tuple(value) for name, value in answer.items()}
+    return CalibrationFile(**parts)
 
 
-def _read(storage: "cv2.FileStorage") -> CalibrationFile:
-    matrix = _numbers(storage, "matrix", (9,))
-    distortion = _numbers(storage, "distortion", (1, 2, 3, 4, 5, 8, 12, 14))
-    rotation = _numbers(storage, "rotation", (3, 9))
-    translation = _numbers(storage, "translation", (3,))
-    if matrix is None and rotation is None:
-        raise _malformed(
-            "neither a camera matrix (camera_matrix, K) nor a rotation (R, rvec) is in this file"
+def _check(body: bytes) -> None:
+    """Refuse what no calibration is, before anything with a stack to overflow looks at it."""
+    if len(body) > MAX_BYTES:
+        raise _malformed(f"at most {MAX_BYTES} bytes are taken, got {len(body)}")
+    if not body.strip() or b"\0" in body:
+        raise _malformed("an OpenCV file is needed, this is empty or binary")
+    depth = 0
+    for found in _OPENING.finditer(body):
+        depth = max(depth + (1 if found.lastgroup == "open" else -1), 0)
+        if depth > MAX_DEPTH:
+            raise _malformed(f"lists or tags in each other: at most {MAX_DEPTH} are taken")
+    if max(len(found.group()) for found in _INDENT.finditer(body)) > MAX_INDENT:
+        raise _malformed(f"indent: at most {MAX_INDENT} columns are taken")
+
+
+def _ask_reader(body: bytes, timeout_s: float) -> dict[str, Any]:
+    # Of this process's environment, which may hold secrets, the reader gets nothing but the way to
+    # the modules.
+    environment = {"PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", _READER],
+            input=body,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            timeout=timeout_s,
+            check=True,
         )
-    if distortion is not None and any(distortion[5:]):
-        raise _malformed(
-            f"the lens has {len(distortion)} distortion numbers; k1, k2, p1, p2, k3 are taken. "
-            "Calibrate again without CALIB_RATIONAL_MODEL, CALIB_THIN_PRISM_MODEL, CALIB_TILTED"
-        )
-    sides = [_number(storage, name) for name in ("width", "height")]
-    return CalibrationFile(
-        matrix=matrix,
-        distortion=None if distortion is None else (*distortion, 0, 0, 0, 0)[:5],
-        rotation=rotation,
-        translation=translation,
-        size=None if None in sides else (int(sides[0] or 0), int(sides[1] or 0)),
-    )
-
-
-def _numbers(
-    storage: "cv2.FileStorage", what: str, counts: tuple[int, ...]
-) -> tuple[float, ...] | None:
-    for name in _NAMES[what]:
-        node = storage.getNode(name)
-        if node.empty():
-            continue
-        values = _values(node)
-        if len(values) not in counts or not np.isfinite(values).all():
-            wanted = " or ".join(str(count) for count in counts)
-            raise _malformed(f"{name}: {wanted} finite numbers are needed, got {len(values)}")
-        return tuple(float(value) for value in values)
-    return None
-
-
-def _values(node: Any) -> Array:
-    """The numbers of a matrix, or of a plain list."""
-    if node.isSeq():
-        items = [node.at(n) for n in range(node.size())]
-        return np.array([item.real() for item in items if item.isReal() or item.isInt()])
-    matrix = node.mat() if node.isMap() else None
-    return np.zeros(0) if matrix is None else np.asarray(matrix, dtype=np.float64).ravel()
-
-
-def _number(storage: "cv2.FileStorage", what: str) -> float | None:
-    for name in _NAMES[what]:
-        node = storage.getNode(name)
-        if node.isInt() or node.isReal():
-            return float(node.real())
-    return None
+        answer = json.loads(done.stdout)
+    except subprocess.TimeoutExpired as error:
+        raise _malformed(f"it was not read within {timeout_s:g} s") from error
+    except subprocess.CalledProcessError as error:
+        status = error.returncode
+        raise _malformed(f"its reader ended over it with status {status}") from error
+    except ValueError as error:
+        raise _malformed("its reader said nothing that makes sense") from error
+    assert isinstance(answer, dict)
+    return answer
 
 
 def _malformed(reason: str) -> MalformedError:
-    return MalformedError(reason, (FieldError(pointer="/file", reason=reason),))
+    return MalformedError(f"file: {reason}", (FieldError(pointer="/file", reason=reason),))

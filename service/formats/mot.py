@@ -15,6 +15,7 @@ from service.formats.track import (
     IncomingTrack,
     Limits,
     check_track,
+    track_name,
 )
 
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
@@ -79,7 +80,8 @@ def read_mot(
         if track_id in lines.broken:
             refuse(lines.broken[track_id])
         array = np.array(boxes[track_id], dtype=np.float64).reshape(-1, 5)
-        return check_track(track_id, source, array[np.argsort(array[:, 0], kind="stable")], limits)
+        ordered = array[np.argsort(array[:, 0], kind="stable")]
+        return check_track(track_name(track_id), source, ordered, limits)
 
     return collect(
         (

@@ -6,7 +6,6 @@ from io import BytesIO
 
 from service.errors import MalformedError, TooLargeError, UnsupportedMediaTypeError
 
-MAX_STILL_BYTES = 8 * 1024 * 1024
 _MOST_PIXELS = 50_000_000
 _LONGEST_SIDE = 1920  # behind a drawing, more is not seen
 _QUALITY = 82
@@ -27,15 +26,13 @@ def read_still(body: bytes, media_type: str) -> Still:
 
     Raises:
         UnsupportedMediaTypeError: neither JPEG nor PNG is said to come.
-        TooLargeError: more bytes or pixels than are taken.
+        TooLargeError: more pixels than are taken.
         MalformedError: it cannot be decoded as what it is said to be.
     """
     if media_type not in _FORMATS:
         raise UnsupportedMediaTypeError(
             f"Content-Type: image/jpeg or image/png is needed, got {media_type or 'none'}"
         )
-    if len(body) > MAX_STILL_BYTES:
-        raise TooLargeError(f"body: at most {MAX_STILL_BYTES} bytes are taken, got {len(body)}")
     from PIL import Image, ImageOps  # few cameras have a picture
 
     try:

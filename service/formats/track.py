@@ -8,10 +8,10 @@ import numpy as np
 
 from models.geometry.rotation import Array
 from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
+from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
 
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
-MAX_BODY_BYTES = 32 * 1024 * 1024
 MAX_ID_LENGTH = 200
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
@@ -87,6 +87,11 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
     Raises:
         TrackRejectedError: with a code, the field, the limit and the value received.
     """
+    if isinstance(raw, OversizedTrack):
+        raise TrackRejectedError(
+            "too_many_points",
+            f"a track of at most {MAX_TRACK_CHARS} characters is taken, got {raw.characters}",
+        )
     if not isinstance(raw, dict):
         raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
     given = [name for name in _FORMS if name in raw]
@@ -162,14 +167,26 @@ def track_name(value: Any) -> str:
     """
     if isinstance(value, bool) or not isinstance(value, str | int):
         raise TrackRejectedError(
-            "malformed", f"id: text or a whole number is needed, got {value!r}"
+            "malformed", f"id: text or a whole number is needed, got {value!r:.60}"
         )
     name = str(value)
     if not 1 <= len(name) <= MAX_ID_LENGTH:
         raise TrackRejectedError(
             "malformed", f"id: 1 to {MAX_ID_LENGTH} characters are needed, got {len(name)}"
         )
+    if not is_text(name):
+        raise TrackRejectedError(
+            "malformed", "id: text without NUL or half a surrogate pair is needed"
+        )
     return name
+
+
+def is_text(value: str) -> bool:
+    """Whether a text can be stored and sent again; JSON's escapes allow half a surrogate pair."""
+    try:
+        return "\0" not in value and bool(value.encode())
+    except UnicodeEncodeError:
+        return False
 
 
 def _numbers(form: str, value: Any, columns: int) -> Array:

@@ -1,4 +1,4 @@
-"""The periodic jobs: reconcile every few seconds, retention every hour."""
+"""The periodic job of every few seconds: reconcile."""
 
 import logging
 
@@ -24,20 +24,3 @@ def run_reconcile(context: JobContext) -> None:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
     with context.store.write() as session:
         upkeep.reconcile_alerts(session)
-
-
-def run_retention(context: JobContext) -> None:
-    """Delete what the limits on age and number say, and weights that no model names."""
-    with context.store.read() as session:
-        ids = upkeep.camera_ids(session)
-    for camera_id in ids:
-        with context.store.write() as session:
-            deleted = upkeep.forget_old(session, context.settings, camera_id)
-        if deleted:
-            log.info("tracks_deleted", extra={"camera_id": camera_id, "tracks": deleted})
-    with context.store.write() as session:
-        upkeep.forget_events(session, context.settings)
-        upkeep.forget_activity(session, context.settings)
-        deliveries.forget_deliveries(session, context.settings)
-        for path in upkeep.unused_weights(session, context.settings.weights_dir):
-            path.unlink(missing_ok=True)

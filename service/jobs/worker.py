@@ -27,7 +27,8 @@ from service.job_queue import (
 from service.jobs.context import JobContext
 from service.jobs.deliver import run_deliver
 from service.jobs.estimate import run_estimate
-from service.jobs.housekeeping import run_reconcile, run_retention
+from service.jobs.housekeeping import run_reconcile
+from service.jobs.retention import run_retention
 from service.jobs.rhythms import run_rhythms
 from service.jobs.train import run_training
 from service.recalibration import upkeep

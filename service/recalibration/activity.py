@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.store import activity
 from service.store.activity_tables import ActivityRecord
+from service.store.actor import actor_of
 
 
 def note(
@@ -26,6 +27,8 @@ def note(
 ) -> None:
     """Keep what was done, in the transaction that does it.
 
+    Where it is known in whose name the session writes, that is who did it.
+
     Args:
         session: of the deed itself: what is rolled back was not done.
         what: a subject and a verb: `alert.resolved`, `token.added`.
@@ -39,11 +42,12 @@ def note(
         text: the words that were given.
         details: what else is worth keeping, as JSON.
     """
+    actor = actor_of(session)
     record = ActivityRecord(
         at=datetime.now(UTC),
         what=what,
-        by=by,
-        via=via,
+        by=by if actor is None else actor.name,
+        via=via if actor is None else actor.token_id,
         camera_id=camera_id,
         subject_id=subject_id,
         kind=kind,

@@ -11,7 +11,6 @@ from service.errors import ConflictError, NotFoundError
 from service.recalibration.activity import note as note_activity
 from service.recalibration.groups import group_with
 from service.recalibration.outbox import json_time, queue_alert
-from service.recalibration.references import begin_window_anew
 from service.settings import Settings
 from service.store import activity, alerts, events, maintenance, tracks
 from service.store.activity_tables import ActivityRecord
@@ -107,6 +106,13 @@ def close_pose_alerts(
             _end(session, record, outcome, note, by)
 
 
+def close_alert(
+    session: Session, record: AlertRecord, outcome: str, note: str | None, by: str | None
+) -> None:
+    """End an open alert with what a person says came of it."""
+    _end(session, record, outcome, note, by)
+
+
 def end_empty_groups(session: Session) -> None:
     """End groups whose members are gone with their cameras."""
     for group in alerts.groups_without_members(session):
@@ -151,25 +157,6 @@ def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertR
     return record
 
 
-def resolve_alert(
-    session: Session, alert_id: str, outcome: str, note: str | None, by: str | None
-) -> AlertRecord:
-    """End an alert with what came of it; an alert of the same kind may open anew later.
-
-    A group's members end with it, and the same way.
-
-    Raises:
-        NotFoundError: there is none of that id.
-        ConflictError: it is resolved.
-    """
-    record = require_firing(session, alert_id)
-    for member in alerts.firing_members(session, record.id):
-        _resolve(session, member, outcome, note, by)
-    if record.state == "firing":
-        _resolve(session, record, outcome, note, by)
-    return record
-
-
 def require_firing(session: Session, alert_id: str) -> AlertRecord:
     """An open alert.
 
@@ -196,17 +183,6 @@ def note_act(
     record.updated_at = datetime.now(UTC)
     _keep_act(session, record, act, by, until=until, note=note)
     _tell(session, record, _CHANGES[act])
-
-
-def _resolve(
-    session: Session, record: AlertRecord, outcome: str, note: str | None, by: str | None
-) -> None:
-    if outcome == "put_back" and record.camera_id and record.kind in alerts.POSE_KINDS:
-        # As a reset, but the reference stays: what was seen until now says nothing any more.
-        close_pose_alerts(session, record.camera_id, outcome, by, note)
-        begin_window_anew(session, record.camera_id)
-    else:
-        _end(session, record, outcome, note, by)
 
 
 def _end(

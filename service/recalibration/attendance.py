@@ -27,6 +27,11 @@ class Attendance:
         """Whether a window was told of after a time that reaches into what was known then."""
         return any(from_s <= known_to_s and at > known_at for from_s, at in self.told)
 
+    def free_since_s(self, now: datetime) -> float | None:
+        """When somebody last left the camera; None where nobody was there."""
+        left = [to_s for _, to_s in self.spans if to_s <= now.timestamp()]
+        return left[-1] if left else None
+
     def under_way(self, now: datetime) -> bool:
         """Whether somebody is at the camera."""
         return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
@@ -41,7 +46,7 @@ def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attend
     """The same by windows in the order of their beginnings; overlapping ones are one time."""
     spans: list[tuple[float, float]] = []
     for record in records:
-        from_s, to_s = record.from_at.timestamp(), record.to_at.timestamp()
+        from_s, to_s = record.from_at.timestamp(), record.until.timestamp()
         if spans and from_s <= spans[-1][1]:
             spans[-1] = (spans[-1][0], max(spans[-1][1], to_s))
         else:

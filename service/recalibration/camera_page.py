@@ -40,6 +40,8 @@ class AlertStory:
 class CameraPage:
     """What the page of a camera shows. Lists are newest first, windows in their order.
 
+    `alerts` are all that fire, and then those that ended last.
+
     `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
     means on the ground; empty where there is none. `sources` are those of its tracks, where there
     are several.
@@ -64,8 +66,9 @@ class CameraPage:
 
     @property
     def firing(self) -> tuple[AlertStory, ...]:
-        """The open alerts."""
-        return tuple(story for story in self.alerts if story.record.state == "firing")
+        """The open alerts, what needs a person most first."""
+        stories = {story.record.id: story for story in self.alerts}
+        return tuple(stories[record.id] for record in self.pose.standing.alerts)
 
     @property
     def past(self) -> tuple[AlertStory, ...]:
@@ -75,8 +78,8 @@ class CameraPage:
     @property
     def attended(self) -> MaintenanceRecord | None:
         """The maintenance window that is under way, the one that ends last."""
-        here = [each for each in self.windows if each.from_at <= self.now < each.to_at]
-        return max(here, key=lambda each: each.to_at, default=None)
+        here = [each for each in self.windows if each.holds(self.now)]
+        return max(here, key=lambda each: each.until, default=None)
 
 
 def view_camera_page(session: Session, settings: Settings, camera_id: str) -> CameraPage:
@@ -91,9 +94,10 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     camera = view_camera(session, camera_id)
     pose = view_pose(session, settings, camera_id)
     estimate = pose.estimate
-    found = list_alerts(session, AlertFilter(camera_id=camera_id), _ALERTS)
+    ended = AlertFilter(state="resolved", camera_id=camera_id)
+    found = [*pose.standing.alerts, *list_alerts(session, ended, _ALERTS)]
     windows = maintenance.of_camera(session, camera_id)
-    over = sum(window.to_at <= now for window in windows)
+    over = sum(window.until <= now for window in windows)
     priors = cameras.prior_poses(session, camera_id, _PRIORS)
     shown = tracks.newest(
         session, camera_id, _TRACKS, None if estimate is None else estimate.from_s

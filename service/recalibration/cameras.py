@@ -8,7 +8,12 @@ from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.errors import ConflictError, NotFoundError, PreconditionFailedError
+from service.errors import (
+    ConflictError,
+    NotFoundError,
+    PreconditionFailedError,
+    TooManyCamerasError,
+)
 from service.job_queue import JobQueue
 from service.recalibration.activity import note
 from service.recalibration.alerts import close_pose_alerts, end_alert, list_alerts
@@ -16,6 +21,7 @@ from service.recalibration.references import begin_reference
 from service.recalibration.trainings import queue_training, request_estimate, stop_trainings
 from service.settings import Settings
 from service.store import cameras, references, tracks, trainings
+from service.store.actor import name_in
 from service.store.alerts import AlertFilter
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import CameraRecord, PriorPoseRecord
@@ -73,10 +79,16 @@ def register_camera(
 
     Raises:
         ConflictError: the id is taken.
+        TooManyCamerasError: as many are registered as may be.
     """
     camera_id = spec.camera_id or f"camera-{secrets.token_hex(4)}"
     if cameras.find(session, camera_id) is not None:
         raise ConflictError(f"id: {camera_id!r} is taken")
+    if cameras.count(session) >= settings.max_cameras:
+        raise TooManyCamerasError(
+            f"cameras: {settings.max_cameras} are registered already; delete one that is not used, "
+            "or raise SUREFOOT_MAX_CAMERAS"
+        )
     now = datetime.now(UTC)
     record = CameraRecord(
         id=camera_id,
@@ -151,7 +163,7 @@ def change_camera(
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
-            close_pose_alerts(session, camera_id, "accepted", None)
+            close_pose_alerts(session, camera_id, "accepted", name_in(session, None))
         # Tracks seen so far may be of another pose or lens, but not of other people.
         from_s = references.newest(session, camera_id).from_s
         if geometry_changed:
@@ -230,7 +242,7 @@ def add_prior_pose(
             x_m=pose.x_m,
             y_m=pose.y_m,
             origin=origin,
-            trusted_by=by,
+            trusted_by=name_in(session, by),
             created_at=datetime.now(UTC),
         )
     )

@@ -21,7 +21,7 @@ from service.recalibration.alerts import end_alert, fired_by_estimate, open_aler
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
-from service.recalibration.references import made_against
+from service.recalibration.references import is_overtaken, made_against
 from service.recalibration.second_look import drift_of
 from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
 from service.settings import Settings
@@ -34,12 +34,17 @@ def store_estimate(
 ) -> EstimateRecord | None:
     """Judge the drift of a finding and store it; None if its reference no longer counts.
 
-    A reference that has become ready, or another one that has begun, has a job of its own.
+    A reference that has become ready, or another one that has begun, has a job of its own. So has
+    what comes after a person has answered or was at the camera.
     """
     reference = references.newest_if_any(session, evidence.camera_id)
     if reference is None or reference.id != evidence.reference_id:
         return None
     if (reference.ready_at is None) != (evidence.site is None):
+        return None
+    if evidence.site is not None and is_overtaken(
+        session, settings, reference, evidence.tracks[-1].ended_s
+    ):
         return None
     drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:

@@ -1,27 +1,19 @@
 """All cameras at a glance: what each does, and which of them need a person first."""
 
-from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.recalibration.attendance import Attendance, attendance_by
+from service.recalibration.attendance import Attendance
+from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
-from service.recalibration.poses import PoseState, counting_beside, state_by
-from service.recalibration.presence import is_no_data
 from service.recalibration.references import tracks_so_far, wanted_tracks
-from service.recalibration.rhythms import unpacked
 from service.settings import Settings
-from service.store import figures, fleet
-from service.store.tables import (
-    AlertRecord,
-    EstimateRecord,
-    SiteReferenceRecord,
-    TrainingRecord,
-)
+from service.store import fleet
+from service.store.tables import AlertRecord, EstimateRecord, TrainingRecord
 
 _HISTORY = 24  # estimates of a sparkline
 
@@ -70,12 +62,14 @@ class FleetCamera:
 
     `history` has the drift of its newest estimates in units of the limits, oldest first, None
     where nothing was told. `learned` and `wanted` are people of the reference being learned.
+    `judged` says whether the drift is of how it stands now, and not only the last that is known.
     """
 
     camera_id: str
     name: str
     state: PoseState
-    since: datetime | None
+    judged: bool
+    since: datetime
     last_track_s: float | None
     drift: FleetDrift | None
     history: tuple[float | None, ...]
@@ -105,7 +99,7 @@ class FleetCamera:
     @property
     def order(self) -> tuple[int, float, str]:
         """Sorts first what a person should look at first; of one kind the newest, then by name."""
-        at_s = self.since.timestamp() if self.since is not None and self.rank < 6 else 0.0
+        at_s = self.since.timestamp() if self.rank < 6 else 0.0
         return self.rank, -at_s, self.name.casefold()
 
 
@@ -123,42 +117,31 @@ def list_fleet(
 ) -> list[FleetCamera]:
     """All cameras, or some, those first that need a person; a dozen statements for all of them."""
     now = datetime.now(UTC)
-    references = figures.newest_references(session, ids)
-    estimates = figures.newest_estimates(session, ids)
-    ended_s = figures.last_tracks_s(session, ids)
+    standing = standings(session, settings, ids)
+    names = dict(fleet.names(session, ids))
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
     counts = fleet.learning_counts(session, ids)
-    windows = fleet.maintenance_windows(session, ids)
     trainings = fleet.unfinished_trainings(session, ids)
-    rhythms = fleet.rhythm_profiles(session, ids)
-    alerts: dict[str, list[FleetAlert]] = defaultdict(list)
-    for record in fleet.firing(session, ids):
-        alerts[str(record.camera_id)].append(_alert(record, now))
-    found = []
-    for camera_id, name in fleet.names(session, ids):
-        reference, last_s = references[camera_id], ended_s[camera_id]
-        attended = attendance_by(windows[camera_id], now)
-        estimate = counting_beside(attended, settings, reference, estimates.get(camera_id), now)
-        known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
-        state = state_by(reference, estimate, silent=is_no_data(settings, known, last_s, now))
-        firing = tuple(sorted(alerts[camera_id], key=_urgency))
-        found.append(
-            FleetCamera(
-                camera_id=camera_id,
-                name=name,
-                state=state,
-                since=_since(state, firing, reference, last_s),
-                last_track_s=last_s,
-                drift=_drift(estimate) if state != "learning" else None,
-                history=tuple(history[camera_id]),
-                learned=_learned(session, settings, reference, counts, attended),
-                wanted=wanted_tracks(reference, settings),
-                doubt=reference.doubt,
-                alerts=firing,
-                training=_training(trainings.get(camera_id)),
-                attended_until=_attended_until(attended, now),
-            )
+    found = [
+        FleetCamera(
+            camera_id=camera_id,
+            name=names[camera_id],
+            state=each.state,
+            judged=each.judged,
+            since=each.since,
+            last_track_s=each.last_track_s,
+            drift=_drift(each.estimate) if each.state != "learning" else None,
+            history=tuple(history[camera_id]),
+            learned=_learned(session, settings, each, counts),
+            wanted=wanted_tracks(each.reference, settings),
+            doubt=each.reference.doubt,
+            alerts=tuple(_alert(record, now) for record in each.alerts),
+            training=_training(trainings.get(camera_id)),
+            attended_until=_attended_until(each.attended, now),
         )
+        for camera_id, each in standing.items()
+        if camera_id in names
+    ]
     return sorted(found, key=lambda camera: camera.order)
 
 
@@ -184,28 +167,11 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
         kind=record.kind,
         severity=record.severity,
         reason=record.reason,
-        since=record.changed_at or record.opened_at,
+        since=alert_since(record),
         acknowledged_by=record.acknowledged_by,
         silenced_until=record.silenced_until if is_silenced(record, now) else None,
         grouped=record.group_id is not None,
     )
-
-
-def _urgency(alert: FleetAlert) -> tuple[bool, bool, datetime]:
-    return not alert.waits, alert.severity != "critical", alert.since
-
-
-def _since(
-    state: PoseState,
-    alerts: Sequence[FleetAlert],
-    reference: SiteReferenceRecord,
-    last_s: float | None,
-) -> datetime | None:
-    if alerts:
-        return alerts[0].since
-    if state == "no_data" and last_s is not None:
-        return datetime.fromtimestamp(last_s, UTC)
-    return reference.created_at if reference.ready_at is None else reference.ready_at
 
 
 def _drift(estimate: EstimateRecord | None) -> FleetDrift | None:
@@ -234,15 +200,12 @@ def _drift(estimate: EstimateRecord | None) -> FleetDrift | None:
 
 
 def _learned(
-    session: Session,
-    settings: Settings,
-    reference: SiteReferenceRecord,
-    counts: dict[str, int],
-    attended: Attendance,
+    session: Session, settings: Settings, standing: Standing, counts: dict[str, int]
 ) -> int | None:
+    reference = standing.reference
     if reference.ready_at is not None:
         return None
-    if attended.spans:
+    if standing.attended.spans:
         return tracks_so_far(session, settings, reference)  # few, which need a statement each
     return min(counts.get(reference.camera_id, 0), wanted_tracks(reference, settings))
 

@@ -56,6 +56,7 @@ def open_window(
         camera_id=camera_id,
         from_at=from_at,
         to_at=to_at,
+        ended_at=to_at if to_at <= now else None,
         reason=reason,
         requested_by=by,
         created_at=now,
@@ -99,6 +100,8 @@ def change_window(
     now = datetime.now(UTC)
     from_at, to_at = change.from_at or record.from_at, change.to_at or record.to_at
     _check(from_at, to_at, now, settings)
+    if change.to_at is not None:
+        record.ended_at = to_at if to_at <= now else None
     record.from_at, record.to_at, record.updated_at = from_at, to_at, now
     record.reason = record.reason if change.reason is None else change.reason
     _note(session, "changed", record, None)
@@ -108,7 +111,7 @@ def change_window(
 
 
 def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str) -> None:
-    """End a window that is under way, or take back one that has not begun.
+    """End a window that is under way, or take back one that has not begun; its plan stays kept.
 
     Raises:
         NotFoundError: the camera has no such window.
@@ -116,16 +119,25 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
     """
     record = _require(session, camera_id, window_id)
     now = datetime.now(UTC)
-    if record.to_at <= now:
-        raise ConflictError(f"to: the window ended at {record.to_at.isoformat()} already")
+    if record.until <= now:
+        raise ConflictError(f"to: the window ended at {record.until.isoformat()} already")
     if record.from_at >= now:
         _note(session, "withdrawn", record, None)
         session.delete(record)
     else:
         _note(session, "ended", record, None)
-        record.to_at = record.updated_at = now
+        record.ended_at = record.updated_at = now
     session.flush()
     request_estimate(session, queue, camera_id)
+
+
+def note_ends(session: Session, camera_id: str, now: datetime) -> bool:
+    """Note the end of windows that came to it by themselves; says whether there was any."""
+    over = maintenance.just_over(session, camera_id, now)
+    for record in over:
+        record.ended_at = record.to_at
+        _note(session, "over", record, None)
+    return bool(over)
 
 
 def _note(session: Session, act: str, record: MaintenanceRecord, by: str | None) -> None:

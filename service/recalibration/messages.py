@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.delivery.alertmanager import ended, postable_alerts, postable_test
 from service.delivery.signing import signed_headers
+from service.recalibration.keys import old_secret_of, secret_of
 from service.recalibration.outbox import alert_body, is_silenced, json_time
 from service.settings import Settings
 from service.store import alerts, webhooks
@@ -35,9 +36,9 @@ def message_of(
     if webhook.format == "alertmanager":
         return _to_alertmanager(webhook, _stands(session, settings, delivery, now))
     body = _json(delivery.payload)
-    secrets = [webhook.secret or ""]
+    secrets = [secret_of(settings, webhook) or ""]
     if webhook.old_secret and webhook.old_secret_until and webhook.old_secret_until > now:
-        secrets.append(webhook.old_secret)
+        secrets.append(old_secret_of(settings, webhook) or "")
     return Message(
         url=webhook.url, body=body, headers=signed_headers(delivery.id, now, body, secrets)
     )

@@ -1,5 +1,6 @@
 """What operators of the service itself ask: is it ready, what happened."""
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -7,9 +8,11 @@ from datetime import UTC, datetime
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
+from service.errors import OverloadedError
 from service.settings import Settings
-from service.store import cameras, events, workers
+from service.store import cameras, events, probes, workers
 from service.store.database import Store
+from service.store.failures import failure_of
 from service.store.tables import EventRecord
 
 
@@ -30,31 +33,40 @@ class Readiness:
 
 
 def check_readiness(store: Store, settings: Settings) -> Readiness:
-    """Try to take the write lock; look at the workers and the oldest waiting camera."""
+    """Write something; look at the disk, the workers and the oldest waiting camera."""
+    now = datetime.now(UTC)
     try:
         with store.write() as session:
+            probes.write(session, now)
             heartbeat = workers.newest_heartbeat(session)
             due = cameras.longest_due(session)
-    except SQLAlchemyError as error:
+    except (SQLAlchemyError, OverloadedError) as error:
+        known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
+        said = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
         return Readiness(
             store_writable=False,
             worker_alive=False,
             worker_silent_s=None,
             queue_lag_s=0.0,
-            problems=(f"store: {error.__class__.__name__}: {error}",),
+            problems=(said if said.startswith("store: ") else f"store: {said}",),
         )
-    now = datetime.now(UTC)
     silent_s = None if heartbeat is None else (now - heartbeat).total_seconds()
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     lag_s = 0.0 if due is None else (now - due).total_seconds()
     problems = []
+    free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
+    full = free_mb < _FULL_MB
+    if full:
+        problems.append(f"store: the disk is full, {free_mb:.1f} MiB are free")
+    elif free_mb < settings.min_free_mb:
+        problems.append(f"disk: {free_mb:.0f} MiB are free; {settings.min_free_mb:g} are the least")
     if not alive:
         heard = "none was ever heard of" if silent_s is None else f"silent for {silent_s:.0f} s"
         problems.append(f"worker: {heard}; up to {settings.worker_lost_s:g} s are waited for")
     if lag_s > _LONGEST_LAG_S:
         problems.append(f"queue: tracks wait for {lag_s:.0f} s; {_LONGEST_LAG_S:g} s are the limit")
     return Readiness(
-        store_writable=True,
+        store_writable=not full,
         worker_alive=alive,
         worker_silent_s=silent_s,
         queue_lag_s=lag_s,
@@ -63,6 +75,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
 
 
 _LONGEST_LAG_S = 60.0
+_FULL_MB = 1.0  # a small write, as ours is, may still find room in the file that is there
 
 
 def newest_event_id(session: Session) -> int:

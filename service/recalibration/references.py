@@ -79,12 +79,21 @@ def window_beside(
     )
 
 
-def begin_window_anew(session: Session, camera_id: str) -> None:
-    """Judge a camera by tracks that are yet to come: it was put back, and its reference holds."""
+def keep_answer(session: Session, camera_id: str, answer: str, by: str | None) -> None:
+    """Judge a camera by tracks that are yet to come: a person says that it is at its prior pose.
+
+    Its reference holds, if there is one. One that is being learned begins anew once the camera was
+    put back: nobody knows how it stood meanwhile. So does one in doubt.
+    """
     reference = references.newest(session, camera_id)
     newest_s = tracks.newest_end_s(session, camera_id)
-    if reference.ready_at is not None and newest_s is not None:
-        reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None
+    if answer == "put_back" and (reference.ready_at is None or reference.doubt):
+        begin_reference(session, camera_id, "put_back", from_s=newest_s, by=by)
+    elif reference.ready_at is not None:
+        if newest_s is not None:
+            reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None
+        reference.answer, reference.answered_by = answer, by
+        reference.answered_at = datetime.now(UTC)
     forget_streak(session, camera_id)
 
 
@@ -97,15 +106,28 @@ def forget_streak(session: Session, camera_id: str) -> None:
 
 def is_outdated(estimate: EstimateRecord, bounds: WindowBounds) -> bool:
     """Whether none of the tracks of an estimate could be in a window: it is of before."""
-    begins_s = max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
-    return estimate.to_s < begins_s
+    return _is_before(estimate.to_s, bounds)
 
 
 def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
     """Whether an estimate was made against a reference, not while that was being learned."""
     if reference.ready_at is None or estimate.reference_id != reference.id:
         return False
+    if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
+        return False  # a person has answered it
     return estimate.created_at >= reference.ready_at
+
+
+def is_overtaken(
+    session: Session, settings: Settings, reference: SiteReferenceRecord, to_s: float
+) -> bool:
+    """Whether tracks, the last of which ended then, are of before: a person answered meanwhile."""
+    bounds = window_of(session, reference, settings)
+    return _is_before(to_s, bounds)
+
+
+def _is_before(to_s: float, bounds: WindowBounds) -> bool:
+    return to_s < max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
 
 
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:

@@ -12,6 +12,8 @@ from service.delivery.addresses import AddressError, check_url
 from service.delivery.signing import new_secret
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
+from service.recalibration.activity import note
+from service.recalibration.keys import sealed_secret
 from service.recalibration.outbox import add_delivery, wake
 from service.settings import Settings
 from service.store import webhooks
@@ -41,6 +43,14 @@ class WebhookView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SecretMade:
+    """A webhook and its new secret in plain text; an Alertmanager has none."""
+
+    record: WebhookRecord
+    secret: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DeliveryView:
     """A delivery and its attempts, oldest first."""
 
@@ -61,24 +71,27 @@ def require_url(settings: Settings, url: str) -> None:
         raise MalformedError(f"url: {error}", (field,)) from error
 
 
-def create_webhook(session: Session, spec: WebhookSpec) -> WebhookRecord:
-    """Store a webhook; its record has the secret, which is shown this once."""
+def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> SecretMade:
+    """Store a webhook; its secret is shown this once."""
     now = datetime.now(UTC)
+    webhook_id = secrets.token_hex(16)
+    secret = new_secret() if spec.format == "webhook" else None
     record = WebhookRecord(
-        id=secrets.token_hex(16),
+        id=webhook_id,
         name=spec.name,
         url=spec.url,
         format=spec.format,
         kinds=None if spec.kinds is None else list(spec.kinds),
         enabled=spec.enabled,
         disabled_reason=None if spec.enabled else _BY_A_PERSON,
-        secret=new_secret() if spec.format == "webhook" else None,
+        secret=None if secret is None else sealed_secret(settings, webhook_id, secret),
         created_at=now,
         updated_at=now,
     )
     session.add(record)
     session.flush()
-    return record
+    _note(session, "added", record)
+    return SecretMade(record=record, secret=secret)
 
 
 def list_webhooks(session: Session) -> Sequence[WebhookView]:
@@ -113,6 +126,7 @@ def change_webhook(
     for name, value in changes.items():
         setattr(record, name, value)
     record.updated_at = now
+    _note(session, "changed", record, sorted(changes))
     if changes.get("enabled") is False:
         record.disabled_reason = _BY_A_PERSON
     elif changes.get("enabled") or "url" in changes:
@@ -125,7 +139,7 @@ def change_webhook(
     return show_webhook(session, webhook_id)
 
 
-def rotate_secret(session: Session, webhook_id: str) -> WebhookRecord:
+def rotate_secret(session: Session, settings: Settings, webhook_id: str) -> SecretMade:
     """Give a webhook a new secret; for a day, messages are signed with the old one, too.
 
     Raises:
@@ -137,8 +151,10 @@ def rotate_secret(session: Session, webhook_id: str) -> WebhookRecord:
         raise ConflictError(f"format: only webhooks have secrets, this is {record.format}")
     now = datetime.now(UTC)
     record.old_secret, record.old_secret_until = record.secret, now + OLD_SECRET_STAYS
-    record.secret, record.updated_at = new_secret(), now
-    return record
+    secret = new_secret()
+    record.secret, record.updated_at = sealed_secret(settings, webhook_id, secret), now
+    _note(session, "secret_changed", record)
+    return SecretMade(record=record, secret=secret)
 
 
 def remove_webhook(session: Session, webhook_id: str) -> None:
@@ -147,7 +163,9 @@ def remove_webhook(session: Session, webhook_id: str) -> None:
     Raises:
         NotFoundError: there is none of that id.
     """
-    session.delete(_require(session, webhook_id))
+    record = _require(session, webhook_id)
+    _note(session, "removed", record)
+    session.delete(record)
 
 
 def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
@@ -161,6 +179,7 @@ def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
     data = {"webhook_id": record.id, "name": record.name, "text": "This is a test of surefoot."}
     record.held_until = None
     delivery = add_delivery(session, record, "test", data, datetime.now(UTC))
+    _note(session, "tested", record)
     session.flush()
     return DeliveryView(record=delivery, attempts=())
 
@@ -208,8 +227,15 @@ def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> Deli
     record.state, record.tries, record.finished_at = "pending", 0, None
     record.next_attempt_at = record.queued_at = now
     webhook.held_until = None
+    _note(session, "replayed", webhook)
     wake(session, queue, webhook, now)
     return view
+
+
+def _note(session: Session, act: str, record: WebhookRecord, fields: Sequence[str] = ()) -> None:
+    """Keep what was done with a webhook; its URL may be a secret, so its name says which."""
+    details = {"name": record.name, **({"fields": list(fields)} if fields else {})}
+    note(session, f"webhook.{act}", by=None, subject_id=record.id, details=details)
 
 
 def _require(session: Session, webhook_id: str) -> WebhookRecord:

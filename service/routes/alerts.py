@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
-from service.recalibration import alerts, silence
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.recalibration import alerts, decisions, silence
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.alerts import (
     AcknowledgeBody,
     AlertDetail,
@@ -51,28 +51,33 @@ def show(alert_id: str, session: ReadDep) -> AlertDetail:
 
 @router.post("/{alert_id}/acknowledge")
 def acknowledge(
-    alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
+    alert_id: str, session: WriteDep, actor: ActorDep, body: AcknowledgeBody | None = None
 ) -> AlertDetail:
     """Note who has seen an alert."""
-    by = None if body is None else body.by
+    by = name_of(actor, None if body is None else body.by)
     return _with_acts(session, alerts.acknowledge_alert(session, alert_id, by))
 
 
 @router.post("/{alert_id}/silence")
 def silence_one(
-    alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep
+    alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep, actor: ActorDep
 ) -> AlertDetail:
     """Silence an alert until a time, in place of the silence it may have; null ends that."""
     record = silence.silence_alert(
-        session, state.settings, alert_id, body.until, body.reason, body.by
+        session, state.settings, alert_id, body.until, body.reason, name_of(actor, body.by)
     )
     return _with_acts(session, record)
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, session: WriteDep) -> AlertDetail:
-    """End an alert with what came of it."""
-    record = alerts.resolve_alert(session, alert_id, body.outcome, body.note, body.by)
+def resolve(
+    alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep, actor: ActorDep
+) -> AlertDetail:
+    """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
+    by = name_of(actor, body.by)
+    record = decisions.resolve_alert(
+        session, state.queue, state.settings, alert_id, body.outcome, body.note, by
+    )
     return _with_acts(session, record)
 
 

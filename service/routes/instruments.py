@@ -7,6 +7,7 @@ from prometheus_client.process_collector import ProcessCollector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _METHODS = frozenset(("GET", "HEAD", "POST", "PATCH", "PUT", "DELETE", "OPTIONS"))
+_REFUSALS = frozenset((413, 429, 503, 507))
 _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
 # A second series for each counter, which nobody asks for.
 disable_created_metrics()  # type: ignore[no-untyped-call]
@@ -29,6 +30,18 @@ class Instruments:
             "From a request to the beginning of its answer: event streams have no end.",
             ["method", "route"],
             buckets=_BUCKETS,
+            registry=self.registry,
+        )
+        self.refusals = Counter(
+            "surefoot_http_refusals",
+            "Requests that were refused for a limit, the load or the store, by the problem's code.",
+            ["code"],
+            registry=self.registry,
+        )
+        self.connections_refused = Counter(
+            "surefoot_http_connections_refused",
+            "Connections that were not taken, or were cut, by the reason.",
+            ["reason"],
             registry=self.registry,
         )
 
@@ -60,3 +73,5 @@ class InstrumentMiddleware:
         route = getattr(scope.get("route"), "path", "unmatched")
         self._instruments.requests.labels(method, route, str(status)).inc()
         self._instruments.durations.labels(method, route).observe(duration_s)
+        if status in _REFUSALS and "surefoot_problem" in scope:
+            self._instruments.refusals.labels(scope["surefoot_problem"]).inc()

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Response
 
 from service.recalibration import maintenance
 from service.recalibration.maintenance import WindowChange
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.maintenance import WindowBody, WindowList, WindowOut, WindowPatch
 
 router = APIRouter(prefix="/cameras/{camera_id}/maintenance", tags=["maintenance"])
@@ -12,7 +12,12 @@ router = APIRouter(prefix="/cameras/{camera_id}/maintenance", tags=["maintenance
 
 @router.post("", status_code=201)
 def begin(
-    camera_id: str, body: WindowBody, state: StateDep, session: WriteDep, response: Response
+    camera_id: str,
+    body: WindowBody,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    response: Response,
 ) -> WindowOut:
     """Say that somebody is at a camera: it is not judged, and opens no alert."""
     record = maintenance.open_window(
@@ -23,7 +28,7 @@ def begin(
         from_at=body.from_,
         to_at=body.to,
         reason=body.reason,
-        by=body.by,
+        by=name_of(actor, body.by),
     )
     response.headers["Location"] = f"/cameras/{camera_id}/maintenance/{record.id}"
     return WindowOut.from_record(record)

@@ -1,6 +1,5 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
-from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
@@ -8,11 +7,23 @@ from fastapi.responses import PlainTextResponse
 
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
-from service.recalibration import cameras, poses
-from service.routes.state import ReadDep, StateDep, WriteDep
-from service.schemas.poses import AcceptBody, History, HistoryPoint, ResetBody, ServedPoseOut
+from service.recalibration import cameras, decisions, poses
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.base import Moment
+from service.schemas.poses import (
+    AcceptBody,
+    History,
+    HistoryPoint,
+    PutBackBody,
+    ResetBody,
+    ServedPoseOut,
+)
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
+
+
+class _YamlResponse(PlainTextResponse):
+    media_type = "application/yaml"
 
 
 @router.get("/pose", response_model=ServedPoseOut)
@@ -31,15 +42,14 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
-@router.get("/pose.yaml", response_class=PlainTextResponse)
+@router.get("/pose.yaml", response_class=_YamlResponse)
 def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
     lens = cameras.view_camera(session, camera_id).intrinsics
     words = (f"state: {view.state}", f"why: {view.reason}")
-    return PlainTextResponse(
+    return _YamlResponse(
         opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
-        media_type="application/yaml",
         headers={
             "ETag": view.etag,
             "Content-Disposition": f'inline; filename="{camera_id}.yaml"',
@@ -51,8 +61,8 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextRespo
 def history(
     camera_id: str,
     session: ReadDep,
-    from_: Annotated[datetime | None, Query(alias="from")] = None,
-    to: datetime | None = None,
+    from_: Annotated[Moment | None, Query(alias="from")] = None,
+    to: Moment | None = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
     points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
@@ -60,12 +70,6 @@ def history(
 
     With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
     """
-    for name, value in (("from", from_), ("to", to)):
-        if value is not None and value.tzinfo is None:
-            reason = f"a time with its zone is needed, got {value.isoformat()}"
-            raise MalformedError(
-                f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),)
-            )
     if points is not None and limit is not None:
         reason = "either limit or points is taken"
         raise MalformedError(f"points: {reason}", (FieldError(pointer="/points", reason=reason),))
@@ -78,21 +82,47 @@ def history(
 
 @router.post("/pose/accept")
 def accept(
-    camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: AcceptBody | None = None,
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
-    by = None if body is None else body.by
+    said = body or AcceptBody()
+    by = name_of(actor, said.by)
     return ServedPoseOut.from_value(
-        poses.accept_pose(session, state.queue, state.settings, camera_id, by)
+        decisions.accept_pose(session, state.queue, state.settings, camera_id, by, said.note)
+    )
+
+
+@router.post("/pose/put-back")
+def put_back(
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: PutBackBody | None = None,
+) -> ServedPoseOut:
+    """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
+    said = body or PutBackBody()
+    by = name_of(actor, said.by)
+    return ServedPoseOut.from_value(
+        decisions.put_back(session, state.queue, state.settings, camera_id, by, said.note)
     )
 
 
 @router.post("/reference/reset")
 def reset(
-    camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: ResetBody | None = None,
 ) -> ServedPoseOut:
-    """Say that the camera is back at its prior pose: closes its alerts, learns it anew there."""
-    by = None if body is None else body.by
+    """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
+    said = body or ResetBody()
+    by = name_of(actor, said.by)
     return ServedPoseOut.from_value(
-        poses.reset_reference(session, state.queue, state.settings, camera_id, by)
+        decisions.learn_anew(session, state.queue, state.settings, camera_id, by, said.note)
     )

@@ -6,8 +6,9 @@ from fastapi import APIRouter, Depends, Header, Request, Response
 
 from service.formats.still import Still, read_still
 from service.recalibration import cameras, snapshots
-from service.routes.state import BodyDep, ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
 from service.schemas.snapshots import SnapshotOut
+from service.store.actor import set_actor
 
 router = APIRouter(prefix="/cameras/{camera_id}/snapshot", tags=["cameras"])
 
@@ -17,22 +18,26 @@ _DESCRIBED_BODY = {
 }
 
 
-def read_body(
-    camera_id: str, request: Request, body: BodyDep, state: StateDep, session: ReadDep
-) -> Still:
-    """The still image of a request, decoded before the write lock is taken."""
-    cameras.require_camera(session, camera_id)
+def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> Still:
+    """The still image of a request, decoded while no session is open."""
+    with state.store.read() as session:
+        cameras.require_camera(session, camera_id)
     snapshots.require_snapshots(state.settings)
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
-    return read_still(body, media_type)
+    with state.large_bodies.turn(state.settings.http_wait_s):
+        return read_still(body, media_type)
 
 
 @router.put("", openapi_extra=_DESCRIBED_BODY)
 def put(
-    camera_id: str, still: Annotated[Still, Depends(read_body)], state: StateDep
+    camera_id: str,
+    still: Annotated[Still, Depends(read_body)],
+    state: StateDep,
+    actor: ActorDep,
 ) -> SnapshotOut:
     """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
     with state.store.write() as session:
+        set_actor(session, actor)
         facts = snapshots.put_snapshot(session, camera_id, still)
     return SnapshotOut.model_validate(facts, from_attributes=True)
 

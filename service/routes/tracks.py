@@ -11,10 +11,12 @@ from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
 from service.formats.track import Batch, Clock, Limits
 from service.recalibration import cameras, tracks
-from service.routes.state import BodyDep, ReadDep, StateDep
-from service.schemas.tracks import ReceiptOut
+from service.routes.state import BodyDep, StateDep
+from service.schemas.tracks import DESCRIBED_TRACK, ReceiptOut
 
 router = APIRouter(tags=["tracks"])
+
+_LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
 
 _DESCRIBED_BODY = {
     "requestBody": {
@@ -28,7 +30,7 @@ _DESCRIBED_BODY = {
                         "source": {"type": "string"},
                         "frame_rate_hz": {"type": "number"},
                         "started_at": {"type": "string", "format": "date-time"},
-                        "tracks": {"type": "array", "items": {"type": "object"}},
+                        "tracks": {"type": "array", "items": DESCRIBED_TRACK},
                     },
                 }
             },
@@ -43,20 +45,23 @@ def read_batch(
     camera_id: str,
     request: Request,
     body: BodyDep,
-    session: ReadDep,
     state: StateDep,
     source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
     frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
     started_at: str | None = None,
     classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
 ) -> Batch:
-    """The tracks of a request, read before the write lock is taken.
+    """The tracks of a request, read while no session is open.
 
     Raises:
         NotFoundError: there is no such camera.
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
+        OverloadedError: other large bodies are being read all the time.
     """
-    camera = cameras.require_camera(session, camera_id)
+    source = formats.read_source(source, "/source")
+    people = None if classes is None else read_classes(classes)
+    with state.store.read() as session:
+        camera = cameras.require_camera(session, camera_id)
     limits = Limits(
         width=camera.width,
         height=camera.height,
@@ -68,12 +73,25 @@ def read_batch(
         started_at_s=None if started_at is None else formats.read_time(started_at, "/started_at"),
     )
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if len(body) > _LARGE:
+        with state.large_bodies.turn(state.settings.http_wait_s):
+            return _read(media_type, body, source, clock, limits, people)
+    return _read(media_type, body, source, clock, limits, people)
+
+
+def _read(
+    media_type: str,
+    body: bytes,
+    source: str,
+    clock: Clock,
+    limits: Limits,
+    people: frozenset[int] | None,
+) -> Batch:
     if media_type == "application/json":
         return formats.read_json(body, clock, limits)
     if media_type == "application/x-ndjson":
         return formats.read_ndjson(body, source, clock, limits)
     if media_type == "text/csv":
-        people = None if classes is None else read_classes(classes)
         return read_mot(body, source, clock, limits, people)
     raise UnsupportedMediaTypeError(
         "Content-Type: application/json, application/x-ndjson or text/csv is needed, "
@@ -94,6 +112,8 @@ def post_tracks(
 
     422 where there were tracks and none of them could be taken.
     """
+    with state.store.read() as session:
+        state.quota.check(session, camera_id, batch)
     with state.store.write() as session:
         cameras.require_camera(session, camera_id)
         receipt = tracks.receive_tracks(

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from service.recalibration import trainings
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.trainings import TrainingBody, TrainingList, TrainingOut
 
 router = APIRouter(tags=["trainings"])
@@ -13,12 +13,17 @@ router = APIRouter(tags=["trainings"])
 
 @router.post("/cameras/{camera_id}/trainings", status_code=202)
 def request(
-    camera_id: str, state: StateDep, session: WriteDep, body: TrainingBody | None = None
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    actor: ActorDep,
+    body: TrainingBody | None = None,
 ) -> TrainingOut:
     """Queue a training at the camera's prior pose."""
     body = body or TrainingBody()
+    by = name_of(actor, body.by)
     record = trainings.request_training(
-        session, state.queue, state.settings, camera_id, body.recipe, body.seed, body.by
+        session, state.queue, state.settings, camera_id, body.recipe, body.seed, by
     )
     return TrainingOut.from_record(record)
 

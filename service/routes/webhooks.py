@@ -40,10 +40,13 @@ CheckedPatch = Annotated[WebhookPatch, Depends(checked_patch)]
 
 
 @router.post("/webhooks", status_code=201)
-def create(body: CheckedBody, session: WriteDep, response: Response) -> WebhookMade:
+def create(
+    body: CheckedBody, state: StateDep, session: WriteDep, response: Response
+) -> WebhookMade:
     """Create a webhook. Its secret is in this answer and in no other."""
-    record = webhooks.create_webhook(
+    made = webhooks.create_webhook(
         session,
+        state.settings,
         WebhookSpec(
             url=body.url,
             name=body.name,
@@ -52,8 +55,8 @@ def create(body: CheckedBody, session: WriteDep, response: Response) -> WebhookM
             enabled=body.enabled,
         ),
     )
-    response.headers["Location"] = f"/webhooks/{record.id}"
-    return WebhookMade.from_record(record)
+    response.headers["Location"] = f"/webhooks/{made.record.id}"
+    return WebhookMade.from_made(made)
 
 
 @router.get("/webhooks")
@@ -84,10 +87,12 @@ def remove(webhook_id: str, session: WriteDep) -> None:
 
 
 @router.post("/webhooks/{webhook_id}/secret")
-def rotate(webhook_id: str, session: WriteDep) -> SecretOut:
+def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
     """Give a webhook a new secret; for a day, messages are signed with the old one, too."""
-    record = webhooks.rotate_secret(session, webhook_id)
-    return SecretOut.model_validate(record, from_attributes=True)
+    made = webhooks.rotate_secret(session, state.settings, webhook_id)
+    return SecretOut.model_validate(
+        {"secret": made.secret, "old_secret_until": made.record.old_secret_until}
+    )
 
 
 @router.post("/webhooks/{webhook_id}/test", status_code=202)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from service.recalibration.outbox import is_silenced
-from service.schemas.base import Body, Who
+from service.schemas.base import Body, Moment, Who
 from service.store.activity_tables import ActivityRecord
 from service.store.tables import AlertRecord
 
@@ -21,7 +21,7 @@ class AcknowledgeBody(Body):
 class SilenceBody(Body):
     """Until when nobody is to be woken by the alert, and why; null ends a silence."""
 
-    until: AwareDatetime | None
+    until: Moment | None
     reason: str | None = Field(None, max_length=2000)
     by: Who | None = None
 

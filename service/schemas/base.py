@@ -1,9 +1,29 @@
 """What several bodies share."""
 
+from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    field_validator,
+)
 
+_EARLIEST, _LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
+
+
+def _checked_moment(value: datetime) -> datetime:
+    # In UTC, the first and the last hours that a datetime can say are none any more.
+    if not _EARLIEST <= value <= _LATEST:
+        raise ValueError(f"a time from 1970 to 9998 is needed, got {value.isoformat()}")
+    return value
+
+
+Moment = Annotated[AwareDatetime, AfterValidator(_checked_moment)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Who = Annotated[str, StringConstraints(min_length=1, max_length=200)]
@@ -13,3 +33,10 @@ class Body(BaseModel):
     """A request body; unknown fields are refused, since they are mostly misspelt ones."""
 
     model_config = ConfigDict(extra="forbid")
+
+    @field_validator("*")
+    @classmethod
+    def _no_nul(cls, value: object) -> object:
+        if isinstance(value, str) and "\0" in value:
+            raise ValueError("text without NUL characters is needed")
+        return value

@@ -12,17 +12,22 @@ from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrice
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
 from service.schemas.base import Body, Finite, Triple
 
+# Of numbers beyond these nothing can be computed, let alone drawn.
+_HIGHEST_M, _FARTHEST_M = 10_000.0, 1e8
+
 
 class IntrinsicsBody(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3."""
 
     width: int = Field(gt=0, le=100_000)
     height: int = Field(gt=0, le=100_000)
-    fx: Finite = Field(gt=0)
-    fy: Finite = Field(gt=0)
-    cx: Finite
-    cy: Finite
-    distortion: list[Finite] = Field(default=[0.0] * 5, min_length=5, max_length=5)
+    fx: Finite = Field(ge=1, le=1e6)
+    fy: Finite = Field(ge=1, le=1e6)
+    cx: Finite = Field(ge=-1e6, le=1e6)
+    cy: Finite = Field(ge=-1e6, le=1e6)
+    distortion: list[Annotated[Finite, Field(ge=-1e4, le=1e4)]] = Field(
+        default=[0.0] * 5, min_length=5, max_length=5
+    )
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
@@ -68,7 +73,7 @@ class PriorPoseBody(Body):
             {"rvec", "tvec_m"},
             {"quaternion_wxyz", "position_m"},
         ]
-        given = self.model_fields_set
+        given = {name for name in self.model_fields_set if getattr(self, name) is not None}
         needed = [{"height_m", "tilt_deg"}, *forms[1:]]
         if not any(need <= given <= form for need, form in zip(needed, forms, strict=True)):
             raise ValueError(
@@ -76,9 +81,14 @@ class PriorPoseBody(Body):
                 f"tvec_m, or quaternion_wxyz and position_m; got {sorted(given)}"
             )
         try:
-            self.to_value()
+            pose = self.to_value()
         except CalibrationError as error:
             raise ValueError(str(error)) from error
+        limits = {"height_m": _HIGHEST_M, "x_m": _FARTHEST_M, "y_m": _FARTHEST_M}
+        for name, limit in limits.items():
+            value = getattr(pose, name)
+            if not abs(value) <= limit:  # nor is it NaN
+                raise ValueError(f"{name}: at most {limit:g} m are taken, got {value:g}")
         return self
 
     def to_value(self) -> CameraPose:

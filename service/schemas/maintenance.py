@@ -3,17 +3,17 @@
 from datetime import UTC, datetime
 from typing import Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.base import Body, Who
+from service.schemas.base import Body, Moment, Who
 from service.store.alert_tables import MaintenanceRecord
 
 
 class WindowBody(Body):
     """A time in which somebody is at a camera; it begins now, if not told otherwise."""
 
-    from_: AwareDatetime | None = Field(None, alias="from")
-    to: AwareDatetime
+    from_: Moment | None = Field(None, alias="from")
+    to: Moment
     reason: str | None = Field(None, max_length=2000)
     by: Who | None = None
 
@@ -21,13 +21,13 @@ class WindowBody(Body):
 class WindowPatch(Body):
     """What to change of a window; fields left out stay."""
 
-    from_: AwareDatetime | None = Field(None, alias="from")
-    to: AwareDatetime | None = None
+    from_: Moment | None = Field(None, alias="from")
+    to: Moment | None = None
     reason: str | None = Field(None, max_length=2000)
 
 
 class WindowOut(BaseModel):
-    """A maintenance window."""
+    """A maintenance window: `to` as planned, `ended_at` when it really ended."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
@@ -36,6 +36,7 @@ class WindowOut(BaseModel):
     state: Literal["planned", "under_way", "over"]
     from_: datetime = Field(serialization_alias="from")
     to: datetime
+    ended_at: datetime | None
     reason: str | None
     by: str | None
     created_at: datetime
@@ -45,13 +46,14 @@ class WindowOut(BaseModel):
     def from_record(cls, record: MaintenanceRecord) -> Self:
         """The body of a stored window."""
         now = datetime.now(UTC)
-        begun, over = record.from_at <= now, record.to_at <= now
+        begun, over = record.from_at <= now, record.until <= now
         return cls(
             id=record.id,
             camera_id=record.camera_id,
             state="over" if over else "under_way" if begun else "planned",
             from_=record.from_at,
             to=record.to_at,
+            ended_at=record.ended_at,
             reason=record.reason,
             by=record.requested_by,
             created_at=record.created_at,

@@ -14,8 +14,8 @@ from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
 from prometheus_client.registry import Collector
 
+from service.recalibration.camera_state import PoseState
 from service.recalibration.figures import Figures
-from service.recalibration.poses import PoseState
 from service.schemas.webhooks import AlertKind
 
 _SEVERITIES = ("warning", "critical")
@@ -74,19 +74,26 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
 
 def _of_alerts(figures: Figures) -> Iterator[Metric]:
     zeros = dict.fromkeys(product(get_args(AlertKind), _SEVERITIES), 0)
-    count = Counter((alert.kind, alert.severity) for alert in figures.alerts)
+    alone = [alert for alert in figures.alerts if not alert.grouped]
+    count = Counter((alert.kind, alert.severity) for alert in alone)
     yield _gauge(
         "surefoot_alerts_firing",
-        "Alerts that fire, silenced or not.",
+        "Alerts that fire, silenced or not; a group and its members are one.",
         ["kind", "severity"],
         {**zeros, **count},
     )
-    for name, text, silenced in (
-        ("surefoot_alert_firing", "1 for an alert that fires, silenced or not.", (True, False)),
-        ("surefoot_alert_silenced", "1 for an alert that fires and is silenced.", (True,)),
+    for name, text, chosen in (
+        (
+            "firing",
+            "1 for an alert that fires, silenced or not, in a group or not.",
+            figures.alerts,
+        ),
+        ("silenced", "is silenced.", [a for a in figures.alerts if a.silenced]),
+        ("grouped", "is in a group.", [a for a in figures.alerts if a.grouped]),
     ):
-        found = {(a.camera_id, a.kind): 1 for a in figures.alerts if a.silenced in silenced}
-        yield _gauge(name, text, ["camera_id", "kind"], found)
+        words = text if name == "firing" else f"1 for an alert that fires and {text}"
+        found = {(alert.camera_id, alert.kind): 1 for alert in chosen}
+        yield _gauge(f"surefoot_alert_{name}", words, ["camera_id", "kind"], found)
 
 
 def _of_webhooks(figures: Figures) -> Iterator[Metric]:

@@ -15,15 +15,24 @@ from service.store.tables import EstimateRecord
 
 
 class AcceptBody(Body):
-    """Who accepts the served pose as the new prior pose."""
+    """Who accepts the served pose as the new prior pose, and why."""
 
     by: Who | None = None
+    note: str | None = Field(None, max_length=2000)
 
 
-class ResetBody(Body):
+class PutBackBody(Body):
     """Who says that the camera is back at its prior pose."""
 
     by: Who | None = None
+    note: str | None = Field(None, max_length=2000)
+
+
+class ResetBody(Body):
+    """Who says that the camera is at its prior pose and has to be learned anew there."""
+
+    by: Who | None = None
+    note: str | None = Field(None, max_length=2000)
 
 
 class SdOut(BaseModel):

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator
 
-from service.recalibration.webhooks import DeliveryView, WebhookView
+from service.recalibration.webhooks import DeliveryView, SecretMade, WebhookView
 from service.schemas.base import Body
 from service.store.delivery_tables import WebhookRecord
 
@@ -71,9 +71,9 @@ class WebhookMade(WebhookOut):
     secret: str | None
 
     @classmethod
-    def from_record(cls, record: WebhookRecord) -> Self:
+    def from_made(cls, made: SecretMade) -> Self:
         """The body of a new webhook."""
-        return cls.model_validate({**_fields(record), "pending": 0, "secret": record.secret})
+        return cls.model_validate({**_fields(made.record), "pending": 0, "secret": made.secret})
 
 
 class SecretOut(BaseModel):

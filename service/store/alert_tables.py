@@ -10,7 +10,10 @@ from service.store.tables import Record
 
 
 class MaintenanceRecord(Record):
-    """A time in which somebody is at a camera: what is seen in it is not judged."""
+    """A time in which somebody is at a camera: what is seen in it is not judged.
+
+    `to_at` is the plan, `ended_at` when it really ended; None until it has.
+    """
 
     __tablename__ = "maintenance_windows"
 
@@ -18,12 +21,22 @@ class MaintenanceRecord(Record):
     camera_id: Mapped[str] = mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
     from_at: Mapped[datetime]
     to_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
     reason: Mapped[str | None]
     requested_by: Mapped[str | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
     __table_args__ = (Index(None, "camera_id", "to_at"),)
+
+    @property
+    def until(self) -> datetime:
+        """When it ended, or will."""
+        return self.ended_at or self.to_at
+
+    def holds(self, now: datetime) -> bool:
+        """Whether somebody is there."""
+        return self.from_at <= now < self.until
 
 
 class RhythmRecord(Record):

@@ -3,10 +3,17 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store.tables import CameraRecord, PriorPoseRecord
+from service.store.tables import (
+    CameraRecord,
+    EstimateRecord,
+    ModelRecord,
+    PriorPoseRecord,
+    SiteReferenceRecord,
+    TrainingRecord,
+)
 
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:
@@ -23,6 +30,11 @@ def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
 def every(session: Session) -> Sequence[CameraRecord]:
     """All cameras."""
     return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
+
+
+def count(session: Session) -> int:
+    """How many cameras there are."""
+    return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
 
 
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
@@ -43,6 +55,28 @@ def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorP
         .order_by(PriorPoseRecord.id.desc())
         .limit(limit)
     ).all()
+
+
+def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but the newest so many that nothing names; how many."""
+    surplus = (
+        select(PriorPoseRecord.id)
+        .where(PriorPoseRecord.camera_id == camera_id)
+        .order_by(PriorPoseRecord.id.desc())
+        .offset(keep)
+    )
+    naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord)
+    named = [select(one.prior_pose_id).where(one.camera_id == camera_id) for one in naming]
+    bite = (
+        select(PriorPoseRecord.id)
+        .where(
+            PriorPoseRecord.id.in_(surplus),
+            *(PriorPoseRecord.id.not_in(query) for query in named),
+        )
+        .limit(limit)
+    )
+    result = session.execute(delete(PriorPoseRecord).where(PriorPoseRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def longest_due(session: Session) -> datetime | None:

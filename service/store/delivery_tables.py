@@ -14,7 +14,7 @@ class WebhookRecord(Record):
 
     `job_queued_at` is set while a delivery job waits to start. Until `held_until` nothing is sent:
     the endpoint as a whole failed a moment ago. `failing_since` is the first failure after the last
-    success.
+    success. Secrets are sealed with the data directory's key.
     """
 
     __tablename__ = "webhooks"

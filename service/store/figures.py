@@ -62,10 +62,8 @@ def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRec
 
 
 def firing(session: Session) -> Sequence[AlertRecord]:
-    """All alerts that fire, but for members of a group, which speaks for them."""
-    return session.scalars(
-        select(AlertRecord).where(AlertRecord.state == "firing", AlertRecord.group_id.is_(None))
-    ).all()
+    """All alerts that fire, members of groups among them."""
+    return session.scalars(select(AlertRecord).where(AlertRecord.state == "firing")).all()
 
 
 def trainings_by_state(session: Session) -> dict[str, int]:

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.alert_tables import MaintenanceRecord
+
+_UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
 
 
 def find(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord | None:
@@ -30,18 +32,31 @@ def under_way(session: Session, camera_id: str, now: datetime) -> MaintenanceRec
         select(MaintenanceRecord)
         .where(
             MaintenanceRecord.camera_id == camera_id,
-            MaintenanceRecord.to_at > now,
+            now < _UNTIL,
             MaintenanceRecord.from_at <= now,
         )
-        .order_by(MaintenanceRecord.to_at.desc())
+        .order_by(_UNTIL.desc())
         .limit(1)
     ).first()
 
 
-def forget(session: Session, camera_id: str, before: datetime) -> None:
-    """Delete windows that ended before a time."""
-    session.execute(
-        delete(MaintenanceRecord).where(
-            MaintenanceRecord.camera_id == camera_id, MaintenanceRecord.to_at < before
+def just_over(session: Session, camera_id: str, now: datetime) -> Sequence[MaintenanceRecord]:
+    """Windows that have come to their planned end, which nobody has noted yet."""
+    return session.scalars(
+        select(MaintenanceRecord).where(
+            MaintenanceRecord.camera_id == camera_id,
+            MaintenanceRecord.to_at <= now,
+            MaintenanceRecord.ended_at.is_(None),
         )
+    ).all()
+
+
+def forget(session: Session, camera_id: str, before: datetime, limit: int) -> int:
+    """Delete up to `limit` of the windows that ended before a time. Returns how many."""
+    bite = (
+        select(MaintenanceRecord.id)
+        .where(MaintenanceRecord.camera_id == camera_id, before > _UNTIL)
+        .limit(limit)
     )
+    result = session.execute(delete(MaintenanceRecord).where(MaintenanceRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]

@@ -62,6 +62,10 @@ def _camera_key() -> Any:
     return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
 
 
+def _prior_pose_key() -> Any:
+    return mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"), index=True)
+
+
 class CameraRecord(Record):
     """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
 
@@ -117,15 +121,16 @@ class SiteReferenceRecord(Record):
     is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
     said. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
-    `changed_s` when it started.
+    `changed_s` when it started. `answer` is what a person said last of how the camera stands:
+    estimates of before `answered_at` say nothing of it any more.
     """
 
     __tablename__ = "site_references"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    origin: Mapped[str]  # registered, changed, accepted, reset, source
+    prior_pose_id: Mapped[int] = _prior_pose_key()
+    origin: Mapped[str]  # registered, changed, accepted, reset, put_back, source
     source: Mapped[str | None]
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
@@ -138,6 +143,9 @@ class SiteReferenceRecord(Record):
     doubt: Mapped[str]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
+    answer: Mapped[str | None]  # put_back, false_alarm
+    answered_by: Mapped[str | None]
+    answered_at: Mapped[datetime | None]
     created_at: Mapped[datetime]
     ready_at: Mapped[datetime | None]
 
@@ -199,7 +207,7 @@ class TrainingRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
@@ -226,7 +234,7 @@ class ModelRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     training_id: Mapped[str] = mapped_column(
         ForeignKey("trainings.id", ondelete="CASCADE"), unique=True
     )
@@ -272,10 +280,12 @@ class EstimateRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    model_id: Mapped[str | None] = mapped_column(ForeignKey("models.id", ondelete="SET NULL"))
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    model_id: Mapped[str | None] = mapped_column(
+        ForeignKey("models.id", ondelete="SET NULL"), index=True
+    )
+    prior_pose_id: Mapped[int] = _prior_pose_key()
     reference_id: Mapped[int | None] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE")
+        ForeignKey("site_references.id", ondelete="CASCADE"), index=True
     )
     state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]

@@ -62,17 +62,23 @@ class StillBounds:
 
 def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
     """Insert tracks; one that is already stored stays as it is. Returns how many are new."""
-    added = 0
-    for row in rows:
-        result = session.execute(insert(TrackRecord).values(row).on_conflict_do_nothing())
-        added += int(result.rowcount)  # type: ignore[attr-defined]
-    return added
+    if not rows:
+        return 0
+    # One statement for all of them: others wait for the lock meanwhile.
+    statement = insert(TrackRecord.__table__).on_conflict_do_nothing()  # type: ignore[arg-type]
+    return session.connection().execute(statement, rows).rowcount
 
 
 def count(session: Session, camera_id: str) -> int:
     """How many tracks are stored."""
     query = select(func.count()).select_from(TrackRecord)
     return session.scalar(query.where(TrackRecord.camera_id == camera_id)) or 0
+
+
+def stored_bytes(session: Session, camera_id: str) -> int:
+    """How many bytes the points and boxes of a camera's tracks have."""
+    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
 
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
@@ -271,10 +277,14 @@ def predictions(
     ).all()
 
 
-def forget(session: Session, camera_id: str, before: datetime, keep: int) -> int:
-    """Delete what the limits on age and number say. Returns how many."""
+def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:
+    """Delete what the limits on age and number say. Returns how many.
+
+    At most `limit` at once, those first that came first.
+    """
     outlived = _outlived(camera_id, before, keep)
-    result = session.execute(delete(TrackRecord).where(outlived))
+    bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
+    result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(bite)))
     return int(result.rowcount)  # type: ignore[attr-defined]
 
 
@@ -287,10 +297,12 @@ def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool
     """Whether a track is to be deleted: it came before a time, or so many have come after it.
 
     By its arrival, not by its own times: what was recorded years ago and is posted today has been
-    acknowledged today, and stays as long as what was walked today. Each source has its own number:
-    none can post another's tracks away.
+    acknowledged today, and stays as long as what was walked today. The source that
+    counts has a number of its own: no other can post its tracks away.
     """
-    number = func.row_number().over(partition_by=TrackRecord.source, order_by=TrackRecord.id.desc())
+    number = func.row_number().over(
+        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
+    )
     numbered = (
         select(TrackRecord.id, number.label("number"))
         .where(TrackRecord.camera_id == camera_id)

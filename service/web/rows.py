@@ -8,15 +8,25 @@ from datetime import datetime, tzinfo
 from markupsafe import Markup
 
 from service.recalibration.fleet import FleetAlert, FleetCamera, FleetGroup
+from service.web.camera_words import KINDS
 from service.web.sparkline import sparkline
 from service.web.words import STATES, ago, clock_time, duration, from_seconds, situation
 
 _URGENT = ("drifting", "out_of_range")
+# What a state says by itself; every other alert is named.
+_SAID = {
+    "drifting": ("drift", "clock"),
+    "out_of_range": ("out_of_range", "drift", "clock"),
+    "no_data": ("no_data",),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """A camera's line. `key` sorts lines as strings, `text` is what a search looks in."""
+    """A camera's line. `key` sorts lines as strings, `text` is what a search looks in.
+
+    `alerts` are the ids of all that fire.
+    """
 
     id: str
     name: str
@@ -27,6 +37,7 @@ class Row:
     training: int | None
     share: int | None
     spark: Markup
+    alerts: str
     since: str
     since_clock: str
     since_words: str
@@ -100,9 +111,10 @@ def _row(camera: FleetCamera, now: datetime, zone: tzinfo) -> Row:
         training=None if camera.training is None else round(100 * camera.training.share),
         share=share,
         spark=sparkline(camera.history),
-        since="" if since is None else since.isoformat(timespec="seconds"),
-        since_clock="" if since is None else clock_time(since, zone),
-        since_words="" if since is None else ago(since, now),
+        alerts=" ".join(alert.alert_id for alert in camera.alerts),
+        since=since.isoformat(timespec="seconds"),
+        since_clock=clock_time(since, zone),
+        since_words=ago(since, now),
         last="" if last is None else last.isoformat(timespec="seconds"),
         last_clock="" if last is None else clock_time(last, zone),
         last_words="" if last is None else ago(last, now),
@@ -126,8 +138,9 @@ def _flags(camera: FleetCamera, now: datetime) -> tuple[str, ...]:
         flags += _alert_flags(camera.alert, now)
     elif camera.state in _URGENT and camera.attended_until is None:
         flags.append("no alert is open")
-    if len(camera.alerts) > 1:
-        flags.append(f"{len(camera.alerts)} alerts")
+    for alert in camera.alerts:
+        if alert.kind not in _SAID.get(camera.state, ()):
+            flags.append(f"alert: {KINDS.get(alert.kind, alert.kind).lower()}")
     return tuple(flags)
 
 

@@ -1,11 +1,13 @@
 """The one sentence at the top of a camera's page: has it moved, how far, since when, how sure."""
 
 import math
+from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 
 from models.estimation.numbers import ANGLES
 from service.recalibration.camera_page import CameraPage
-from service.store.tables import EstimateRecord
+from service.store.alerts import POSE_KINDS
+from service.store.tables import AlertRecord, EstimateRecord
 from service.web.moments import when
 from service.web.words import duration
 
@@ -17,23 +19,33 @@ _SAYS_DEG = 0.1  # less is not worth a word
 
 def headline(page: CameraPage, zone: tzinfo) -> str:
     """The state of a camera in plain words."""
-    estimate, silence = page.pose.estimate, page.silence
-    no_data = page.pose.state == "no_data"
+    standing, estimate = page.pose.standing, page.pose.estimate
     quiet = ""
-    if silence is not None and no_data:
-        since = when(datetime.fromtimestamp(silence.last_s, UTC), page.now, zone)
-        quiet = f"No people since {since}: {silence.reason}."
-    if estimate is not None and estimate.drifted:
-        return " ".join(part for part in (_moved(page, estimate, zone), quiet) if part)
-    if no_data:
-        before = "" if estimate is None else "When it was last told, it stood where it should."
-        return f"{quiet} {before}".strip()
-    if page.pose.state == "learning" or estimate is None:
-        return _learning(page)
+    if page.silence is not None and standing.silent and standing.state != "learning":
+        since = when(datetime.fromtimestamp(page.silence.last_s, UTC), page.now, zone)
+        quiet = f"No people since {since}: {page.silence.reason}."
+    return " ".join(part for part in (_how_it_stands(page, estimate, zone), quiet) if part)
+
+
+def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzinfo) -> str:
+    standing = page.pose.standing
+    state, told = standing.state, estimate is not None and bool(estimate.told)
+    doubts = [alert for alert in standing.alerts if alert.kind in POSE_KINDS]
+    if state in ("drifting", "out_of_range") and not standing.judged:
+        words = _moved(page, estimate, zone) if estimate is not None and told else _alarmed(doubts)
+        return f"{words} That is what is known last: the next people will tell how it stands now."
+    if estimate is not None and standing.judged and estimate.drifted:
+        return _moved(page, estimate, zone)
+    if doubts:  # of a reference, or about a move whose size is not told
+        return _alarmed(doubts)
+    if state == "learning" or estimate is None or not standing.judged:
+        return _waiting(page)
+    if state == "no_data":
+        return "When it was last told, it stood where it should."
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
-    if page.pose.state == "out_of_range":
+    if state == "out_of_range":
         how = moved_words(estimate)
         edge = "At the edge of what its model was trained for"
         return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
@@ -41,6 +53,10 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
         how = moved_words(estimate)
         return f"It may have moved{how and ': it ' + how}. The next people will tell."
     return f"Standing where it should, as {people}{_sure(estimate)}."
+
+
+def _alarmed(doubts: Sequence[AlertRecord]) -> str:
+    return f"It may not stand where it should: {doubts[0].reason.rstrip('.')}."
 
 
 def turn_words(estimate: EstimateRecord) -> str:
@@ -125,8 +141,11 @@ def _sure(estimate: EstimateRecord) -> str:
     return f"; sure to {' and '.join(parts)}" if parts else ""
 
 
-def _learning(page: CameraPage) -> str:
-    reference = page.pose.reference
+def _waiting(page: CameraPage) -> str:
+    reference, standing = page.pose.reference, page.pose.standing
+    if standing.state in ("ok", "no_data"):
+        who = standing.reference.answered_by or "somebody"
+        return f"Where it should be, as {who} said. The next people will tell."
     if not reference.ready:
         return f"Learning: {reference.tracks} of {reference.wanted} people."
     return "Waiting for people: too few have come to tell how it stands."

@@ -3,8 +3,8 @@
 import math
 from datetime import UTC, datetime, tzinfo
 
+from service.recalibration.camera_state import PoseState
 from service.recalibration.fleet import FleetCamera, FleetDrift
-from service.recalibration.poses import PoseState
 
 STATES: dict[PoseState, str] = {
     "drifting": "Moved",
@@ -18,7 +18,7 @@ _MINUTE_S, _HOUR_S, _DAY_S = 60.0, 3600.0, 86_400.0
 
 def situation(camera: FleetCamera, now: datetime) -> str:
     """What a camera does, in one line."""
-    if camera.alert is not None and camera.alert.kind == "clock":
+    if camera.state == "drifting" and any(alert.kind == "clock" for alert in camera.alerts):
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
     if camera.state == "learning":
         return _learning(camera)
@@ -26,6 +26,10 @@ def situation(camera: FleetCamera, now: datetime) -> str:
         silent_s = now.timestamp() - (camera.last_track_s or now.timestamp())
         return f"no people seen for {duration(silent_s)}, longer than is usual here"
     moved = drift_words(camera.drift)
+    if camera.state == "ok" and not camera.judged:
+        return "where it should be, as somebody said; the next people will tell"
+    if moved and not camera.judged:
+        moved = f"{moved} when it was last told"
     if camera.state == "out_of_range":
         return f"{moved or 'moved'}: further than it was trained for, so this is rough"
     if camera.state == "drifting":

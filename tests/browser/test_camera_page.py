@@ -127,9 +127,30 @@ def test_the_camera_was_put_back(seen, knocked):
     seen.get_by_role("button", name="The camera was put back").click()
     seen.get_by_role("button", name="It was put back").click()
     named(seen, "")  # a name is asked for, not demanded
-    expect(seen.locator(".headline")).to_have_text("Learning: 0 of 200 people.")
+    expect(seen.locator(".headline")).to_contain_text("Waiting for people")
     assert only_alert(knocked)["outcome"] == "put_back"
-    assert knocked.pose()["pose"]["tilt_deg"] == pytest.approx(22.0)
+    body = knocked.pose()
+    assert (body["reference"]["state"], body["pose"]["tilt_deg"]) == ("ready", pytest.approx(22.0))
+
+
+def test_the_camera_is_learned_anew(seen, knocked):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    seen.get_by_role("button", name="Learn it anew").click()
+    seen.locator("#confirm-yes").click()
+    named(seen, "Ada")
+    expect(seen.locator(".headline")).to_have_text("Learning: 0 of 200 people.")
+    expect(seen.locator(".log")).to_contain_text("Ada had the camera learned anew")
+
+
+def test_a_new_pose_that_is_accepted_by_resolving_keeps_its_note(seen, knocked):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    seen.get_by_role("button", name="Resolve…").click()
+    seen.get_by_role("radio", name="New pose accepted").check()
+    seen.get_by_label("Note (optional)").fill("new mast")
+    seen.get_by_role("button", name="Resolve", exact=True).click()
+    seen.locator("#confirm-yes").click()
+    named(seen, "Ada")
+    expect(seen.locator(".log")).to_contain_text("as the prior pose. new mast")
 
 
 def test_an_alert_is_resolved_as_a_false_alarm_by_keyboard_alone(seen, knocked):

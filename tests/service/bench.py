@@ -12,7 +12,7 @@ from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
 from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import Finding, asked_enough, gather
+from service.recalibration.evidence import Evidence, Finding, asked_enough, gather
 from service.recalibration.trainings import begin_training, publish_model
 from service.store import events, references, trainings
 from service.store.database import Store
@@ -51,67 +51,22 @@ class Bench:
             reference.walking_speed_mps = 1.27
             reference.ready_at = datetime.now(UTC)
 
-    def see(
-        self,
-        pose: CameraPose,
-        people: int = 20,
-        sd_deg=0.2,
-        sd_log=0.01,
-        weak=(),
-        change=None,
-        paths=False,
-        earlier: CameraPose | None = None,
-    ):
-        """Post people, who come to a pose, and bring the estimate up to date.
-
-        With `paths` they tell its heading too. Without the newest of them, they come to the
-        `earlier` one: the same, if it is not said.
-        """
+    def post(self, people: int):
+        """Post so many people, who walk one after the other."""
         first = self.count
         self.count += people
         self.clock_s += 60
         batch = [track(str(first + n), start_s=self.clock_s + n) for n in range(people)]
         self.http.post("/cameras/corner/tracks", json={"tracks": batch}).raise_for_status()
+
+    def see(self, pose: CameraPose, people: int = 20, **told):
+        """Post people, who come to a pose, and bring the estimate up to date."""
+        self.post(people)
         with self.store.write() as session:
             evidence = gather(session, self.settings, "corner")
             if evidence is None:
                 return None
-            values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
-            sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
-            joint = JointEstimate(
-                values=values,
-                covariance=np.diag(sd**2),
-                bound=np.diag(sd**2),
-                raw=values + 0.01,
-                walkers=len(evidence.tracks),
-                parties=len(evidence.tracks),
-                weak=tuple(weak),
-                reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
-            )
-            fused = by_speeds_alone(joint, PRIOR)
-            if paths:
-                sds = np.append(sd, math.radians(sd_deg))
-                fused = FusedEstimate(
-                    values=np.append(values, pose.heading_rad),
-                    covariance=np.diag(sds**2),
-                    told=(*fused.told, "heading"),
-                    reason="",
-                    raw=np.append(values, pose.heading_rad) + 0.01,
-                )
-            before = fused
-            if earlier is not None:
-                apart = [earlier.tilt_rad, earlier.roll_rad, math.log(earlier.height_m)]
-                values = np.array([*apart, earlier.heading_rad])
-                before = replace(fused, values=values)
-            finding = Finding(
-                joint=joint,
-                fused=fused,
-                earlier=before if asked_enough(evidence) else None,
-                averaged=None,
-                reading=None,
-                tracks=evidence.tracks,
-                change=None if change is None else evidence.tracks[change],
-            )
+            finding = made_up(evidence, pose, **told)
             return store_estimate(session, self.queue, self.settings, evidence, finding)
 
     def refresh(self):
@@ -130,6 +85,58 @@ class Bench:
     def events(self, type_):
         with self.store.read() as session:
             return [e.payload for e in events.after(session, 0, 1000) if e.type == type_]
+
+
+def made_up(
+    evidence: Evidence,
+    pose: CameraPose,
+    *,
+    sd_deg=0.2,
+    sd_log=0.01,
+    weak=(),
+    change=None,
+    paths=False,
+    earlier: CameraPose | None = None,
+) -> Finding:
+    """What the tracks of a window come to: a pose, whose heading they tell by their `paths`.
+
+    Without the newest of them, they come to the `earlier` one: the same, if it is not said.
+    """
+    values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+    sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
+    joint = JointEstimate(
+        values=values,
+        covariance=np.diag(sd**2),
+        bound=np.diag(sd**2),
+        raw=values + 0.01,
+        walkers=len(evidence.tracks),
+        parties=len(evidence.tracks),
+        weak=tuple(weak),
+        reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
+    )
+    fused = by_speeds_alone(joint, evidence.prior)
+    if paths:
+        sds = np.append(sd, math.radians(sd_deg))
+        fused = FusedEstimate(
+            values=np.append(values, pose.heading_rad),
+            covariance=np.diag(sds**2),
+            told=(*fused.told, "heading"),
+            reason="",
+            raw=np.append(values, pose.heading_rad) + 0.01,
+        )
+    before = fused
+    if earlier is not None:
+        apart = [earlier.tilt_rad, earlier.roll_rad, math.log(earlier.height_m)]
+        before = replace(fused, values=np.array([*apart, earlier.heading_rad]))
+    return Finding(
+        joint=joint,
+        fused=fused,
+        earlier=before if asked_enough(evidence) else None,
+        averaged=None,
+        reading=None,
+        tracks=evidence.tracks,
+        change=None if change is None else evidence.tracks[change],
+    )
 
 
 def moved(tilt_deg=0.0, roll_deg=0.0, height_m=0.0, heading_deg=0.0):

@@ -36,12 +36,13 @@ def dashboard_expressions():
 def series(bench):
     """Label names of every sample of a service in which something of everything happens."""
     for _ in range(3):
-        bench.see(moved(tilt_deg=5.0))
+        bench.see(moved(tilt_deg=14.0))
     bench.http.post("/webhooks", json={"url": "http://1.1.1.1/"}).raise_for_status()
     with bench.store.write() as session:
         upkeep.heartbeat(session, "local-0", 1)
         record = alerts.show_alert(session, bench.alerts()[0]["id"])
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
+        alerts.show_alert(session, bench.alerts()[1]["id"]).group_id = record.id
     found = {}
     for family in families(bench.http.get("/metrics").text):
         for sample in family.samples:

@@ -229,7 +229,7 @@ def test_what_is_wrong_is_said_beside_its_field(http):
     document = problem(http.post("/ui/register", json=fields), 422, "malformed")
     reasons = {item["pointer"]: item["reason"] for item in document["errors"]}
     assert reasons == {
-        "/fx": "must be greater than 0",
+        "/fx": "must be greater than or equal to 1",
         "/tilt_deg": "must be less than or equal to 90",
     }
     fields = {**LENS, **ANGLES, "id": "Not An Id"}

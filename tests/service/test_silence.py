@@ -192,8 +192,8 @@ def test_a_camera_that_was_not_put_back_after_all_alarms_anew(bench):
     )
 
 
-@pytest.mark.parametrize("outcome", ["accepted", "false_alarm"])
-def test_no_outcome_makes_a_new_reference_by_itself(bench, outcome):
+@pytest.mark.parametrize("outcome", ["put_back", "false_alarm"])
+def test_no_answer_makes_a_new_reference_by_itself(bench, outcome):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
     before = bench.http.get("/cameras/corner").json()["prior_pose"]

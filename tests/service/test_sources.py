@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.recalibration import upkeep
+from service.recalibration.retention import limits_of_camera
 from service.store import references, sources, tracks
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
@@ -183,6 +184,6 @@ def test_a_source_cannot_post_another_ones_tracks_away(corner, settings):
         street.source = name
         street.walk(PRIOR, 12)
     with street.context.store.write() as session:
-        assert upkeep.forget_old(session, limited, "corner") == 4
+        assert next(limits_of_camera(limited, "corner")).bite(session) == 4
         assert sources.count_from(session, "corner", "first", None, ()) == 10
         assert sources.find(session, "corner", "first").last_seen_at < datetime.now(UTC)

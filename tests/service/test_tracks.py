@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select
 
 from service.app import create_app
-from service.recalibration import upkeep
+from service.recalibration.retention import limits_of_camera
 from service.settings import Settings
 from service.store.database import Store
 from service.store.packing import unpack
@@ -160,7 +160,7 @@ def test_what_is_taken_as_ahead_is_a_setting(settings):
 def test_a_recording_of_years_ago_outlives_retention(corner, settings):
     assert post(corner, [track("old", start_s=T0)])["accepted"] == 1
     with Store(settings).write() as session:
-        assert upkeep.forget_old(session, settings, "corner") == 0
+        assert next(limits_of_camera(settings, "corner")).bite(session) == 0
     assert len(stored(settings)) == 1
 
 

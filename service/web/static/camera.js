@@ -17,7 +17,7 @@ for (const part of document.querySelectorAll("[data-part]")) was.set(part, part.
 /** Exchange the parts of the page that have changed; what is open stays open, focus stays. */
 async function refresh() {
   const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
-  if (!answer.ok) return;
+  if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   document.title = fresh.title;
   for (const part of document.querySelectorAll("[data-part]")) {
@@ -95,12 +95,12 @@ const ACTS = {
   async resolve({ alert, told }) {
     const said = await ask("resolve-dialog", { needsPose: told === "yes" });
     if (!said) return;
-    if (said.outcome === "accepted") return ACTS.accept();
+    if (said.outcome === "accepted") return ACTS.accept({ note: said.note });
     const body = await asMe({ outcome: said.outcome, ...(said.note && { note: said.note }) });
     if (body) await put("Resolved.", "POST", `/alerts/${alert}/resolve`, body);
   },
 
-  async accept() {
+  async accept({ note }) {
     const yes = await confirmed({
       title: "Accept the new pose?",
       detail:
@@ -108,17 +108,29 @@ const ACTS = {
         "A new reference is learned from people who come from now on. This cannot be undone.",
       yes: "Accept the new pose",
     });
-    const body = yes && (await asMe());
+    const body = yes && (await asMe(note ? { note } : {}));
     if (body) await put("Accepted: a new reference begins.", "POST", `${path}/pose/accept`, body);
   },
 
-  async reset() {
+  async "put-back"() {
     const yes = await confirmed({
       title: "Was the camera put back?",
       detail:
-        "It is taken to stand at its prior pose, exactly, and open alerts about it are closed. " +
-        "The reference so far is dropped and learned anew from now on. This cannot be undone.",
+        "It is taken to stand at its prior pose again, and open alerts about it are closed. " +
+        "Whoever comes from now on tells how it stands, against what was learned there.",
       yes: "It was put back",
+    });
+    const body = yes && (await asMe());
+    if (body) await put("Noted: the next people will tell.", "POST", `${path}/pose/put-back`, body);
+  },
+
+  async relearn() {
+    const yes = await confirmed({
+      title: "Learn it anew?",
+      detail:
+        "It is taken to stand at its prior pose, exactly, and open alerts about it are closed. " +
+        "What was learned so far is dropped and learned anew from now on. This cannot be undone.",
+      yes: "Learn it anew",
     });
     const body = yes && (await asMe());
     if (body) await put("Noted: a new reference begins.", "POST", `${path}/reference/reset`, body);
@@ -138,7 +150,7 @@ const ACTS = {
   },
 
   async train() {
-    await put("A training is queued.", "POST", `${path}/trainings`);
+    await put("A training is queued.", "POST", `${path}/trainings`, signed());
   },
 
   async cancel({ training }) {

@@ -2,8 +2,12 @@
 
 const KEY = "surefoot.by";
 
+/** Who is logged in, and so who acts; undefined where access is off. */
+export const caller = document.body.dataset.caller;
+
 /** The name that acts are kept with; empty where nobody has said one. */
 export function myName() {
+  if (caller) return caller;
   try {
     return localStorage.getItem(KEY) ?? "";
   } catch {
@@ -13,7 +17,7 @@ export function myName() {
 
 /** Ask for a name unless one was given before; false where the act is called off. */
 export async function nameMe({ again = false } = {}) {
-  if (!again && asked()) return true;
+  if (caller || (!again && asked())) return true;
   document.getElementById("name-field").value = myName();
   const said = await ask("name-dialog", { keep: true });
   if (!said) return false;

@@ -26,7 +26,9 @@ export function subscribe(onEvent, onState = showState) {
     source.onerror = () => {
       onState("off");
       // The browser tries again by itself unless the answer was an error.
-      if (source?.readyState === EventSource.CLOSED) timer = setTimeout(open, AGAIN_MS);
+      if (source?.readyState !== EventSource.CLOSED) return;
+      timer = setTimeout(open, AGAIN_MS);
+      leaveIfLoggedOut().catch(() => {});
     };
     for (const type of TYPES) {
       source.addEventListener(type, (event) => {
@@ -45,6 +47,12 @@ export function subscribe(onEvent, onState = showState) {
     document.removeEventListener("visibilitychange", onVisibility);
     close();
   };
+}
+
+/** Load the page anew, which leads to the login, where its session is over. */
+async function leaveIfLoggedOut() {
+  const answer = await fetch("/cameras?limit=1", { headers: { Accept: "application/json" } });
+  if (answer.status === 401) location.reload();
 }
 
 /** Show in the page's head whether it is live. */

@@ -3,8 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
-revision = "2026_11_24_track_sources"
-down_revision = "2026_11_23_activity"
+revision = "2026_11_25_track_sources"
+down_revision = "2026_11_24_parent_indexes"
 branch_labels = None
 depends_on = None
 

@@ -1,0 +1,78 @@
+"""Sessions of pages: who logs in with a token is known by a cookie until the session ends."""
+
+import hashlib
+import secrets
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller
+from service.access.tokens import caller_of, caller_of_token, is_valid
+from service.errors import ForbiddenError, UnauthorizedError
+from service.recalibration.activity import note
+from service.settings import Settings
+from service.store import access
+from service.store.access_tables import SessionRecord
+
+_ID_BYTES = 32
+
+
+def check_login(session: Session, token: str) -> Caller:
+    """Whom a token stands for, who may look at pages.
+
+    Raises:
+        UnauthorizedError: nobody is let in with it.
+        ForbiddenError: it is not for pages.
+    """
+    caller = caller_of_token(session, token.strip())
+    if caller is None:
+        raise UnauthorizedError("token: nobody is let in with this; it may be over or revoked")
+    if not caller.may("read"):
+        raise ForbiddenError("token: pages need the scope read, this is for posting tracks alone")
+    return caller
+
+
+def log_in(session: Session, settings: Settings, caller: Caller) -> str:
+    """Begin a session of who was let in with a token; returns what its cookie says."""
+    assert caller.token_id is not None
+    now = datetime.now(UTC)
+    access.forget_sessions(session, now)
+    cookie = secrets.token_urlsafe(_ID_BYTES)
+    session.add(
+        SessionRecord(
+            id_sha256=_hash(cookie),
+            token_id=caller.token_id,
+            created_at=now,
+            expires_at=now + timedelta(hours=settings.session_hours),
+        )
+    )
+    note(session, "session.began", by=caller.name, via=caller.token_id, subject_id=caller.token_id)
+    return cookie
+
+
+def log_out(session: Session, caller: Caller) -> None:
+    """End the session of a page."""
+    if caller.session_hash is None:
+        return
+    access.end_session(session, caller.session_hash)
+    note(session, "session.ended", by=caller.name, via=caller.token_id, subject_id=caller.token_id)
+
+
+def note_refused(session: Session, address: str) -> None:
+    """Keep that somebody was not let in; never with what."""
+    note(session, "login.refused", by=None, details={"address": address})
+
+
+def caller_of_session(session: Session, cookie: str) -> Caller | None:
+    """Whose page asks; None where its session, or the token behind it, is over."""
+    id_sha256 = _hash(cookie)
+    found = access.session_with_token(session, id_sha256)
+    now = datetime.now(UTC)
+    if found is None or found[0].expires_at <= now or not is_valid(found[1], now):
+        return None
+    return replace(caller_of(found[1]), session_hash=id_sha256)
+
+
+def _hash(cookie: str) -> str:
+    return hashlib.sha256(cookie.encode("utf-8", "replace")).hexdigest()

@@ -1,0 +1,131 @@
+"""Reads one OpenCV file from stdin and writes what it says to stdout, as JSON.
+
+A process of its own, with little to lose and nothing to reach: `python -m
+service.formats.calibration_reader`. By the time that it sees the file it can open no other file
+and no connection, and it is ended when it wants too much memory or time.
+"""
+
+import json
+import math
+import resource
+import sys
+from typing import Any
+
+import cv2
+import numpy as np
+
+MAX_INPUT_BYTES = 2 * 1024 * 1024
+MAX_MEMORY_BYTES = 1024 * 1024 * 1024  # above what the libraries have mapped already
+MAX_CPU_S = 5
+# What tutorials, calib3d's samples and ROS call things.
+_NAMES = {
+    "matrix": ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "intrinsics", "M"),
+    "distortion": (
+        "distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "distCoeffs",
+        "dist_coeff", "distortion", "D", "D1",
+    ),
+    "rotation": ("R", "rotation", "rotation_matrix", "rotationMatrix", "rvec", "rvecs"),
+    "translation": ("t", "T", "translation", "translation_vector", "tvec", "tvecs"),
+    "width": ("image_width", "image_Width", "width"),
+    "height": ("image_height", "image_Height", "height"),
+}  # fmt: skip
+
+
+class _RefusedError(Exception):
+    """The file is not what is looked for; the message says why."""
+
+
+def main() -> None:
+    """Answer for the file on stdin: its numbers, or `{"refused": why}`."""
+    body = sys.stdin.buffer.read(MAX_INPUT_BYTES)
+    _give_up_rights()
+    try:
+        answer: dict[str, Any] = _read_file(body)
+    except _RefusedError as error:
+        answer = {"refused": str(error)}
+    sys.stdout.write(json.dumps(answer))
+
+
+def _give_up_rights() -> None:
+    """Cap what this process may still take. Once done, it cannot be undone."""
+    with open("/proc/self/statm") as counts:
+        mapped = int(counts.read().split()[0]) * resource.getpagesize()
+    _cap(resource.RLIMIT_AS, mapped + MAX_MEMORY_BYTES)
+    _cap(resource.RLIMIT_CPU, MAX_CPU_S)
+    _cap(resource.RLIMIT_CORE, 0)
+    _cap(resource.RLIMIT_FSIZE, 0)  # of files: pipes are none
+    _cap(resource.RLIMIT_NOFILE, 0)  # no file and no socket more
+
+
+def _cap(what: int, most: int) -> None:
+    resource.setrlimit(what, (most, most))
+
+
+def _read_file(body: bytes) -> dict[str, Any]:
+    text = body.decode("utf-8", errors="replace").strip()
+    flags = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
+    try:
+        storage = cv2.FileStorage(text + "\n", flags)
+        if not storage.isOpened():
+            raise _RefusedError("this is no OpenCV YAML, XML or JSON")
+        return _read(storage)
+    except (cv2.error, SystemError, MemoryError) as error:
+        raise _RefusedError("this is no OpenCV YAML, XML or JSON") from error
+
+
+def _read(storage: cv2.FileStorage) -> dict[str, Any]:
+    matrix = _numbers(storage, "matrix", (9,))
+    distortion = _numbers(storage, "distortion", (1, 2, 3, 4, 5, 8, 12, 14))
+    rotation = _numbers(storage, "rotation", (3, 9))
+    translation = _numbers(storage, "translation", (3,))
+    if matrix is None and rotation is None:
+        raise _RefusedError(
+            "neither a camera matrix (camera_matrix, K) nor a rotation (R, rvec) is in this file"
+        )
+    if distortion is not None and any(distortion[5:]):
+        raise _RefusedError(
+            f"the lens has {len(distortion)} distortion numbers; k1, k2, p1, p2, k3 are taken. "
+            "Calibrate again without CALIB_RATIONAL_MODEL, CALIB_THIN_PRISM_MODEL, CALIB_TILTED"
+        )
+    sides = [_number(storage, name) for name in ("width", "height")]
+    return {
+        "matrix": matrix,
+        "distortion": None if distortion is None else [*distortion, 0, 0, 0, 0][:5],
+        "rotation": rotation,
+        "translation": translation,
+        "size": None if None in sides else [int(side or 0) for side in sides],
+    }
+
+
+def _numbers(storage: cv2.FileStorage, what: str, counts: tuple[int, ...]) -> list[float] | None:
+    for name in _NAMES[what]:
+        node = storage.getNode(name)
+        if node.empty():
+            continue
+        values = _values(node)
+        if len(values) not in counts or not all(math.isfinite(value) for value in values):
+            wanted = " or ".join(str(count) for count in counts)
+            raise _RefusedError(f"{name}: {wanted} finite numbers are needed, got {len(values)}")
+        return values
+    return None
+
+
+def _values(node: Any) -> list[float]:
+    """The numbers of a matrix, or of a plain list."""
+    if node.isSeq():
+        items = [node.at(n) for n in range(node.size())]
+        return [item.real() for item in items if item.isReal() or item.isInt()]
+    matrix = node.mat() if node.isMap() else None
+    return [] if matrix is None else np.asarray(matrix, dtype=np.float64).ravel().tolist()
+
+
+def _number(storage: cv2.FileStorage, what: str) -> float | None:
+    for name in _NAMES[what]:
+        node = storage.getNode(name)
+        if (node.isInt() or node.isReal()) and math.isfinite(node.real()):
+            return float(node.real())
+    return None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""What a person says of how a camera stands: its pose is accepted, it was put back, it never moved.
+
+Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
+"""
+
+from typing import Literal
+
+from sqlalchemy.orm import Session
+
+from service.errors import ConflictError
+from service.job_queue import JobQueue
+from service.recalibration.activity import note as note_activity
+from service.recalibration.alerts import close_alert, close_pose_alerts, require_firing
+from service.recalibration.cameras import renew_prior_pose, require_camera
+from service.recalibration.poses import PoseView, view_pose
+from service.recalibration.references import begin_reference, keep_answer
+from service.recalibration.trainings import request_estimate
+from service.settings import Settings
+from service.store import alerts, tracks
+from service.store.tables import AlertRecord
+
+Outcome = Literal["put_back", "accepted", "false_alarm"]
+
+
+def accept_pose(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Make the served pose the new prior pose, close its alerts and begin a new reference.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        ConflictError: no pose has been estimated yet.
+    """
+    view = view_pose(session, settings, camera_id)
+    if not view.told:
+        raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
+    close_pose_alerts(session, camera_id, "accepted", by, note)
+    note_activity(session, "pose.accepted", by=by, camera_id=camera_id, text=note)
+    from_s = tracks.newest_end_s(session, camera_id)
+    renew_prior_pose(
+        session, queue, settings, camera_id, view.pose, "accepted", from_s=from_s, by=by
+    )
+    return view_pose(session, settings, camera_id)
+
+
+def put_back(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Take a person's word that the camera is back at its prior pose; what was learned there holds.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    _answer(session, queue, camera_id, "put_back", by, note)
+    return view_pose(session, settings, camera_id)
+
+
+def learn_anew(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Take a person's word that the camera is at its prior pose, and learn it anew there.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    close_pose_alerts(session, camera_id, "put_back", by, note)
+    note_activity(session, "reference.reset", by=by, camera_id=camera_id, text=note)
+    from_s = tracks.newest_end_s(session, camera_id)
+    begin_reference(session, camera_id, "reset", from_s=from_s, by=by)
+    request_estimate(session, queue, camera_id)
+    return view_pose(session, settings, camera_id)
+
+
+def resolve_alert(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    alert_id: str,
+    outcome: Outcome,
+    note: str | None,
+    by: str | None,
+) -> AlertRecord:
+    """End an alert with what came of it; an alert of the same kind may open anew later.
+
+    What is said of a camera's pose is said of all its alerts about the pose. A group's members end
+    with it, and the same way.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved, or there is no pose to accept.
+    """
+    record = require_firing(session, alert_id)
+    for each in (*alerts.firing_members(session, record.id), record):
+        if each.state == "firing":
+            _resolve(session, queue, settings, each, outcome, note, by)
+    return record
+
+
+def _resolve(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    record: AlertRecord,
+    outcome: Outcome,
+    note: str | None,
+    by: str | None,
+) -> None:
+    if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
+        close_alert(session, record, outcome, note, by)
+    elif outcome == "accepted":
+        accept_pose(session, queue, settings, record.camera_id, by, note)
+    else:
+        _answer(session, queue, record.camera_id, outcome, by, note)
+
+
+def _answer(
+    session: Session,
+    queue: JobQueue,
+    camera_id: str,
+    answer: Literal["put_back", "false_alarm"],
+    by: str | None,
+    note: str | None,
+) -> None:
+    """Have a camera judged against its prior pose by whoever comes from now on."""
+    close_pose_alerts(session, camera_id, answer, by, note)
+    note_activity(session, f"pose.{answer}", by=by, camera_id=camera_id, text=note)
+    keep_answer(session, camera_id, answer, by)
+    request_estimate(session, queue, camera_id)

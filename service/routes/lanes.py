@@ -1,0 +1,133 @@
+"""So many requests at once, so many waiting, and no more: the others are told to come back.
+
+Kinds of requests have lanes of their own, so that none starves another; `/healthz` needs none.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.errors import OverloadedError
+from service.settings import Settings
+
+_COME_BACK_S = 2.0
+_OPERATION_AT_ONCE = 2
+
+
+class Lane:
+    """Turns for requests of one kind, in the order of their coming; in one event loop."""
+
+    def __init__(self, name: str, *, at_once: int, waiting: int, patience_s: float) -> None:
+        self._name = name
+        self._free = at_once
+        self._most_waiting = waiting
+        self._patience_s = patience_s
+        self._waiting: deque[asyncio.Future[None]] = deque()
+
+    def check(self) -> None:
+        """Refuse before anything is read.
+
+        Raises:
+            OverloadedError: as many wait already as may.
+        """
+        if self._free <= 0 and len(self._waiting) >= self._most_waiting:
+            raise OverloadedError(
+                f"{self._name}: every place is taken, and {self._most_waiting} requests wait",
+                retry_after_s=_COME_BACK_S,
+            )
+
+    @asynccontextmanager
+    async def turn(self) -> AsyncIterator[None]:
+        """Wait for a turn, and have it as long as the block lasts.
+
+        Raises:
+            OverloadedError: too many wait already, or the turn did not come in time.
+        """
+        self.check()
+        if self._free > 0:
+            self._free -= 1
+        else:
+            await self._wait()
+        try:
+            yield
+        finally:
+            self._pass_on()
+
+    async def _wait(self) -> None:
+        called = asyncio.get_running_loop().create_future()
+        self._waiting.append(called)
+        try:
+            async with asyncio.timeout(self._patience_s):
+                await called
+        except BaseException as error:
+            if called.done() and not called.cancelled():
+                self._pass_on()  # it came in the very moment of giving up
+            elif called in self._waiting:
+                self._waiting.remove(called)
+            if isinstance(error, TimeoutError):
+                raise OverloadedError(
+                    f"{self._name}: no turn came within {self._patience_s:g} s",
+                    retry_after_s=_COME_BACK_S,
+                ) from error
+            raise
+
+    def _pass_on(self) -> None:
+        while self._waiting:
+            called = self._waiting.popleft()
+            if not called.cancelled():
+                called.set_result(None)
+                return
+        self._free += 1
+
+
+class Lanes:
+    """The lanes of an application."""
+
+    def __init__(self, settings: Settings) -> None:
+        def lane(name: str, at_once: int, waiting: int) -> Lane:
+            return Lane(name, at_once=at_once, waiting=waiting, patience_s=settings.http_wait_s)
+
+        self._reads = lane("reads", settings.http_at_once, settings.http_waiting)
+        self._writes = lane("writes", settings.http_at_once, settings.http_waiting)
+        self._operation = lane("operation", _OPERATION_AT_ONCE, settings.http_waiting)
+        self._streams = lane("streams", settings.max_streams, 0)
+
+    def of(self, scope: Scope) -> Lane | None:
+        """The lane of a request; None for what is answered whatever the load."""
+        path = scope["path"]
+        if path == "/healthz":
+            return None
+        if path in ("/readyz", "/metrics"):
+            return self._operation
+        if path == "/events":
+            return self._streams
+        return self._reads if scope["method"] in ("GET", "HEAD") else self._writes
+
+
+class LaneMiddleware:
+    """Lets a request, whose body has come, wait for its turn."""
+
+    def __init__(self, app: ASGIApp, lanes: Lanes) -> None:
+        self._app = app
+        self._lanes = lanes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on when its turn comes."""
+        lane = self._lanes.of(scope) if scope["type"] == "http" else None
+        if lane is None:
+            await self._app(scope, receive, send)
+            return
+        async with lane.turn():
+            await self._app(scope, receive, send)
+
+
+def sessions_at_once(settings: Settings) -> int:
+    """How many sessions requests may have at once: a request has one at a time."""
+    return 2 * settings.http_at_once + _OPERATION_AT_ONCE + STREAM_POLLS + LOOKUPS
+
+
+STREAM_POLLS = 2  # of all event streams together
+LOOKUPS = 4  # of who asks, before a request has its turn

@@ -1,0 +1,192 @@
+"""What keeps a command from starting is one line that says what to do; the commands are real."""
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+
+import httpx
+import psutil
+import pytest
+
+from tests.conftest import free_port, pid_exists, wait_for
+
+
+def start(command, data_dir, *flags, code=1, **variables):
+    """The one line that a command ends with."""
+    environment = {**os.environ, "SUREFOOT_DATA_DIR": str(data_dir), "SUREFOOT_PORT": "0"}
+    ended = subprocess.run(
+        [sys.executable, "-m", "service.cli", command, *flags],
+        env={**environment, **variables},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert ended.returncode == code, ended.stderr
+    lines = ended.stderr.splitlines()
+    assert len(lines) == 1, ended.stderr
+    assert lines[0].startswith("surefoot: ")
+    assert not ended.stdout
+    return lines[0].removeprefix("surefoot: ")
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "told"),
+    [
+        ("PORT", "abc", "SUREFOOT_PORT: .*integer.*, got 'abc'"),
+        ("PORT", "70000", "SUREFOOT_PORT: .*65535, got '70000'"),
+        ("RECIPE", "soup", "SUREFOOT_RECIPE: .*'default' or 'paper', got 'soup'"),
+        ("WEBHOOK_ALLOW", "10.0.0.0/99", "SUREFOOT_WEBHOOK_ALLOW: .*'10.0.0.0/99'"),
+        ("TIMEZONE", "Mars/Base", "SUREFOOT_TIMEZONE: .*'Mars/Base'"),
+        ("SECRET_KEY", "hunter2", "SUREFOOT_SECRET_KEY: 32 bytes in base64 .*openssl"),
+    ],
+)
+def test_a_bad_setting_names_its_variable_its_limit_and_its_value(tmp_path, variable, value, told):
+    command = {"PORT": "serve", "RECIPE": "worker"}.get(variable, "migrate")
+    line = start(command, tmp_path / "data", code=2, **{f"SUREFOOT_{variable}": value})
+    assert re.fullmatch(told + ".*", line), line
+    assert "hunter2" not in line
+    assert not (tmp_path / "data").exists()
+
+
+@contextlib.contextmanager
+def taken_port():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        yield other.getsockname()[1]
+
+
+def test_a_port_in_use_is_named(tmp_path):
+    with taken_port() as port:
+        line = start("serve", tmp_path / "data", SUREFOOT_PORT=str(port))
+    assert f"port: cannot listen on 127.0.0.1, port {port} (Address already in use)" in line
+
+
+def test_an_address_of_another_machine_is_named(tmp_path):
+    line = start("serve", tmp_path / "data", "--host", "192.0.2.1")
+    assert "port: cannot listen on 192.0.2.1" in line
+
+
+def test_a_data_directory_that_is_a_file(tmp_path):
+    (tmp_path / "data").write_text("")
+    assert f"{tmp_path}/data is a file; name a folder" in start("serve", tmp_path / "data")
+    assert "is a file" in start("migrate", tmp_path / "data" / "below")
+
+
+@pytest.mark.parametrize("command", ["serve", "worker", "migrate"])
+def test_a_newer_schema_is_not_touched(settings, command):
+    with sqlite3.connect(settings.database_path) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '2031_01_01_later'")
+    line = start(command, settings.data_dir)
+    assert "revision 2031_01_01_later, newer than this release" in line
+    assert "install the release that wrote it" in line
+
+
+def test_a_database_that_is_none_or_damaged(settings):
+    whole = settings.database_path.read_bytes()
+    settings.database_path.write_bytes(b"not a database at all" * 1000)
+    assert "surefoot.sqlite is no SQLite database" in start("serve", settings.data_dir)
+    settings.database_path.write_bytes(whole[:4096] + b"\xa5" * (len(whole) - 4096))
+    assert "surefoot.sqlite is damaged" in start("migrate", settings.data_dir)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of two megabytes; where it cannot be made, the test is skipped."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2m", "none", str(folder)],
+        capture_output=True,
+        check=False,
+    )
+    if made.returncode:
+        pytest.skip("no right to mount a small disk")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_disk_without_space(small_disk):
+    data = small_disk / "data"
+    with contextlib.suppress(OSError), (small_disk / "filler").open("wb") as filler:
+        while True:
+            filler.write(b"\0" * 4096)
+            filler.flush()
+    line = start("serve", data)
+    assert "space" in line
+    assert "make room" in line
+
+
+def test_a_read_only_disk(small_disk, settings):
+    shutil.copytree(settings.data_dir, small_disk / "data")
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    line = start("serve", small_disk / "data")
+    assert "read-only" in line.lower() or "readonly" in line.lower()
+    assert "writable" in line
+
+
+@pytest.mark.slow
+def test_one_serve_a_data_directory_and_workers_beside_it(service):
+    wait_for(service.ready)
+    line = start("serve", service.settings.data_dir)
+    assert (
+        f"{service.settings.data_dir} is in use by `surefoot serve`, pid {service.process.pid}"
+        in (line)
+    )
+    assert service.ready()
+    beside = subprocess.Popen(
+        [sys.executable, "-m", "service.cli", "worker", "--name", "beside"],
+        env=service.settings.as_environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert beside.stderr is not None
+    try:
+        assert any("worker_started" in said for said in beside.stderr)
+    finally:
+        beside.terminate()
+        beside.wait(20)
+    service.kill()  # what dies holds nothing
+    service.start()
+
+
+def test_a_demo_keeps_out_of_a_service_that_runs(tmp_path):
+    with taken_port() as port:
+        line = start("demo", tmp_path, "--port", str(port))
+    assert f"port {port}" in line
+    assert "another" in line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [signal.SIGHUP, signal.SIGKILL])
+def test_nothing_stays_of_a_demo_that_was_ended(tmp_path, end):
+    port = free_port()
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-m", "service.cli", "demo", "--port", str(port), "--no-stay"]
+    demo = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
+    wait_for(lambda: _answers(port))
+    (folder,) = tmp_path.glob("surefoot-demo-*")
+    family = psutil.Process(demo.pid).children(recursive=True)
+    assert family
+    demo.send_signal(end)
+    demo.wait(20)
+    wait_for(lambda: not any(pid_exists(process.pid) for process in family), 30)
+    if end == signal.SIGKILL:  # the next one finds it
+        with taken_port() as other:
+            start("demo", tmp_path, "--port", str(other), TMPDIR=str(tmp_path))
+    assert not folder.exists()
+
+
+def _answers(port):
+    try:
+        return httpx.get(f"http://127.0.0.1:{port}/healthz").status_code == 200
+    except httpx.TransportError:
+        return False
