@@ -190,9 +190,8 @@ class TrackRecord(Record):
 
     __table_args__ = (
         UniqueConstraint("camera_id", "source", "track_id", "started_s"),
-        # With the source, so that those that count are counted without their points.
         Index(None, "camera_id", "ended_s", "source"),
-        # When tracks came and what they were of: the camera's rhythm.
+        # What counts is counted without its points; when it came is the camera's rhythm.
         Index(None, "camera_id", "received_at", "ended_s", "source"),
     )
 
