@@ -13,11 +13,8 @@ from service.recalibration.maintenance import note_ends
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
 from service.recalibration.silence import end_silences
-from service.recalibration.trainings import (
-    camera_step_s,
-    queue_training,
-    request_estimate,
-)
+from service.recalibration.sources import watch_sources
+from service.recalibration.trainings import camera_step_s, queue_training, request_estimate
 from service.settings import Settings
 from service.store import (
     cameras,
@@ -48,6 +45,9 @@ def reconcile_camera(
     if camera.estimate_due_at is None and _is_behind(session, settings, camera):
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
+    source = watch_sources(session, queue, settings, camera_id, datetime.now(UTC))
+    if source is not None:
+        found.append(source)
     if note_ends(session, camera_id, datetime.now(UTC)):
         found.append("maintenance that has come to its end")
     presence = watch_presence(session, settings, camera_id, datetime.now(UTC))

@@ -17,6 +17,7 @@ from service.store.tables import (
     TrackRecord,
     TrainingRecord,
 )
+from service.store.tracks import of_counting_source
 from service.store.worker_tables import WorkerRecord
 
 # Which cameras are asked about; None is all.
@@ -32,8 +33,13 @@ class Backlog:
 
 
 def last_tracks_s(session: Session, ids: Ids = None) -> dict[str, float | None]:
-    """When the newest track of each camera ended."""
-    newest = newest_of(TrackRecord.ended_s, TrackRecord.camera_id)
+    """When the newest track of each camera ended, of those that count."""
+    newest = (
+        select(func.max(TrackRecord.ended_s))
+        .where(TrackRecord.camera_id == CameraRecord.id, of_counting_source(CameraRecord.id))
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
     query = select(CameraRecord.id, newest).where(among(CameraRecord.id, ids))
     rows = session.execute(query.order_by(CameraRecord.id))
     return {camera_id: ended_s for camera_id, ended_s in rows}

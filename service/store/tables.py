@@ -126,7 +126,8 @@ class SiteReferenceRecord(Record):
     """What estimators say while a camera is known to be at its prior pose; the newest counts.
 
     It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
-    is unset. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
+    is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
+    said. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
     `changed_s` when it started. `answer` is what a person said last of how the camera stands:
     estimates of before `answered_at` say nothing of it any more.
@@ -137,7 +138,8 @@ class SiteReferenceRecord(Record):
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
-    origin: Mapped[str]  # registered, changed, accepted, reset, put_back
+    origin: Mapped[str]  # registered, changed, accepted, reset, put_back, source
+    source: Mapped[str | None]
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
     to_s: Mapped[float | None]
@@ -194,10 +196,10 @@ class TrackRecord(Record):
 
     __table_args__ = (
         UniqueConstraint("camera_id", "source", "track_id", "started_s"),
-        Index(None, "camera_id", "ended_s"),
+        Index(None, "camera_id", "ended_s", "source"),
         Index(None, "camera_id", "id"),
-        # When tracks came and what they were of, without their points: the camera's rhythm.
-        Index(None, "camera_id", "received_at", "ended_s"),
+        # What counts is counted without its points; when it came is the camera's rhythm.
+        Index(None, "camera_id", "received_at", "ended_s", "source"),
     )
 
 
@@ -300,7 +302,7 @@ class EstimateRecord(Record):
     drift_heading_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
     suspected: Mapped[bool]  # the score test says that the camera has moved
-    drift_streak: Mapped[int]  # updates in a row beyond the limits; negative: below them
+    drift_streak: Mapped[int]  # 1: beyond the limits; -1: below the share that clears
     drifted: Mapped[list[str]]  # of those: what has been beyond since it began
     drift_since: Mapped[datetime | None]
     raw: Mapped[dict[str, Any]]
@@ -329,9 +331,9 @@ class AlertRecord(Record):
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
     group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
-    kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale
+    kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale, tracker
     state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference, rhythm, upkeep, group
+    source: Mapped[str]  # estimate, reference, rhythm, upkeep, group, tracks
     told: Mapped[bool] = mapped_column(default=False)
     severity: Mapped[str]  # warning, critical
     reason: Mapped[str]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from models.geometry.pose import CameraPose
-from service.formats.track import Batch, Clock, read_track
+from service.formats.track import Batch, Clock, Limits, read_track
 from service.recalibration import upkeep
 from service.recalibration.cameras import add_prior_pose
 from service.recalibration.looking import begin_look, end_look
@@ -71,7 +71,8 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         for k, point in enumerate(raw["points"]):
             point[0] = start_s + n + step_s * k
         clock = Clock(frame_rate_hz=None, started_at_s=None)
-        batch.append(read_track(raw, "t", clock, (1280, 720)))
+        limits = Limits(width=1280, height=720, now_s=time.time(), max_ahead_s=60.0)
+        batch.append(read_track(raw, "t", clock, limits))
     return receive_tracks(session, Recorder(), "corner", Batch(tracks=tuple(batch), rejections=()))
 
 
