@@ -15,6 +15,7 @@ from service.routes import (
     alerts,
     camera_page,
     cameras,
+    documented,
     events,
     fleet,
     login,
@@ -100,6 +101,7 @@ def create_app(settings: Settings) -> FastAPI:
         tokens,
     ):
         app.include_router(module.router)
+    documented.document_errors(app)
     pages.mount_static(app)
     lanes = Lanes(settings)
     # The last one is outermost.

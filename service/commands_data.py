@@ -91,11 +91,14 @@ def rotate_key(
     old_key_file: Annotated[
         Path | None, typer.Option(help="Of the key until now; secret.key of the data directory.")
     ] = None,
+    lost: Annotated[
+        bool, typer.Option("--lost", help="There is none: new secrets, webhooks disabled.")
+    ] = False,
 ) -> None:
     """Seal the stored secrets with a new key file, or with SUREFOOT_SECRET_KEY if that is set."""
     from service.recalibration.key_rotation import rotate_key as rotate
 
-    count = rotate(_begin(data_dir), old_key_file)
+    count = rotate(_begin(data_dir), old_key_file, lost=lost)
     _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
 
 

@@ -97,7 +97,7 @@ def running_in(folder: Path, but: tuple[str, ...] = ()) -> list[str]:
     for path in sorted(folder.glob("*.lock")):
         if path.name in (MIGRATE_LOCK, *but):
             continue
-        with path.open("r+") as lock:
+        with path.open() as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "2026_11_24_failing_cameras"
-down_revision = "2026_11_24_access"
+down_revision = "2026_11_24_parent_indexes"
 branch_labels = None
 depends_on = None
 

@@ -1,4 +1,4 @@
-"""The rounds of the upkeep: sweep twice a second, reconcile every few, retention every hour."""
+"""The rounds of the upkeep that come often: sweep twice a second, reconcile every few."""
 
 import logging
 import time
@@ -57,20 +57,3 @@ def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
         changed = stale.watch(session, context.settings)
     for camera_id, change in changed.items():
         log.warning("stale", extra={"camera_id": camera_id, "alert": change})
-
-
-def run_retention(context: JobContext) -> None:
-    """Delete what the limits on age and number say, and weights that no model names."""
-    with context.store.read() as session:
-        ids = upkeep.camera_ids(session)
-    for camera_id in ids:
-        with context.store.write() as session:
-            deleted = upkeep.forget_old(session, context.settings, camera_id)
-        if deleted:
-            log.info("tracks_deleted", extra={"camera_id": camera_id, "tracks": deleted})
-    with context.store.write() as session:
-        upkeep.forget_events(session, context.settings)
-        upkeep.forget_activity(session, context.settings)
-        deliveries.forget_deliveries(session, context.settings)
-        for path in upkeep.unused_weights(session, context.settings.weights_dir):
-            path.unlink(missing_ok=True)

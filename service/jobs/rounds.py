@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from service.jobs import engine
 from service.jobs.context import JobContext
-from service.jobs.housekeeping import ClockWatch, run_reconcile, run_retention, run_sweep
+from service.jobs.housekeeping import ClockWatch, run_reconcile, run_sweep
+from service.jobs.retention import run_retention
 from service.jobs.rhythms import run_rhythms
 from service.recalibration.staleness import StaleWatch
 

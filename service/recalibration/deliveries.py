@@ -165,13 +165,6 @@ def follow_clock(session: Session, set_back_by: timedelta) -> int:
     return len(waiting)
 
 
-def forget_deliveries(session: Session, settings: Settings) -> int:
-    """Give up what has waited too long and delete what ended long ago; returns how many."""
-    now = datetime.now(UTC)
-    webhooks.give_up(session, now - timedelta(hours=settings.webhook_patience_h), now)
-    return webhooks.forget(session, now - timedelta(days=settings.keep_deliveries_days))
-
-
 def _is_open(webhook: WebhookRecord, now: datetime) -> bool:
     held = webhook.held_until is not None and webhook.held_until > now
     return webhook.enabled and not held

@@ -4,18 +4,19 @@ from pathlib import Path
 
 from service.data_dir import KEY_FILE, held_alone, make_private, require_stopped
 from service.delivery.sealing import read_key_file, sealer_of, write_key_file
-from service.recalibration.keys import NEW_KEY_FILE, reseal
+from service.recalibration.keys import NEW_KEY_FILE, give_up_secrets, reseal
 from service.settings import Settings
 from service.store import files
 from service.store.database import Store
 
 
-def rotate_key(settings: Settings, old_key_file: Path | None) -> int:
+def rotate_key(settings: Settings, old_key_file: Path | None, *, lost: bool = False) -> int:
     """Seal by SUREFOOT_SECRET_KEY, or by a key file that is made anew; returns how many secrets.
 
     Args:
         settings: of a data directory that nothing uses.
         old_key_file: of the key until now; the data directory's own if None.
+        lost: there is none; webhooks get new secrets and are disabled.
 
     Raises:
         StartError: something uses it, or the old key does not open what is stored.
@@ -25,7 +26,7 @@ def rotate_key(settings: Settings, old_key_file: Path | None) -> int:
     make_private(folder)
     with held_alone(folder):
         require_stopped(folder)
-        old = read_key_file(old_key_file or path)
+        old = None if lost else read_key_file(old_key_file or path)
         if settings.secret_key is not None:
             new = sealer_of(settings)
         else:
@@ -35,7 +36,7 @@ def rotate_key(settings: Settings, old_key_file: Path | None) -> int:
         try:
             with store.write() as session:
                 files.overwrite_deleted(session)
-                count = reseal(session, old, new)
+                count = give_up_secrets(session, new) if old is None else reseal(session, old, new)
         except BaseException:
             new_path.unlink(missing_ok=True)
             raise

@@ -13,11 +13,13 @@ from service.delivery.sealing import (
     sealer_of,
     write_key_file,
 )
+from service.delivery.signing import new_secret
 from service.settings import Settings
 from service.store import webhooks
 from service.store.delivery_tables import WebhookRecord
 
 NEW_KEY_FILE = f"{KEY_FILE}.new"
+_LOST = "its secret was lost with the key: fetch a new one, tell the receiver, enable it"
 
 
 def secret_of(settings: Settings, record: WebhookRecord) -> str | None:
@@ -85,6 +87,18 @@ def reseal(session: Session, old: Sealer, new: Sealer) -> int:
                 plain = _opened(old, record, text)
                 setattr(record, name, new.seal(plain, _purpose(record.id)))
                 count += 1
+    return count
+
+
+def give_up_secrets(session: Session, new: Sealer) -> int:
+    """Give all webhooks that have a secret another one, and disable them; returns how many."""
+    count = 0
+    for record in webhooks.every(session):
+        if record.secret is not None:
+            record.secret = new.seal(new_secret(), _purpose(record.id))
+            record.old_secret = None
+            record.enabled, record.disabled_reason = False, _LOST
+            count += 1
     return count
 
 

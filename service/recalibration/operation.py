@@ -41,6 +41,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     try:
         with store.write() as session:
             probes.write(session, now)
+        with store.read() as session:
             heartbeat = workers.newest_heartbeat(session)
             troubles = workers.troubles(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}

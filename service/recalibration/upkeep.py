@@ -1,9 +1,7 @@
-"""Level-triggered upkeep: what should be under way, and what may be forgotten."""
+"""Level-triggered upkeep: what should be under way."""
 
-import time
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
-from pathlib import Path
+from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
@@ -22,11 +20,7 @@ from service.recalibration.trainings import (
 )
 from service.settings import Settings
 from service.store import (
-    activity,
     cameras,
-    estimates,
-    events,
-    maintenance,
     references,
     tracks,
     trainings,
@@ -35,8 +29,6 @@ from service.store.tables import CameraRecord
 
 # A model reads tracks at another step than its own, but less well the farther they are apart.
 _STEP_RATIO = 1.3
-_KEPT_MODELS = 2
-_ENTRIES_AT_ONCE = 5_000
 
 
 def reconcile_camera(
@@ -87,39 +79,6 @@ def reconcile_alerts(session: Session) -> None:
     """End silences that have come to their time, and groups whose cameras are gone."""
     end_silences(session)
     end_empty_groups(session)
-
-
-def forget_old(session: Session, settings: Settings, camera_id: str) -> int:
-    """Apply the limits on what is stored of a camera; returns tracks deleted."""
-    before_s = time.time() - settings.keep_days * 86_400
-    deleted = tracks.forget(session, camera_id, before_s, settings.keep_tracks)
-    maintenance.forget(session, camera_id, datetime.fromtimestamp(before_s, UTC))
-    estimates.forget(session, camera_id, settings.keep_estimates)
-    for model in trainings.superseded_models(session, camera_id, _KEPT_MODELS):
-        session.delete(model)
-    return deleted
-
-
-def forget_events(session: Session, settings: Settings) -> None:
-    """Apply the limit on events."""
-    events.forget(session, settings.keep_events)
-
-
-def forget_activity(session: Session, settings: Settings) -> int:
-    """Apply the limit on the log of what was done, a bit at a time; returns entries deleted."""
-    before = datetime.now(UTC) - timedelta(days=settings.keep_activity_days)
-    return activity.forget(session, before, _ENTRIES_AT_ONCE)
-
-
-def unused_weights(session: Session, folder: Path) -> list[Path]:
-    """Weight files that no model names and that are not being written now."""
-    used = trainings.weights_in_use(session)
-    hour_ago = time.time() - 3600
-    return [
-        path
-        for path in folder.glob("*")
-        if path.name.split(".")[0] not in used and path.stat().st_mtime < hour_ago
-    ]
 
 
 def camera_ids(session: Session) -> Sequence[str]:

@@ -11,8 +11,12 @@ from service.schemas.metrics import FiguresCollector
 
 router = APIRouter(tags=["operation"])
 
+_FORMATS = dict.fromkeys(
+    ("text/plain", "application/openmetrics-text"), {"schema": {"type": "string"}}
+)
 
-@router.get("/metrics", response_class=Response)
+
+@router.get("/metrics", response_class=Response, responses={200: {"content": _FORMATS}})
 def metrics(state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = "") -> Response:
     """The figures now, as Prometheus text or OpenMetrics."""
     encode, media_type = choose_encoder(accept)

@@ -22,6 +22,10 @@ from service.schemas.poses import (
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
 
+class _YamlResponse(PlainTextResponse):
+    media_type = "application/yaml"
+
+
 @router.get("/pose", response_model=ServedPoseOut)
 def show(
     camera_id: str,
@@ -38,15 +42,14 @@ def show(
     return ServedPoseOut.from_value(view)
 
 
-@router.get("/pose.yaml", response_class=PlainTextResponse)
+@router.get("/pose.yaml", response_class=_YamlResponse)
 def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
     lens = cameras.view_camera(session, camera_id).intrinsics
     words = (f"state: {view.state}", f"why: {view.reason}")
-    return PlainTextResponse(
+    return _YamlResponse(
         opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
-        media_type="application/yaml",
         headers={
             "ETag": view.etag,
             "Content-Disposition": f'inline; filename="{camera_id}.yaml"',

@@ -10,7 +10,7 @@ from service.formats.batch import DEFAULT_SOURCE
 from service.formats.track import Batch, Clock
 from service.recalibration import cameras, tracks
 from service.routes.state import BodyDep, StateDep
-from service.schemas.tracks import ReceiptOut
+from service.schemas.tracks import DESCRIBED_TRACK, ReceiptOut
 
 router = APIRouter(tags=["tracks"])
 
@@ -28,7 +28,7 @@ _DESCRIBED_BODY = {
                         "source": {"type": "string"},
                         "frame_rate_hz": {"type": "number"},
                         "started_at": {"type": "string", "format": "date-time"},
-                        "tracks": {"type": "array", "items": {"type": "object"}},
+                        "tracks": {"type": "array", "items": DESCRIBED_TRACK},
                     },
                 }
             },

@@ -1,11 +1,30 @@
 """Answers of `/cameras/{id}/tracks`; its bodies are read by `service/formats`."""
 
-from typing import Self
+from typing import Any, Self
 
 from pydantic import BaseModel
 
 from service.formats.track import Rejection
 from service.recalibration.tracks import Receipt
+
+
+def _rows(what: str, numbers: int) -> dict[str, Any]:
+    row = {"type": "array", "items": {"type": "number"}, "minItems": numbers}
+    return {"type": "array", "items": row, "description": what}
+
+
+# A track takes one of the four forms.
+DESCRIBED_TRACK: dict[str, Any] = {
+    "type": "object",
+    "required": ["id"],
+    "properties": {
+        "id": {"type": "string"},
+        "points": _rows("[time_s, u_px, v_px] of the foot", 3),
+        "boxes": _rows("[time_s, x1, y1, x2, y2] in pixels", 5),
+        "frames": _rows("[frame, u_px, v_px]", 3),
+        "frame_boxes": _rows("[frame, x1, y1, x2, y2]", 5),
+    },
+}
 
 
 class RejectionOut(BaseModel):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import and_, exists, not_, select
+from sqlalchemy import and_, delete, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.store.tables import AlertRecord
@@ -163,3 +163,14 @@ def listed(
         silent = and_(until.is_not(None), until > now)
         query = query.where(silent if wanted.silenced else not_(silent))
     return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()
+
+
+def forget(session: Session, before: datetime, limit: int) -> int:
+    """Delete up to `limit` alerts that ended before a time. Returns how many."""
+    bite = (
+        select(AlertRecord.id)
+        .where(AlertRecord.state == "resolved", AlertRecord.resolved_at < before)
+        .limit(limit)
+    )
+    result = session.execute(delete(AlertRecord).where(AlertRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]

@@ -2,10 +2,17 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import func, select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store.tables import CameraRecord, PriorPoseRecord
+from service.store.tables import (
+    CameraRecord,
+    EstimateRecord,
+    ModelRecord,
+    PriorPoseRecord,
+    SiteReferenceRecord,
+    TrainingRecord,
+)
 
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:
@@ -47,6 +54,28 @@ def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorP
         .order_by(PriorPoseRecord.id.desc())
         .limit(limit)
     ).all()
+
+
+def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but the newest so many that nothing names; how many."""
+    surplus = (
+        select(PriorPoseRecord.id)
+        .where(PriorPoseRecord.camera_id == camera_id)
+        .order_by(PriorPoseRecord.id.desc())
+        .offset(keep)
+    )
+    naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord)
+    named = [select(one.prior_pose_id).where(one.camera_id == camera_id) for one in naming]
+    bite = (
+        select(PriorPoseRecord.id)
+        .where(
+            PriorPoseRecord.id.in_(surplus),
+            *(PriorPoseRecord.id.not_in(query) for query in named),
+        )
+        .limit(limit)
+    )
+    result = session.execute(delete(PriorPoseRecord).where(PriorPoseRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def due(session: Session) -> Sequence[CameraRecord]:

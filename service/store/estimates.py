@@ -62,15 +62,18 @@ def thinned(
     return session.scalars(query).all()
 
 
-def forget(session: Session, camera_id: str, keep: int) -> None:
-    """Delete all but the newest so many."""
+def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but the newest so many, oldest first. Returns how many."""
     surplus = (
         select(EstimateRecord.id)
         .where(EstimateRecord.camera_id == camera_id)
         .order_by(EstimateRecord.id.desc())
         .offset(keep)
+        .subquery()
     )
-    session.execute(delete(EstimateRecord).where(EstimateRecord.id.in_(surplus)))
+    bite = select(surplus.c.id).order_by(surplus.c.id).limit(limit)
+    result = session.execute(delete(EstimateRecord).where(EstimateRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def _made_between(

@@ -26,6 +26,9 @@ def newest_id(session: Session) -> int:
     return session.scalar(select(func.max(EventRecord.id))) or 0
 
 
-def forget(session: Session, keep: int) -> None:
-    """Delete all but the newest so many."""
-    session.execute(delete(EventRecord).where(EventRecord.id <= newest_id(session) - keep))
+def forget(session: Session, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but the newest so many, oldest first. Returns how many."""
+    surplus = select(EventRecord.id).where(EventRecord.id <= newest_id(session) - keep)
+    bite = surplus.order_by(EventRecord.id).limit(limit)
+    result = session.execute(delete(EventRecord).where(EventRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]

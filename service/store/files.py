@@ -129,9 +129,10 @@ def rebuild(path: Path) -> None:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
 
 
-def wipe_log(path: Path) -> None:
-    """Write the log back and empty it, so that it holds nothing that was overwritten."""
+def wipe_log(path: Path, patience_ms: int = _BUSY_MS) -> None:
+    """Write the log back and empty it, unless somebody reads all the while."""
     with connected(path) as connection:
+        connection.execute(f"PRAGMA busy_timeout={patience_ms}")  # writers wait as long
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
 
 
@@ -140,8 +141,14 @@ def overwrite_deleted(session: Session) -> None:
     session.execute(text("PRAGMA secure_delete=ON"))
 
 
-def give_back(path: Path, pages: int) -> int:
-    """Give up to so many free pages back to the disk; returns how many are still free."""
+def free_pages(path: Path) -> int:
+    """How many pages of a file hold nothing."""
     with connected(path) as connection:
-        connection.execute(f"PRAGMA incremental_vacuum({pages})").fetchall()
         return int(connection.execute("PRAGMA freelist_count").fetchone()[0])
+
+
+def give_back(path: Path, pages: int) -> None:
+    """Give up to so many free pages back to the disk, in one transaction."""
+    with connected(path) as connection:
+        # It gives a page a step, without a column; `execute` would take one step alone.
+        connection.executescript(f"PRAGMA incremental_vacuum({pages})")

@@ -51,8 +51,12 @@ def just_over(session: Session, camera_id: str, now: datetime) -> Sequence[Maint
     ).all()
 
 
-def forget(session: Session, camera_id: str, before: datetime) -> None:
-    """Delete windows that ended before a time."""
-    session.execute(
-        delete(MaintenanceRecord).where(MaintenanceRecord.camera_id == camera_id, before > _UNTIL)
+def forget(session: Session, camera_id: str, before: datetime, limit: int) -> int:
+    """Delete up to `limit` of the windows that ended before a time. Returns how many."""
+    bite = (
+        select(MaintenanceRecord.id)
+        .where(MaintenanceRecord.camera_id == camera_id, before > _UNTIL)
+        .limit(limit)
     )
+    result = session.execute(delete(MaintenanceRecord).where(MaintenanceRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]

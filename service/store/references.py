@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import Select, select
+from sqlalchemy import Select, delete, exists, select
 from sqlalchemy.orm import Session, defer
 
-from service.store.tables import SiteReferenceRecord
+from service.store.tables import EstimateRecord, SiteReferenceRecord
 
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:
@@ -27,6 +27,25 @@ def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[SiteRefe
         .limit(limit)
         .options(defer(SiteReferenceRecord.data))
     ).all()
+
+
+def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but the newest so many that no estimate names; how many."""
+    surplus = (
+        select(SiteReferenceRecord.id)
+        .where(SiteReferenceRecord.camera_id == camera_id)
+        .order_by(SiteReferenceRecord.id.desc())
+        .offset(keep)
+    )
+    named = exists().where(EstimateRecord.reference_id == SiteReferenceRecord.id)
+    of_camera = EstimateRecord.camera_id == camera_id  # by its index
+    bite = (
+        select(SiteReferenceRecord.id)
+        .where(SiteReferenceRecord.id.in_(surplus), ~named.where(of_camera))
+        .limit(limit)
+    )
+    result = session.execute(delete(SiteReferenceRecord).where(SiteReferenceRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def _newest(camera_id: str) -> Select[SiteReferenceRecord]:

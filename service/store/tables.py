@@ -62,6 +62,10 @@ def _camera_key() -> Any:
     return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
 
 
+def _key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
+    return mapped_column(ForeignKey(target, ondelete=gone), **options)
+
+
 class CameraRecord(Record):
     """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
 
@@ -132,7 +136,7 @@ class SiteReferenceRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     origin: Mapped[str]  # registered, changed, accepted, reset, put_back
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
@@ -164,9 +168,7 @@ class FlowMapRecord(Record):
 
     __tablename__ = "flow_maps"
 
-    reference_id: Mapped[int] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE"), primary_key=True
-    )
+    reference_id: Mapped[int] = _key("site_references.id", primary_key=True)
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     chart: Mapped[bytes | None] = mapped_column(LargeBinary)
     tracks: Mapped[int]
@@ -209,7 +211,7 @@ class TrainingRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
@@ -236,10 +238,8 @@ class ModelRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    training_id: Mapped[str] = mapped_column(
-        ForeignKey("trainings.id", ondelete="CASCADE"), unique=True
-    )
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
+    training_id: Mapped[str] = _key("trainings.id", unique=True)
     weights_sha256: Mapped[str] = mapped_column(String(64))
     config: Mapped[dict[str, Any]]
     seed: Mapped[int]
@@ -255,9 +255,7 @@ class PredictionRecord(Record):
 
     __tablename__ = "predictions"
 
-    model_id: Mapped[str] = mapped_column(
-        ForeignKey("models.id", ondelete="CASCADE"), primary_key=True
-    )
+    model_id: Mapped[str] = _key("models.id", primary_key=True)
     track_pk: Mapped[int] = mapped_column(
         ForeignKey("tracks.id", ondelete="CASCADE"), primary_key=True, index=True
     )
@@ -282,11 +280,9 @@ class EstimateRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    model_id: Mapped[str | None] = mapped_column(ForeignKey("models.id", ondelete="SET NULL"))
-    prior_pose_id: Mapped[int] = mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"))
-    reference_id: Mapped[int | None] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE")
-    )
+    model_id: Mapped[str | None] = _key("models.id", "SET NULL", index=True)
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
+    reference_id: Mapped[int | None] = _key("site_references.id", index=True)
     state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]
     told: Mapped[list[str]]  # of tilt, roll, height, heading
@@ -331,9 +327,7 @@ class AlertRecord(Record):
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str | None] = _camera_key()
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
-    group_id: Mapped[str | None] = mapped_column(
-        ForeignKey("alerts.id", ondelete="SET NULL"), index=True
-    )
+    group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
     kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale
     state: Mapped[str]  # firing, resolved

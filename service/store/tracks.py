@@ -270,20 +270,23 @@ def predictions(
     ).all()
 
 
-def forget(session: Session, camera_id: str, before_s: float, keep: int) -> int:
-    """Delete tracks that ended before a time, and all but the newest so many. Returns how many."""
+def forget(session: Session, camera_id: str, before_s: float, keep: int, limit: int) -> int:
+    """Delete tracks that ended before a time, and all but the newest so many. Returns how many.
+
+    At most `limit` at once, those first that came first.
+    """
     surplus = (
         select(TrackRecord.id)
         .where(TrackRecord.camera_id == camera_id)
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .offset(keep)
     )
-    result = session.execute(
-        delete(TrackRecord).where(
-            TrackRecord.camera_id == camera_id,
-            (TrackRecord.ended_s < before_s) | TrackRecord.id.in_(surplus),
-        )
+    outlived = (
+        TrackRecord.camera_id == camera_id,
+        (TrackRecord.ended_s < before_s) | TrackRecord.id.in_(surplus),
     )
+    bite = select(TrackRecord.id).where(*outlived).order_by(TrackRecord.id).limit(limit)
+    result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(bite)))
     return int(result.rowcount)  # type: ignore[attr-defined]
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import ModelRecord, TrainingRecord
@@ -52,6 +52,30 @@ def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[M
         .order_by(ModelRecord.created_at.desc())
         .offset(keep)
     ).all()
+
+
+def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of all but a camera's newest so many; how many.
+
+    Those stay that have a model or have not ended.
+    """
+    surplus = (
+        select(TrainingRecord.id)
+        .where(TrainingRecord.camera_id == camera_id)
+        .order_by(TrainingRecord.queued_at.desc())
+        .offset(keep)
+    )
+    bite = (
+        select(TrainingRecord.id)
+        .where(
+            TrainingRecord.id.in_(surplus),
+            TrainingRecord.state.not_in(UNFINISHED),
+            TrainingRecord.id.not_in(select(ModelRecord.training_id)),
+        )
+        .limit(limit)
+    )
+    result = session.execute(delete(TrainingRecord).where(TrainingRecord.id.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def weights_in_use(session: Session) -> set[str]:

@@ -119,18 +119,38 @@ def bring_forward(session: Session, webhook_id: str, now: datetime, refused: Seq
     )
 
 
-def give_up(session: Session, before: datetime, now: datetime) -> None:
-    """End what has waited since before a time, on a disabled webhook say."""
-    session.execute(
-        update(DeliveryRecord)
+def give_up(session: Session, before: datetime, now: datetime, limit: int) -> int:
+    """End up to `limit` that have waited since before a time, on a disabled webhook say."""
+    bite = (
+        select(DeliveryRecord.number)
         .where(DeliveryRecord.state == "pending", DeliveryRecord.queued_at < before)
+        .limit(limit)
+    )
+    result = session.execute(
+        update(DeliveryRecord)
+        .where(DeliveryRecord.number.in_(bite))
         .values(state="failed", finished_at=now, next_attempt_at=None)
     )
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
-def forget(session: Session, before: datetime) -> int:
-    """Delete deliveries that ended before a time, with their attempts. Returns how many."""
-    result = session.execute(delete(DeliveryRecord).where(DeliveryRecord.finished_at < before))
+def forget(session: Session, before: datetime, limit: int) -> int:
+    """Delete up to `limit` deliveries that ended before a time, with attempts; how many."""
+    bite = select(DeliveryRecord.number).where(DeliveryRecord.finished_at < before).limit(limit)
+    result = session.execute(delete(DeliveryRecord).where(DeliveryRecord.number.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
+
+
+def forget_old_secrets(session: Session, now: datetime, limit: int) -> int:
+    """Delete secrets that nothing is signed with any more. Returns how many."""
+    bite = (
+        select(WebhookRecord.id)
+        .where(WebhookRecord.old_secret.is_not(None), WebhookRecord.old_secret_until < now)
+        .limit(limit)
+    )
+    result = session.execute(
+        update(WebhookRecord).where(WebhookRecord.id.in_(bite)).values(old_secret=None)
+    )
     return int(result.rowcount)  # type: ignore[attr-defined]
 
 

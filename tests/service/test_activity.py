@@ -11,7 +11,7 @@ from sqlalchemy.exc import IntegrityError
 
 from service.migrate import alembic_config, migrate
 from service.recalibration.activity import note
-from service.recalibration.upkeep import forget_activity
+from service.recalibration.retention import limits_of_all
 from service.settings import Settings
 from service.store.activity_tables import ActivityRecord
 from service.store.database import Store
@@ -95,7 +95,8 @@ def test_only_age_ends_an_entry(settings):
         for days in (2000, 1826, 1824, 0):
             session.add(ActivityRecord(what=f"{days}", at=now - timedelta(days=days), details={}))
     with store.write() as session:
-        assert forget_activity(session, settings) == 2
+        limits = {limit.name: limit for limit in limits_of_all(settings)}
+        assert limits["activity"].bite(session) == 2
     with store.read() as session:
         assert session.execute(text("SELECT what FROM activity")).all() == [("1824",), ("0",)]
 

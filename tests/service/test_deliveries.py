@@ -12,7 +12,8 @@ from service.delivery import send
 from service.delivery.send import post
 from service.jobs import deliver
 from service.jobs.deliver import run_deliver
-from service.jobs.housekeeping import run_reconcile, run_retention
+from service.jobs.housekeeping import run_reconcile
+from service.jobs.retention import run_retention
 from service.recalibration.deliveries import next_attempt, record_attempt
 from service.settings import Settings
 from tests.service.receiver import receiver

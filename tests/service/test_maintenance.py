@@ -4,12 +4,12 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.recalibration import upkeep
 from service.recalibration.alerts import open_alert
 from service.recalibration.growth import keep_growth, take_growth
 from service.recalibration.learning import take_period
 from service.recalibration.paths import LearnedPaths
 from service.recalibration.references import window_of
+from service.recalibration.retention import limits_of_camera
 from service.store import maintenance, references, tracks
 from tests.conftest import track
 from tests.service.bench import PRIOR, moved
@@ -207,7 +207,8 @@ def test_windows_are_kept_as_long_as_their_tracks(bench):
     begin(bench.http, from_h=24 * 32, to_h=24 * 31)
     begin(bench.http, from_h=24 * 32, to_h=24 * 29)
     with bench.store.write() as session:
-        upkeep.forget_old(session, bench.settings, "corner")
+        for limit in limits_of_camera(bench.settings, "corner"):
+            limit.bite(session)
         (left,) = maintenance.of_camera(session, "corner")
     assert left.to_at > datetime.now(UTC) - timedelta(days=30)
     bench.http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()

@@ -160,6 +160,22 @@ def test_a_rotation_that_was_cut_off_is_ended_or_taken_back(settings, sealed_ane
     assert not (settings.data_dir / "secret.key.new").exists()
 
 
+def test_a_key_that_is_lost_for_good_is_given_up_in_the_open(settings):
+    webhook_id, secret = hook(settings)
+    (settings.data_dir / "secret.key").unlink()
+    with pytest.raises(StartError, match="secret.key is missing"):
+        rotate_key(settings, None)
+    assert rotate_key(settings, None, lost=True) == 1
+    migrate(settings)
+    assert read(settings, webhook_id) != secret
+    with Store(settings).read() as session:
+        record = webhooks.find(session, webhook_id)
+        assert (record.enabled, record.disabled_reason.split(":")[0]) == (
+            False,
+            "its secret was lost with the key",
+        )
+
+
 def modes(folder):
     paths = [folder, *folder.rglob("*")]
     return {path.name: oct(stat.S_IMODE(path.stat().st_mode)) for path in paths}

@@ -1,9 +1,7 @@
-"""What the reconcile finds in the store, and what retention deletes."""
+"""What the reconcile finds in the store."""
 
-import os
 import time
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import pytest
 
@@ -21,9 +19,9 @@ from service.recalibration.trainings import (
     report_progress,
     request_estimate,
 )
-from service.store import events, tracks, trainings
+from service.store import tracks, trainings
 from service.store.database import Store
-from service.store.tables import CameraRecord, TrackRecord
+from service.store.tables import CameraRecord
 from service.store.tracks import WindowBounds
 from tests.conftest import track
 
@@ -142,34 +140,6 @@ def test_tracks_of_another_step_ask_for_another_model(session, queue, settings):
     found = upkeep.reconcile_camera(session, queue, settings, "corner")
     assert found == ["model of another sampling step than the tracks offer"]
     assert begin(session, settings).plan.walk.step_s == 1.0
-
-
-def test_retention_keeps_the_newest_and_the_young(session, settings):
-    put_tracks(session, 12)
-    put_tracks(session, 3, start_s=time.time() - 40 * 86_400, first=500)
-    limited = settings.model_copy(update={"keep_days": 30.0, "keep_tracks": 10})
-    assert upkeep.forget_old(session, limited, "corner") == 5
-    kept = sorted(int(r.track_id) for r in session.query(TrackRecord))
-    assert kept == list(range(2, 12))
-
-
-def test_events_are_kept_up_to_a_number(session, settings):
-    for n in range(20):
-        events.add(session, "pose", {"n": n}, datetime.now(UTC))
-    session.flush()
-    upkeep.forget_events(session, settings.model_copy(update={"keep_events": 5}))
-    assert [e.payload["n"] for e in events.after(session, 0, 100)] == [15, 16, 17, 18, 19]
-
-
-def test_weights_that_no_model_names_are_found_once_they_are_old(session, settings, queue):
-    publish(session, queue, settings)
-    folder = settings.weights_dir
-    folder.mkdir()
-    for name in ("0" * 64 + ".safetensors", "f" * 64 + ".safetensors", "new.safetensors"):
-        (folder / name).write_bytes(b"")
-        if not name.startswith("new"):
-            os.utime(folder / name, (1, 1))
-    assert [p.name[0] for p in upkeep.unused_weights(session, folder)] == ["f"]
 
 
 def test_progress_of_an_attempt_that_was_taken_over_ends_it(session, settings):

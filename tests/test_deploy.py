@@ -1,0 +1,96 @@
+"""The unit, the compose file and the operation page name what exists."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from service.cli import app
+from service.settings import Settings
+
+ROOT = Path(__file__).parent.parent
+UNIT = ROOT / ".deploy" / "surefoot.service"
+COMPOSE = ROOT / ".deploy" / "compose.yaml"
+PAGE = ROOT / "service" / "README.md"
+SETTINGS = {f"SUREFOOT_{name.upper()}" for name in Settings.model_fields}
+OF_CLIENTS = {"SUREFOOT_TOKEN"}  # of replay, which is no part of the service
+
+
+def test_settings_exist():
+    for path in (UNIT, COMPOSE, PAGE):
+        assert (
+            set(re.findall(r"SUREFOOT_[A-Z_]*[A-Z]", path.read_text())) <= SETTINGS | OF_CLIENTS
+        ), path
+    retention = PAGE.read_text().split("## Retention")[1].split("## Running")[0]
+    named = {f"SUREFOOT{name}" for name in re.findall(r"`(?:SUREFOOT)?(_[A-Z_]+)`", retention)}
+    assert len(named) >= 10
+    assert named <= SETTINGS
+    assert {name for name in SETTINGS if name.startswith("SUREFOOT_KEEP")} <= named
+
+
+def test_limits_that_are_told_are_the_defaults():
+    defaults = Settings()
+    retention = PAGE.read_text().split("## Retention")[1].split("## Running")[0]
+    told = (
+        f"{defaults.keep_days:g} days, {defaults.keep_tracks:,}, {defaults.keep_mb:g} MiB",
+        f"| {defaults.keep_estimates:,} |",
+        f"| {defaults.keep_trainings} |",
+        f"| {defaults.keep_references} of a camera |",
+        f"| {defaults.keep_alerts_days / 365:g} years |",
+        f"| {defaults.keep_events:,} |",
+        f"| {defaults.keep_deliveries_days:g} days |",
+    )
+    for words in told:
+        assert words in retention
+
+
+def test_commands_exist():
+    text = PAGE.read_text() + UNIT.read_text()
+    commands = set(re.findall(r"(?:`|/bin/|    )surefoot ([a-z-]+)", text))
+    assert {"serve", "backup", "restore", "check", "rotate-key"} <= commands
+    for command in commands:
+        described = CliRunner().invoke(app, [command, "--help"])
+        assert described.exit_code == 0, command
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd here")
+def test_systemd_takes_the_unit(tmp_path):
+    unit = tmp_path / "surefoot.service"
+    unit.write_text(UNIT.read_text().replace("/opt/surefoot/bin/surefoot", "/bin/true"))
+    checked = subprocess.run(
+        ["systemd-analyze", "verify", str(unit)], capture_output=True, text=True, check=False
+    )
+    assert (checked.returncode, checked.stderr) == (0, "")
+
+
+def test_the_unit_restarts_limits_and_hardens():
+    lines = set(UNIT.read_text().splitlines())
+    assert {
+        "Restart=always",
+        "UMask=0077",
+        "NoNewPrivileges=true",
+        "ProtectSystem=strict",
+        "StateDirectory=surefoot",
+    } <= lines
+    assert any(line.startswith("MemoryMax=") for line in lines)
+
+
+def test_the_container_restarts_limits_and_is_watched():
+    service = yaml.safe_load(COMPOSE.read_text())["services"]["surefoot"]
+    assert service["restart"] == "always"
+    assert service["mem_limit"]
+    assert service["pids_limit"]
+    assert (COMPOSE.parent / service["build"]["context"] / "Dockerfile").exists()
+    environment = service["environment"]
+    assert {f"data:{environment['SUREFOOT_DATA_DIR']}"} == set(service["volumes"])
+    (published,) = service["ports"]
+    assert published.startswith("127.0.0.1:")
+    assert published.endswith(f":{environment['SUREFOOT_PORT']}")
+    probe = service["healthcheck"]["test"]
+    assert probe[:3] == ["CMD", "python", "-c"]
+    compile(probe[3], "healthcheck", "exec")
+    assert f":{environment['SUREFOOT_PORT']}/readyz" in probe[3]

@@ -1,0 +1,177 @@
+"""Databases of every revision that was ever on main, with rows in all tables, brought to now."""
+
+import contextlib
+import json
+import shutil
+import sqlite3
+import stat
+import struct
+import time
+
+import alembic.command
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.data_dir import StartError
+from service.migrate import migrate
+from service.settings import Settings
+from service.store import files
+from service.store.revisions import alembic_config, known_revisions
+from tests.test_migrations import put
+
+REVISIONS = known_revisions()[::-1]
+ENGINE_AND_ALEMBIC = {"alembic_version", "sqlite_sequence"}
+NOW_S = time.time() - 3600
+NUMBERS = {"height_m": 6.1, "tilt_rad": 0.38, "roll_rad": 0.02, "heading_rad": 0.7}
+INTRINSICS = {"width": 1280, "height": 720, "fx": 1100.0, "fy": 1100.0, "cx": 639.5, "cy": 359.5}
+CALLED = {
+    "cameras": {"id": "corner", "name": "The corner", "distortion": "[0, 0, 0, 0, 0]",
+                "reference_tracks": 50, "walking_speed_mean_mps": 1.4, "walking_speed_sd_mps": 0.1,
+                **INTRINSICS},
+    "prior_poses": {"id": 1, "origin": "registered", **NUMBERS},
+    "site_references": {"id": 1, "origin": "registered", "wanted": 50, "tracks": 1,
+                        "from_s": NOW_S - 50, "doubt": "", "data": None, "ready_at": None},
+    "flow_maps": {"reference_id": 1, "data": None, "chart": None},
+    "tracks": {"id": 1, "source": "s", "track_id": "17", "started_s": NOW_S, "ended_s": NOW_S + 8,
+               "points": b"".join(struct.pack("<3d", NOW_S + 0.4 * n, 300 + 12 * n, 400 + 5 * n)
+                                  for n in range(20))},
+    "trainings": {"id": "t" * 32, "recipe": "default", "state": "succeeded", "metrics": "{}"},
+    "models": {"id": "m" * 32, "training_id": "t" * 32, "weights_sha256": "0" * 64,
+               "config": "{}", "metrics": "{}", "step_s": 0.4},
+    "predictions": {"model_id": "m" * 32, "track_pk": 1, "windows": 0},
+    "estimates": {"id": 1, "model_id": "m" * 32, "state": "ok", "reason": "as usual",
+                  "raw": "{}", "told": '["tilt"]', "suspected": 0, "reference_id": 1,
+                  "newest_track_pk": 1, "tracks": 1, "from_s": NOW_S, "to_s": NOW_S + 8, **NUMBERS},
+    "alerts": {"id": "a" * 32, "kind": "drift", "state": "firing", "severity": "critical",
+               "source": "estimate", "reason": "it has turned", "told": 1,
+               "drift": json.dumps({"angle_deg": 6.6, "tilt_deg": 6.0, "roll_deg": 1.0,
+                                    "heading_deg": 0.0, "height_m": 0.1})},
+    "alert_acts": {"id": 1, "alert_id": "a" * 32, "act": "acknowledged", "by": "Ada"},
+    "events": {"id": 1, "type": "alert", "payload": "{}"},
+    "workers": {"name": "local-0"},
+    "webhooks": {"id": "w" * 32, "name": "duty", "url": "https://example.org/h", "kinds": None,
+                 "format": "webhook", "enabled": 1,
+                 "secret": "whsec_cGxhaW4gdGV4dCBvZiBlYXJsaWVyIHJlbGVhc2Vz"},
+    "deliveries": {"number": 1, "id": "d" * 32, "webhook_id": "w" * 32, "alert_id": "a" * 32,
+                   "type": "alert.opened", "payload": "{}", "state": "delivered"},
+    "delivery_attempts": {"id": 1, "delivery_number": 1, "status_code": 204},
+    "maintenance_windows": {"id": "n" * 32, "from_at": "2026-11-20 08:00:00"},
+    "camera_rhythms": {"profile": None, "counts": '{"tracks": {}, "latest_s": {}}'},
+    "snapshots": {"jpeg": b"a picture", "sha256": "0" * 64, "width": 1280, "height": 720},
+    "activity": {"what": "camera.registered", "by": "Ada", "details": "{}"},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def released(tmp_path_factory):
+    """The data directory of a revision, with a row in each of its tables; made once each."""
+    folder = tmp_path_factory.mktemp("released")
+
+    def make(revision):
+        settings = Settings(data_dir=folder / revision)
+        if not settings.data_dir.exists():
+            settings.data_dir.mkdir(mode=0o755)
+            alembic.command.upgrade(alembic_config(settings.database_url), revision)
+            with contextlib.closing(sqlite3.connect(settings.database_path)) as connection:
+                connection.execute("PRAGMA foreign_keys=ON")
+                fill(connection)
+                connection.commit()
+            files.drop_log(settings.database_path)
+            settings.database_path.chmod(0o644)
+        return settings.data_dir
+
+    return make
+
+
+def fill(connection):
+    """A row in each table, parents first."""
+    waiting = names(connection)
+    for table in [name for name in CALLED if name in waiting] + sorted(waiting - set(CALLED)):
+        columns = {row[1]: row[2] for row in connection.execute(f"PRAGMA table_info({table})")}
+        own = {"camera_id": "corner", "prior_pose_id": 1, **CALLED.get(table, {})}
+        values = {name: value for name, value in own.items() if name in columns}
+        put(connection, table, **values)
+
+
+def names(connection):
+    rows = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+    return {row[0] for row in rows} - ENGINE_AND_ALEMBIC
+
+
+def rows_of(path):
+    with sqlite3.connect(path) as connection:
+        return {
+            table: connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
+            for table in names(connection)
+        }
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+def test_a_database_of_a_revision_keeps_its_rows_and_is_served(released, tmp_path, revision):
+    settings = Settings(data_dir=tmp_path / "data", epochs=1)
+    shutil.copytree(released(revision), settings.data_dir)
+    before = rows_of(settings.database_path)
+    assert set(before.values()) == {1}
+    migrate(settings)
+    path = settings.database_path
+    assert files.revision(path) == REVISIONS[-1]
+    assert files.faults(path) == []
+    assert files.broken_references(path) == {}
+    assert files.shrinks(path)
+    after = rows_of(path)
+    # What tables were merged into another is in that one.
+    kept = {table: after[table] for table in before if table in after and table != "activity"}
+    assert kept == {table: 1 for table in kept}
+    assert set(before) - set(after) <= {"alert_acts"}
+    assert b"whsec_" not in path.read_bytes()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    with TestClient(create_app(settings)) as http:
+        pose = http.get("/cameras/corner/pose").raise_for_status().json()
+        assert pose["pose"]["height_m"] == pytest.approx(6.1)
+        (alert,) = http.get("/alerts").raise_for_status().json()["items"]
+        assert (alert["kind"], alert["severity"]) == ("drift", "critical")
+        for page in ("/", "/ui/cameras/corner", "/metrics", "/webhooks"):
+            http.get(page, headers={"accept": "text/html"}).raise_for_status()
+        receipt = http.post("/cameras/corner/tracks", json={"tracks": [
+            {"id": "new", "points": [[NOW_S + 100 + 0.4 * n, 300 + 12 * n, 400 + 5 * n]
+                                     for n in range(20)]}]})  # fmt: skip
+        assert receipt.json()["accepted"] == 1
+    copies = list((settings.data_dir / "copies").glob("*.sqlite"))
+    assert len(copies) == (revision != REVISIONS[-1])
+    for copy in copies:
+        assert rows_of(copy) == before
+        assert files.revision(copy) == revision
+        assert stat.S_IMODE(copy.stat().st_mode) == 0o600
+
+
+def test_a_migration_that_fails_is_undone_and_told(released, tmp_path):
+    settings = Settings(data_dir=tmp_path / "data")
+    shutil.copytree(released(REVISIONS[0]), settings.data_dir)
+    with sqlite3.connect(settings.database_path) as connection:
+        connection.execute("CREATE TABLE snapshots (in_the_way INTEGER)")
+        put(connection, "snapshots", in_the_way=1)
+    before = rows_of(settings.database_path)
+    told = f"migration: from {REVISIONS[0]} to {REVISIONS[-1]} failed .*snapshots.* is as it was"
+    with pytest.raises(StartError, match=told):
+        migrate(settings)
+    assert files.revision(settings.database_path) == REVISIONS[0]
+    assert rows_of(settings.database_path) == before
+    assert files.faults(settings.database_path) == []
+    with sqlite3.connect(settings.database_path) as connection:
+        connection.execute("DROP TABLE snapshots")
+    migrate(settings)
+    assert files.revision(settings.database_path) == REVISIONS[-1]
+
+
+def test_two_copies_are_kept_and_none_where_that_is_said(released, tmp_path):
+    settings = Settings(data_dir=tmp_path / "data")
+    for revision in REVISIONS[:3]:
+        shutil.copytree(released(revision), settings.data_dir, dirs_exist_ok=True)
+        migrate(settings)
+    copies = sorted((settings.data_dir / "copies").iterdir())
+    assert [files.revision(copy) for copy in copies] == REVISIONS[1:3]
+    none = Settings(data_dir=tmp_path / "none", copy_before_migration=False)
+    shutil.copytree(released(REVISIONS[0]), none.data_dir)
+    migrate(none)
+    assert not (none.data_dir / "copies").exists()
