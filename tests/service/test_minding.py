@@ -81,7 +81,7 @@ def test_a_worker_refused_for_its_name_ends_the_service_with_one_line(start, set
     service = start()
     assert service.process.wait(60) == exits.REFUSED
     assert log_of(service).count("worker refused:") == 1
-    assert log_of(service).count("worker_refused") == 1
+    assert log_of(service).count("ERROR worker_refused") == 1
     assert "Traceback" not in log_of(service)
 
 
