@@ -23,7 +23,8 @@ from service.app import create_app
 from service.job_queue import JobQueue
 from service.jobs.context import JobContext
 from service.jobs.estimate import run_estimate
-from service.jobs.housekeeping import run_reconcile, run_retention
+from service.jobs.housekeeping import run_reconcile
+from service.jobs.retention import run_retention
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import Evidence, gather
 from service.recalibration.learning import LearnedReference, keep_reference, take_period
