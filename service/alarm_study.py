@@ -20,7 +20,7 @@ from models.evaluation.camera_years import live_year
 from models.evaluation.scene_alarms import judge_scene
 from models.evaluation.scenes import load_scene
 from service.alarm_tables import BARS, delay_table, still_table
-from service.recalibration.estimates import drift_limits
+from service.recalibration.limits import drift_limits
 from service.settings import Settings
 
 _TABLE_WIDTH = 130

@@ -26,6 +26,7 @@ from service.routes import (
     poses,
     registration,
     snapshots,
+    sources,
     tokens,
     tracks,
     trainings,
@@ -83,6 +84,7 @@ def create_app(settings: Settings) -> FastAPI:
     for module in (
         cameras,
         tracks,
+        sources,
         poses,
         snapshots,
         trainings,

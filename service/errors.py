@@ -72,6 +72,12 @@ class ConflictError(ServiceError):
     status, code = 409, "conflict"
 
 
+class TooManySourcesError(ServiceError):
+    """A camera has as many sources of tracks as it may have."""
+
+    status, code = 409, "too_many_sources"
+
+
 class PreconditionFailedError(ServiceError):
     """`If-Match` names another version than the stored one."""
 
@@ -94,6 +100,12 @@ class MalformedError(ServiceError):
     """A body that cannot be read at all, or lacks or breaks a field."""
 
     status, code = 422, "malformed"
+
+
+class NothingTakenError(ServiceError):
+    """A body of tracks of which none could be taken; `errors` has the reason of each."""
+
+    status, code = 422, "nothing_taken"
 
 
 class UnsupportedMediaTypeError(ServiceError):

@@ -109,9 +109,11 @@ def post_tracks(
         if answer.status_code not in (429, 503) or wait_s > _LONGEST_WAIT_S:
             break
         time.sleep(wait_s)
+    document: dict[str, Any] = answer.json()
+    if document.get("code") == "nothing_taken":  # too short, all of them: the next may be longer
+        return {"accepted": 0, "duplicates": 0, "rejected": document["errors"]}
     answer.raise_for_status()
-    receipt: dict[str, Any] = answer.json()
-    return receipt
+    return document
 
 
 def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str, Any]:

@@ -58,11 +58,17 @@ class Settings(BaseSettings):
     )
     seed: int = Field(0, ge=0, description="seed of trainings and bootstraps")
     trainings_at_once: int = Field(1, ge=1, description="over all workers")
-    training_threads: int = Field(1, ge=1, description="CPU threads of a worker process")
+    training_nice: int = Field(
+        19, ge=0, le=19, description="how much a training yields to all else; 0: not at all"
+    )
+    training_threads: int = Field(1, ge=1, description="CPU threads of a training")
 
     window_tracks: int = Field(400, ge=5, description="newest tracks that an estimate uses")
     window_days: float = Field(
         7.0, gt=0, description="age of the oldest of them, before the newest"
+    )
+    max_ahead_s: float = Field(
+        60.0, ge=0, description="seconds that a track's times may be ahead of our clock"
     )
     no_data_after_h: float = Field(
         24.0, gt=0, description="hours without a track until no_data, whatever the rhythm"
@@ -77,10 +83,17 @@ class Settings(BaseSettings):
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
     )
+    max_sources: int = Field(16, ge=1, description="sources that may post tracks for one camera")
+    source_silent_h: float = Field(
+        6.0, gt=0, description="hours of silence after which another source takes over"
+    )
+
     drift_sigmas: float = Field(5.0, gt=0, description="a told drift must exceed so many sd")
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
-    drift_updates: int = Field(3, ge=1, description="updates in a row until an alert fires")
+    drift_people: int = Field(
+        12, ge=1, description="and so without so many of the newest people: none alarms alone"
+    )
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 
     silence_max_days: float = Field(30.0, gt=0, description="longest silence of an alert")
@@ -97,11 +110,11 @@ class Settings(BaseSettings):
         100, ge=0, description="newest tracks that it leaves out: a move may be unnoticed"
     )
 
-    keep_days: float = Field(30.0, gt=0, description="age at which tracks are deleted")
-    keep_tracks: int = Field(20_000, ge=5, description="tracks kept for each camera")
-    keep_mb: float = Field(
-        200.0, gt=0, description="MB of tracks kept for each camera: 10 kB for each of keep_tracks"
+    keep_days: float = Field(30.0, gt=0, description="days from a track's arrival to its deletion")
+    keep_tracks: int = Field(
+        20_000, ge=5, description="tracks kept of a camera: the last to arrive"
     )
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
@@ -171,6 +184,24 @@ class Settings(BaseSettings):
     )
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
+    estimate_rest: float = Field(
+        1.0, ge=0, le=60, description="a camera rests so many times as long as its last look took"
+    )
+    stale_after_s: float = Field(
+        600.0, gt=1, description="tracks that wait for longer make their camera's alert `stale`"
+    )
+    stale_failures: int = Field(3, ge=1, description="and so many looks in a row that fail")
+    estimate_limit_s: float = Field(
+        600.0, gt=1, description="a look at a camera that takes longer hangs: its worker is ended"
+    )
+    delivery_limit_s: float = Field(300.0, gt=60, description="the same of a delivery job")
+    upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a round of the upkeep")
+    training_limit_s: float = Field(
+        21_600.0, gt=1, description="a training that takes longer has failed"
+    )
+    worker_max_mb: int = Field(
+        1_500, ge=50, description="a worker that grows beyond ends its jobs and is started anew"
+    )
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
     @field_validator("secret_key")

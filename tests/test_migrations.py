@@ -1,4 +1,5 @@
 import sqlite3
+from datetime import UTC, datetime
 
 import alembic.command
 import pytest
@@ -9,6 +10,7 @@ from service.migrate import migrate
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
+from service.store import references, sources
 from service.store.alerts import AlertFilter
 from service.store.database import Store
 from service.store.revisions import alembic_config
@@ -80,6 +82,35 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
     with sqlite3.connect(settings.database_path) as connection:
         for table, rows in (("estimates", 1), ("models", 1), ("tracks", 7)):
             assert connection.execute(f"SELECT count(*) FROM {table}").fetchone() == (rows,)
+
+
+def test_the_newest_reference_is_bound_to_the_source_of_its_tracks(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_24_parent_indexes")
+    with sqlite3.connect(settings.database_path) as connection:
+        for name in ("fed", "empty"):
+            put(connection, "cameras", id=name, distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+            put(connection, "prior_poses", id=len(name), camera_id=name)
+            for number in (1, 2):
+                put(connection, "site_references", id=10 * len(name) + number, camera_id=name,
+                    prior_pose_id=len(name))  # fmt: skip
+        for n, source in enumerate(("old", "old", "new")):
+            put(connection, "tracks", camera_id="fed", source=source, track_id=str(n),
+                started_s=10.0 * n, ended_s=10.0 * n + 8,
+                received_at=f"2026-11-20 0{n}:00:00")  # fmt: skip
+    migrate(settings)
+    with Store(settings).read() as session:
+        assert [references.newest(session, name).source for name in ("fed", "empty")] == [
+            "new",
+            None,
+        ]
+        found = sources.of_camera(session, "fed")
+        assert [(each.name, each.tracks) for each in found] == [("old", 2), ("new", 1)]
+        assert found[0].last_seen_at == datetime(2026, 11, 20, 1, tzinfo=UTC)
+        assert all(each.told_at is not None for each in found)
+    alembic.command.downgrade(config, "2026_11_24_parent_indexes")
+    migrate(settings)
 
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):

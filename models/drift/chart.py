@@ -101,9 +101,11 @@ class DriftChart:
 class Reading:
     """What a chart says of the newest parties.
 
-    `statistic` is compared with `level`. `number` is 0 to 4 as for a knock of the grid,
-    `sign` the way it seems to have gone, `parties` how many say so and `track_idx` the first track
-    of theirs. What is `suspicious` would be an alarm were a hundred times as many allowed.
+    `statistic` is compared with `level`: where it is below by now, the highest since the chart was
+    last calm for some parties in a row, so that it matters not after whom somebody looks.
+    `number` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone, `parties`
+    how many say so and `track_idx` the first track of theirs. What is `suspicious` would be an
+    alarm were a hundred times as many allowed.
     """
 
     statistic: float
@@ -125,23 +127,55 @@ class Reading:
         return self.statistic / self.level
 
 
-def read_chart(chart: DriftChart, scores: PartyScores, alarms_a_run: float) -> Reading | None:
-    """What the chart says now; None of fewer than 16 parties."""
+def read_chart(
+    chart: DriftChart,
+    scores: PartyScores,
+    alarms_a_run: float,
+    *,
+    calm_ratio: float,
+    calm_parties: int,
+) -> Reading | None:
+    """What the chart says now; None of fewer than 16 parties.
+
+    Args:
+        chart: of the camera.
+        scores: of its parties, in the order of their ends.
+        alarms_a_run: how many false alarms 1000 parties may come to.
+        calm_ratio: of its level, below which the chart is calm.
+        calm_parties: how many parties in a row it must be, to have calmed down.
+    """
     if len(scores.values) < FEWEST:
         return None
-    newest = chart.bounded(scores.values[-int(LENGTHS[-1]) :])
+    most = int(LENGTHS[-1])
+    newest = chart.bounded(scores.values[-most:])
     path = trace(ratios_of(chart), newest - chart.mean)
-    knock = KNOCKS[int(path.knock_idx[-1])]
-    parties, statistic = int(path.parties[-1]), float(path.statistic[-1])
+    level = chart.level(alarms_a_run)
+    since = _last_calm(path.statistic < calm_ratio * level, calm_parties)
+    at = len(newest) - 1
+    if path.statistic[at] <= level:
+        at = since + int(path.statistic[since:].argmax())
+    knock = KNOCKS[int(path.knock_idx[at])]
+    parties, statistic = int(path.parties[at]), float(path.statistic[at])
     return Reading(
         statistic=statistic,
-        level=chart.level(alarms_a_run),
+        level=level,
         number=knock.number,
         sign=1 if knock.size > 0 else -1,
         parties=parties,
-        track_idx=int(scores.last[-parties]),
+        track_idx=int(scores.last[-most:][at + 1 - parties]),
         suspicious=statistic > chart.level(_SUSPICION * alarms_a_run),
     )
+
+
+def _last_calm(calm: npt.NDArray[np.bool_], parties: int) -> int:
+    """The last place (T,) at which so many, or all so far, were calm; else the first of them."""
+    run = 0
+    since = 0
+    for at, is_calm in enumerate(calm):
+        run = run + 1 if is_calm else 0
+        if run >= parties or run == at + 1:
+            since = at
+    return since
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

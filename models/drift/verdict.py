@@ -1,4 +1,4 @@
-"""The verdict: by the chart at once, by the told pose after a hold; with hysteresis."""
+"""The verdict: by the chart at once, by the told pose twice; with hysteresis."""
 
 import math
 from dataclasses import dataclass, replace
@@ -47,12 +47,15 @@ class Drift:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftLimits:
-    """When a drift counts: beyond so many standard deviations and beyond a floor, for a while."""
+    """When a drift counts: beyond so many standard deviations and beyond a floor.
+
+    And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise.
+    """
 
     sigmas: float
     floor_rad: float
     floor_m: float
-    updates: int
+    people: int
     clear_ratio: float
 
     def of(self, name: str, sd: float) -> float:
@@ -63,7 +66,7 @@ class DriftLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftVerdict:
-    """`streak` is how many updates in a row were beyond the limits, negative how many below them.
+    """`streak` is 1 where the window is beyond the limits, -1 where it is below `clear_ratio`.
 
     `excess` is the largest told drift in units of its limit: 1 and more is beyond. `drifted` names
     the numbers that have been beyond since the drift began; empty where there is none.
@@ -128,42 +131,70 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
     )
 
 
+def asks_again(drift: Drift, limits: DriftLimits, *, drifting: bool) -> bool:
+    """Whether a verdict on a drift needs what the window says without its newest people."""
+    excess = max(_ratios(drift, limits).values(), default=0.0)
+    return excess < limits.clear_ratio if drifting else excess >= 1
+
+
 def judge(
     drift: Drift,
     limits: DriftLimits,
-    streak: int,
     drifted: tuple[str, ...],
     reading: Reading | None = None,
+    earlier: Drift | None = None,
 ) -> DriftVerdict:
-    """The verdict of one more update, given the streak so far and what had drifted before.
+    """The verdict on a window, given what had drifted before.
 
-    Drifting begins at once where the chart is beyond its level, and after `updates` in a row where
-    a told number is beyond its limit: the chart's level is of a rate of false alarms already, and
-    far moves, which the chart is not made for, are told by the pose. It ends after `updates` in
-    a row with both below `clear_ratio`; what lies between ends either streak. A number that the
-    tracks cannot tell is never beyond, and its drift does not end until it is told again or the
-    chart, which asks for all four, is calm. Where nothing is told, nothing changes.
+    Drifting begins at once where the chart is beyond its level, and where a told number is beyond
+    its limit, by the window and by the same without its newest `people`: one freak person does not
+    do it, and it matters not how many jobs have looked meanwhile. The chart's level is of a rate
+    of false alarms already, and far moves, which the chart is not made for, are told by the pose.
+    It ends where both, and the chart, are below `clear_ratio`. A number that the tracks cannot
+    tell is never beyond, and its drift does not end until it is told again or the chart, which
+    asks for all four, is calm. Where nothing is told, nothing changes.
+
+    Args:
+        drift: of the window.
+        limits: what counts.
+        drifted: the numbers that have drifted, by the verdicts before; empty where none has.
+        reading: of the chart, where there is one.
+        earlier: of the window without its newest people; None where too few are left, or nobody
+            has asked (`asks_again`).
     """
-    ratios = {}
-    for name in drift.told:
-        value, sd = drift.of(name)
-        ratios[name] = abs(value) / limits.of(name, sd)
+    ratios = _ratios(drift, limits)
     if not ratios and reading is None:
-        return DriftVerdict(streak=streak, excess=0.0, drifted=drifted)
+        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     excess = max(ratios.values(), default=0.0)
-    beyond = tuple(name for name, ratio in ratios.items() if ratio >= 1)
+    beyond = _beyond(drift, limits)
     charted = (_CHARTED[reading.number],) if reading is not None and reading.moved else ()
     calm = reading is None or reading.excess < limits.clear_ratio
-    told = set(drift.told) if reading is None else set(WITH_HEADING)
-    if beyond or charted:
-        streak = max(streak, 0) + 1
-    elif excess < limits.clear_ratio and calm and set(drifted) <= told:
-        streak = min(streak, 0) - 1
-    else:
-        streak = 0
+    well = calm and _is_well(drift, limits, drifted, reading)
+    streak = 1 if beyond or charted else -1 if well else 0
     if drifted:
         drifted = tuple(n for n in WITH_HEADING if n in drifted or n in beyond)
-        drifted = () if streak <= -limits.updates else drifted
-    elif charted or streak >= limits.updates:
-        drifted = beyond or charted
+        if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, reading):
+            drifted = ()
+    elif charted or (earlier is not None and beyond.items() & _beyond(earlier, limits).items()):
+        drifted = tuple(beyond) or charted
     return DriftVerdict(streak=streak, excess=excess, drifted=drifted)
+
+
+def _ratios(drift: Drift, limits: DriftLimits) -> dict[str, float]:
+    """The told numbers in units of their limits."""
+    found = {name: drift.of(name) for name in drift.told}
+    return {name: abs(value) / limits.of(name, sd) for name, (value, sd) in found.items()}
+
+
+def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
+    """The told numbers that are beyond their limits, and whether they have grown."""
+    found = _ratios(drift, limits).items()
+    return {name: drift.of(name)[0] > 0 for name, ratio in found if ratio >= 1}
+
+
+def _is_well(
+    drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], reading: Reading | None
+) -> bool:
+    told = set(drift.told) if reading is None else set(WITH_HEADING)
+    excess = max(_ratios(drift, limits).values(), default=0.0)
+    return excess < limits.clear_ratio and set(drifted) <= told

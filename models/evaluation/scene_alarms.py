@@ -90,13 +90,18 @@ def judge_scene(
 def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
     """Tracks after which the pose by all until then tells a drift beyond its limit; inf: never.
 
-    Looked at after some numbers of tracks only: a pose takes half a second.
+    And told it without the newest people, too. Looked at after some numbers of tracks only: a pose
+    takes half a second.
     """
     for number in _LOOKS:
-        if number > seen.tracks:
+        held = number + limits.people
+        if held > seen.tracks:
             break
-        if _told(learned, of_tracks(seen, np.arange(number)), limits) >= 1:
-            return float(number)
+        if all(
+            _told(learned, of_tracks(seen, np.arange(count)), limits) >= 1
+            for count in (number, held)
+        ):
+            return float(held)
     return math.inf
 
 
@@ -108,7 +113,7 @@ def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
     joint = joint_estimate(seen, case.prior_pose, learned.site)
     fused = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, flow)
     drift = drift_between(fused.values, fused.covariance, fused.told, case.prior_pose)
-    return judge(drift, limits, 0, ()).excess
+    return judge(drift, limits, ()).excess
 
 
 def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Observations:

@@ -1,7 +1,6 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
 import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,7 @@ MAX_TRACKS = 5_000
 MAX_ID_LENGTH = 200
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
-# A track from the future would push all others out of the window; milliseconds taken for seconds
-# are the usual cause. Clocks may disagree by a zone.
-MAX_AHEAD_S = 86_400.0
+_YEAR_9999_S = 253_402_300_799.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,10 +40,11 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What could be read of a request."""
+    """What could be read of a request; `left_out` lines of it were of no person."""
 
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
+    left_out: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +53,20 @@ class Clock:
 
     frame_rate_hz: float | None
     started_at_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What tracks have to keep to: the picture, and the time by our clock.
+
+    A track of later than now owns the camera's window, which is of the newest tracks, until that
+    time comes: `max_ahead_s` is what clocks may differ by.
+    """
+
+    width: int
+    height: int
+    now_s: float
+    max_ahead_s: float
 
 
 class TrackRejectedError(Exception):
@@ -69,7 +81,7 @@ class TrackRejectedError(Exception):
 _FORMS = {"points": 3, "boxes": 5, "frames": 3, "frame_boxes": 5}
 
 
-def read_track(raw: Any, source: str, clock: Clock, size: tuple[int, int]) -> IncomingTrack:
+def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
     """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes"}`.
 
     Raises:
@@ -96,10 +108,10 @@ def read_track(raw: Any, source: str, clock: Clock, size: tuple[int, int]) -> In
                 "no_clock", f"{form}: frame_rate_hz and started_at are needed beside it"
             )
         rows[:, 0] = clock.started_at_s + rows[:, 0] / clock.frame_rate_hz
-    return check_track(track_name(raw.get("id")), source, rows, size)
+    return check_track(track_name(raw.get("id")), source, rows, limits)
 
 
-def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) -> IncomingTrack:
+def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> IncomingTrack:
     """The track of rows (N, 3) of time, u, v or (N, 5) of time and box, if it keeps the limits.
 
     Raises:
@@ -116,15 +128,7 @@ def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) 
             "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
         )
     time_s = rows[:, 0]
-    latest_s = time.time() + MAX_AHEAD_S
-    in_range = (time_s >= 0) & (time_s <= latest_s)
-    if not in_range.all():
-        at = int(np.argmin(in_range))
-        raise TrackRejectedError(
-            "time_out_of_range",
-            f"points/{at}/0: seconds from 1970 to a day ahead of now, {latest_s:.0f}, are needed, "
-            f"got {time_s[at]:.3f}",
-        )
+    _check_times(time_s, limits)
     increasing = np.diff(time_s) > 0
     if not increasing.all():
         at = int(np.argmin(increasing)) + 1
@@ -151,7 +155,7 @@ def check_track(track_id: str, source: str, rows: Array, size: tuple[int, int]) 
                 "malformed", f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}"
             )
         points = np.column_stack([time_s, (boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
-    _check_inside(points[:, 1:], size)
+    _check_inside(points[:, 1:], (limits.width, limits.height))
     return IncomingTrack(source=source, track_id=track_id, points=points, boxes=boxes)
 
 
@@ -209,6 +213,24 @@ def _numbers(form: str, value: Any, columns: int) -> Array:
                     "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
                 )
     return np.array(value, dtype=np.float64).reshape(-1, columns)
+
+
+def _check_times(time_s: Array, limits: Limits) -> None:
+    in_range = (time_s >= 0) & (time_s <= limits.now_s + limits.max_ahead_s)
+    if in_range.all():
+        return
+    at = int(np.argmin(in_range))
+    got = float(time_s[at])
+    needed = "seconds from 1970 on are needed"
+    if got > _YEAR_9999_S:
+        needed += "; these look like milliseconds"
+    elif got > 0:
+        needed = (
+            f"at most {limits.max_ahead_s:g} s ahead of this service's clock, "
+            f"{limits.now_s:.3f}, are taken; this is {got - limits.now_s:.3f} s ahead: "
+            "one of the two clocks, or a zone, is wrong"
+        )
+    raise TrackRejectedError("time_out_of_range", f"points/{at}/0: {needed}, got {got:.3f}")
 
 
 def _check_inside(uv: Array, size: tuple[int, int]) -> None:

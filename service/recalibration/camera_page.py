@@ -14,6 +14,7 @@ from service.recalibration.deeds import Deed, deeds_of
 from service.recalibration.poses import PoseView, view_pose
 from service.recalibration.presence import Silence, silence_of
 from service.recalibration.snapshots import snapshot_facts
+from service.recalibration.sources import SourceView, rival_sources
 from service.settings import Settings
 from service.store import alerts, cameras, events, maintenance, tracks, trainings
 from service.store.alert_tables import MaintenanceRecord
@@ -42,7 +43,8 @@ class CameraPage:
     `alerts` are all that fire, and then those that ended last.
 
     `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
-    means on the ground; empty where there is none.
+    means on the ground; empty where there is none. `sources` are those of its tracks, where there
+    are several.
     """
 
     now: datetime
@@ -57,6 +59,7 @@ class CameraPage:
     windows: tuple[MaintenanceRecord, ...]
     trainings: tuple[TrainingRecord, ...]
     deeds: tuple[Deed, ...]
+    sources: tuple[SourceView, ...]
     snapshot: SnapshotFacts | None
     snapshots_allowed: bool
     newest_event_id: int
@@ -116,6 +119,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
         deeds=deeds_of(session, camera_id),
+        sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,

@@ -10,9 +10,7 @@ from models.drift.chart import CLOCK
 from models.drift.clock import clock_fault, may_be_clock
 from models.drift.verdict import (
     Drift,
-    DriftLimits,
     DriftVerdict,
-    drift_between,
     judge,
     pose_after,
 )
@@ -21,8 +19,10 @@ from models.geometry.rotation import Array
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
+from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import is_overtaken, made_against
+from service.recalibration.second_look import drift_of
 from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
@@ -46,8 +46,7 @@ def store_estimate(
         session, settings, reference, evidence.tracks[-1].ended_s
     ):
         return None
-    fused = finding.fused
-    drift = drift_between(fused.values, fused.covariance, fused.told, evidence.prior)
+    drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
         record.state, record.reason = "learning", "the reference is being learned"
@@ -75,25 +74,23 @@ def _judge(
     drift: Drift,
     record: EstimateRecord,
 ) -> None:
-    """Set state, reason, streak and alerts of an estimate after the reference."""
+    """Set state, reason, drift and alerts of an estimate after the reference."""
     if finding.change is not None:
         reference.window_from_s = finding.change.ended_s
         reference.changed_s = finding.change.started_s
     camera_id = record.camera_id
     last = estimates.newest(session, camera_id)
     firing = fired_by_estimate(session, camera_id)
-    streak, since = 0, None
+    since = None
     if last is not None and not made_against(reference, last):
         last = None
     drifted: tuple[str, ...] = ()
     if firing & {"drift", "clock"}:
-        # An alert of before this reference stands until updates below the limits end it.
-        before = estimates.newest_of_earlier(session, camera_id, reference.id)
+        # An alert of before this reference stands until what is seen after it ends it.
+        before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
         drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
     if last is not None:
-        streak, drifted, since = last.drift_streak, tuple(last.drifted), last.drift_since
-    if drifted and not firing & {"drift", "clock"}:
-        streak, drifted = 0, ()  # a person resolved the alert: it has to earn its updates anew
+        since = last.drift_since
     limits = drift_limits(settings)
     camera = cameras.find(session, camera_id)
     assert camera is not None
@@ -101,7 +98,8 @@ def _judge(
     reading = finding.reading
     if reading is not None and clock is None and not drifted and may_be_clock(reading):
         reading = None
-    verdict = judge(drift, limits, streak, drifted, reading)
+    earlier = None if finding.earlier is None else drift_of(finding.earlier, evidence.prior)
+    verdict = judge(drift, limits, drifted, reading, earlier)
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
     edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
@@ -123,7 +121,7 @@ def _judge(
     if not set(NUMBERS) <= set(drift.told):
         words.append(finding.joint.reason)
     words.append(reference.doubt)
-    record.reason = "; ".join(word for word in words if word)
+    record.reason = "; ".join(word for word in (*words, *finding.lacks) if word)
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.number == CLOCK:
         clock = describe_reading(reading)
@@ -224,7 +222,8 @@ def _record(
         from_s=min(track.started_s for track in finding.tracks),
         to_s=finding.tracks[-1].ended_s,
         newest_track_pk=finding.newest_pk,
-        created_at=datetime.now(UTC),
+        # A clock that was set back must not make it older than the reference that it was held to.
+        created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
     )
 
 
@@ -264,14 +263,3 @@ def drift_body(drift: Drift) -> dict[str, float | None]:
     }
     turned = set(ANGLES) & set(drift.told)
     return {**body, "angle_deg": math.degrees(drift.angle_rad) if turned else None}
-
-
-def drift_limits(settings: Settings) -> DriftLimits:
-    """The limits of the settings."""
-    return DriftLimits(
-        sigmas=settings.drift_sigmas,
-        floor_rad=math.radians(settings.drift_floor_deg),
-        floor_m=settings.drift_floor_m,
-        updates=settings.drift_updates,
-        clear_ratio=settings.drift_clear_ratio,
-    )

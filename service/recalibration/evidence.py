@@ -1,8 +1,8 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from models.drift.chart import RUN, DriftChart, Reading, read_chart
 from models.drift.chart_packing import chart_from_bytes
 from models.drift.party_scores import Usual, score_parties
-from models.errors import CheckpointError
+from models.drift.verdict import DriftLimits
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -28,8 +28,12 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.recalibration.alerts import fired_by_estimate
 from service.recalibration.changes import change_among
+from service.recalibration.lacks import Lacks
+from service.recalibration.limits import drift_limits
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
+from service.recalibration.second_look import drift_of, look_again
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
@@ -40,8 +44,6 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
 )
-
-log = logging.getLogger("surefoot.recalibration")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,8 @@ class Evidence:
 
     `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
     `chart`; None where there is none. `predictions` has what the model in use says of the tracks.
-    `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
+    `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed. `drifting`
+    says that an alert tells of a drift by now.
     """
 
     camera_id: str
@@ -75,6 +78,8 @@ class Evidence:
     tracks: tuple[SeenTrack, ...]
     tracks_a_year: float
     alarms_a_year: float
+    limits: DriftLimits
+    drifting: bool
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
 
@@ -83,16 +88,20 @@ class Evidence:
 class Finding:
     """What the evidence comes to. `tracks` are those after the `change`, where one was found.
 
-    `fused` is to be served. `reading` is what the drift chart says of all the tracks, those before
-    the change too, long before a pose can say how far; None where there is no chart.
+    `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
+    for it. `reading` is what the drift chart says of the tracks after the change, or of all where
+    these are too few, long before a pose can say how far; None where there is no chart.
+    `lacks` names what should be there beside the served pose and failed.
     """
 
     joint: JointEstimate
     fused: FusedEstimate
+    earlier: FusedEstimate | None
     averaged: PoseEstimate | None
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    lacks: tuple[str, ...] = ()
 
     @property
     def newest_pk(self) -> int:
@@ -138,6 +147,8 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
         ),
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
+        limits=drift_limits(settings),
+        drifting=bool(fired_by_estimate(session, camera_id) & {"drift", "clock"}),
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
     )
@@ -149,8 +160,9 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     if observations.walkers < FEWEST_WALKERS:
         return None
     lens, prior = evidence.intrinsics, evidence.prior
-    seen, change = evidence.tracks, None
-    reading = None
+    seen, change, first = evidence.tracks, None, 0
+    reading = earlier = None
+    lacks = Lacks(evidence.camera_id)
     if evidence.site is None:
         joint = joint_estimate(
             observations, prior, assumed_reference(observations, prior, evidence.walk)
@@ -158,63 +170,102 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         fused = by_speeds_alone(joint, prior)
     else:
         site = reference_from_bytes(evidence.site)
-        flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
-        chart = _chart_of(evidence)
-        if flow is not None and chart is not None:
-            reading = _read(evidence, observations, flow, chart)
+        flow, chart = _paths_of(evidence, lacks)
         ends_s = np.array([track.ended_s for track in seen])
-        found, observations, joint = change_among(observations, ends_s, lens, prior, site, flow)
+        every = observations
+        among = partial(change_among, every, ends_s, lens, prior, site)
+        changed = None if flow is None else lacks.unless_failed("flow_map", partial(among, flow))
+        if changed is None:
+            flow = None
+        found, observations, joint = changed or among(None)
         if found is not None:
             change = seen[found]
             seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
-        if flow is None:
-            fused = by_speeds_alone(joint, prior)
-        else:
-            fused = fused_estimate(observations, lens, prior, joint, flow)
+            first = len(evidence.tracks) - len(seen)
+        if flow is not None and chart is not None:
+            reading = lacks.unless_failed(
+                "chart", partial(_read, evidence, every, flow, chart, first)
+            )
+        fused = by_speeds_alone(joint, prior)
+        if flow is not None:
+            by_map = partial(fused_estimate, observations, lens, prior, joint, flow)
+            found_by_map = lacks.unless_failed("flow_map", by_map)
+            fused, flow = (fused, None) if found_by_map is None else (found_by_map, flow)
+        if asked_enough(evidence):
+            earlier = look_again(
+                observations,
+                drift_of(fused, prior),
+                evidence.limits,
+                drifting=evidence.drifting,
+                intrinsics=lens,
+                prior=prior,
+                site=site,
+                flow=flow,
+            )
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
     if len(predictions) >= FEWEST_TRACKS:
-        averaged = averaged_estimate(predictions, seed)
+        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
     return Finding(
         joint=joint,
         fused=fused,
+        earlier=earlier,
         averaged=averaged,
         reading=reading,
         tracks=seen,
         change=change,
+        lacks=tuple(lacks.said),
     )
 
 
-def _chart_of(evidence: Evidence) -> DriftChart | None:
-    """The drift chart; None where there is none, or one of another release.
+def _paths_of(evidence: Evidence, lacks: Lacks) -> tuple[FlowReference | None, DriftChart | None]:
+    """The flow map and its chart, of which the pose needs neither; None where there is none.
 
-    The pose judges the camera until the next growth of the map brings a new one.
+    One of another release cannot be read: the next growth of the map brings new ones.
     """
-    if evidence.chart is None:
-        return None
-    try:
-        return chart_from_bytes(evidence.chart)
-    except CheckpointError as error:
-        log.warning("chart_unreadable", extra={"camera_id": evidence.camera_id, "why": str(error)})
-        return None
+    flow, chart = None, None
+    if evidence.flow is not None:
+        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+    if flow is not None and evidence.chart is not None:
+        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
+    return flow, chart
 
 
 def _read(
-    evidence: Evidence, observations: Observations, flow: FlowReference, chart: DriftChart
+    evidence: Evidence,
+    observations: Observations,
+    flow: FlowReference,
+    chart: DriftChart,
+    first: int,
 ) -> Reading | None:
-    """What the chart says, at the level that the allowed alarms come to.
+    """What the chart says of the tracks from the first after a change on, or else of all.
 
-    Once a person has said that the camera is where it should be, it begins anew.
+    At the level that the allowed alarms come to. Once a person has said that the camera is where
+    it should be, it begins anew.
     """
-    asked = np.flatnonzero([track.unanswered for track in evidence.tracks])
-    if not asked.size:
-        return None
+    unanswered = np.flatnonzero([track.unanswered for track in evidence.tracks])
     usual = Usual(prior=evidence.prior, paces=chart.paces, paths=flow.site(evidence.intrinsics))
-    scores = score_parties(of_tracks(observations, asked), usual)
-    parties_a_year = evidence.tracks_a_year * max(scores.last.size, 1) / asked.size
-    reading = read_chart(chart, scores, RUN * evidence.alarms_a_year / parties_a_year)
-    return reading and replace(reading, track_idx=int(asked[reading.track_idx]))
+    for asked in (unanswered[unanswered >= first], unanswered):
+        if not asked.size:
+            continue
+        scores = score_parties(of_tracks(observations, asked), usual)
+        parties_a_year = evidence.tracks_a_year * max(scores.last.size, 1) / asked.size
+        reading = read_chart(
+            chart,
+            scores,
+            RUN * evidence.alarms_a_year / parties_a_year,
+            calm_ratio=evidence.limits.clear_ratio,
+            calm_parties=evidence.limits.people,
+        )
+        if reading is not None:
+            return replace(reading, track_idx=int(asked[reading.track_idx]))
+    return None
+
+
+def asked_enough(evidence: Evidence) -> bool:
+    """Whether enough people came since a person last said how the camera stands."""
+    return sum(track.unanswered for track in evidence.tracks) >= evidence.limits.people
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

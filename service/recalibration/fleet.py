@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.recalibration.attendance import Attendance
 from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
-from service.recalibration.estimates import drift_limits
+from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
 from service.recalibration.references import tracks_so_far, wanted_tracks
 from service.settings import Settings

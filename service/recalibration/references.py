@@ -22,14 +22,22 @@ def begin_reference(
     *,
     from_s: float | None,
     by: str | None = None,
+    source: str | None = None,
 ) -> SiteReferenceRecord:
-    """Have a camera's next tracks, that start at or after a time, say what is usual at its site."""
+    """Have a camera's next tracks, that start at or after a time, say what is usual at its site.
+
+    Those of a source; of the one that has counted so far, if none is said.
+    """
     camera = cameras.find(session, camera_id)
     assert camera is not None
+    last = references.newest_if_any(session, camera_id)
+    if source is None and last is not None:
+        source = last.source
     record = SiteReferenceRecord(
         camera_id=camera_id,
         prior_pose_id=cameras.prior_pose(session, camera_id).id,
         origin=origin,
+        source=source,
         requested_by=by,
         from_s=from_s,
         wanted=camera.reference_tracks,

@@ -43,9 +43,7 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
     most_bytes = round(settings.keep_mb * 2**20)
     yield Limit(
         name="tracks",
-        bite=lambda session: tracks.forget(
-            session, camera_id, before.timestamp(), settings.keep_tracks, BITE
-        ),
+        bite=lambda session: tracks.forget(session, camera_id, before, settings.keep_tracks, BITE),
     )
     if most_bytes:
         yield Limit(

@@ -103,6 +103,9 @@ def _counted(arrivals: Arrivals, now: datetime) -> HourCounts:
     oldest = math.floor(now_s / _HOUR_S) - _PAST_DAYS * 24 + 1
     counts = {hour: n for hour, n in arrivals.known.tracks.items() if hour >= oldest}
     ended_s, received_s = np.array(arrivals.ended_s), np.array(arrivals.received_s)
+    # What was recorded long ago and posted now came late by years; nobody waits for that.
+    recent = ended_s >= oldest * _HOUR_S
+    ended_s, received_s = ended_s[recent], received_s[recent]
     hours, numbers = np.unique((ended_s // _HOUR_S).astype(int), return_counts=True)
     for hour, number in zip(hours.tolist(), numbers.tolist(), strict=True):
         if oldest <= hour <= now_s / _HOUR_S + 24:

@@ -18,14 +18,14 @@ def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> 
     if not drift.told:
         return f"beyond {limit} when it was last told" if verdict.drifting else ""
     text = ", ".join(_said(drift, name) for name in drift.told) + " against the prior pose"
+    hold = f"without the newest {limits.people} people"
     if verdict.drifting and verdict.excess >= 1:
-        updates = "1 update" if limits.updates == 1 else f"{limits.updates} updates"
-        return f"{text}: beyond {limit} for {updates} or more"
+        return f"{text}: beyond {limit}"
     if verdict.drifting:
-        below = max(-verdict.streak, 0)
-        return f"{text}: was beyond {limit}, {below} of {limits.updates} updates below"
-    if verdict.streak > 0:
-        return f"{text}: beyond {limit}, {verdict.streak} of {limits.updates} updates"
+        share = f"{100 * limits.clear_ratio:g} % of that, and so {hold}"
+        return f"{text}: was beyond {limit}; it ends once all is below {share}"
+    if verdict.excess >= 1:
+        return f"{text}: beyond {limit}, but not so {hold}"
     return f"{text}: not beyond {limit}"
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from service.formats.batch import read_mot
 from service.formats.calibration_file import read_calibration
-from service.formats.track import Clock
+from service.formats.mot import read_mot
+from service.formats.track import Clock, Limits
 from service.recalibration import cameras
 from service.routes.pages import render
 from service.routes.state import BodyDep, StateDep, WriteDep
@@ -31,6 +31,7 @@ router = APIRouter(include_in_schema=False)
 _MOST_TRACKS, _MOST_POINTS = 80, 40  # of recorded ones, which every preview takes along
 _USUAL_RATE_HZ = 25.0
 _AN_EPOCH_S = 1e9  # recordings to try have frames and no dates
+_A_RECORDING_S = 366 * 86_400.0
 
 
 @router.get("/ui/register")
@@ -85,7 +86,8 @@ def tracks(
 ) -> TriedOut:
     """Recorded MOTChallenge tracks, thinned, to try a form with; nothing is stored."""
     clock = Clock(frame_rate_hz=frame_rate_hz, started_at_s=_AN_EPOCH_S)
-    batch = read_mot(body, "tried", clock, (width, height))
+    limits = Limits(width=width, height=height, now_s=_AN_EPOCH_S, max_ahead_s=_A_RECORDING_S)
+    batch = read_mot(body, "tried", clock, limits)
     some = batch.tracks[:: max(-(-len(batch.tracks) // _MOST_TRACKS), 1)]
     thinned = []
     for track in some:
@@ -95,6 +97,8 @@ def tracks(
     text = f"{len(batch.tracks)} tracks read"
     if len(some) < len(batch.tracks):
         text += f", {len(some)} of them shown"
+    if batch.left_out:
+        text += f"; {batch.left_out} lines are of no person"
     if batch.rejections:
         first = batch.rejections[0]
         text += f"; {len(batch.rejections)} left out, the first since: {first.detail}"

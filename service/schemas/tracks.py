@@ -42,11 +42,12 @@ class RejectionOut(BaseModel):
 
 
 class ReceiptOut(BaseModel):
-    """What became of the posted tracks."""
+    """What became of the posted tracks; where it stands, `left_out` lines were of no person."""
 
     accepted: int
     duplicates: int
     rejected: list[RejectionOut]
+    left_out: int = 0
 
     @classmethod
     def from_value(cls, value: Receipt) -> Self:
@@ -55,4 +56,5 @@ class ReceiptOut(BaseModel):
             accepted=value.accepted,
             duplicates=value.duplicates,
             rejected=[RejectionOut.from_value(item) for item in value.rejections],
+            left_out=value.left_out,
         )

@@ -16,8 +16,9 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
     TrainingRecord,
-    WorkerRecord,
 )
+from service.store.tracks import of_counting_source
+from service.store.worker_tables import WorkerRecord
 
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None
@@ -32,8 +33,13 @@ class Backlog:
 
 
 def last_tracks_s(session: Session, ids: Ids = None) -> dict[str, float | None]:
-    """When the newest track of each camera ended."""
-    newest = newest_of(TrackRecord.ended_s, TrackRecord.camera_id)
+    """When the newest track of each camera ended, of those that count."""
+    newest = (
+        select(func.max(TrackRecord.ended_s))
+        .where(TrackRecord.camera_id == CameraRecord.id, of_counting_source(CameraRecord.id))
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
     query = select(CameraRecord.id, newest).where(among(CameraRecord.id, ids))
     rows = session.execute(query.order_by(CameraRecord.id))
     return {camera_id: ended_s for camera_id, ended_s in rows}
@@ -68,10 +74,9 @@ def trainings_by_state(session: Session) -> dict[str, int]:
     return {state: count for state, count in rows}
 
 
-def heartbeats(session: Session) -> dict[str, datetime]:
-    """When each worker was last heard of."""
-    rows = session.execute(select(WorkerRecord.name, WorkerRecord.heartbeat_at))
-    return {name: at for name, at in rows}
+def workers(session: Session) -> Sequence[WorkerRecord]:
+    """All workers, those that are lost among them."""
+    return session.scalars(select(WorkerRecord).order_by(WorkerRecord.name)).all()
 
 
 def backlogs(session: Session) -> dict[str, Backlog]:

@@ -72,7 +72,11 @@ def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
     begun = func.coalesce(SiteReferenceRecord.from_s, -math.inf)
     count = (
         select(func.count())
-        .where(TrackRecord.camera_id == CameraRecord.id, TrackRecord.started_s >= begun)
+        .where(
+            TrackRecord.camera_id == CameraRecord.id,
+            TrackRecord.started_s >= begun,
+            TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
+        )
         .correlate(CameraRecord, SiteReferenceRecord)
         .scalar_subquery()
     )

@@ -1,4 +1,8 @@
-"""Statements on tracks and predictions."""
+"""Statements on tracks and predictions.
+
+Of a camera's tracks those count that its reference is of: one source's. Others are stored, and
+counted where a function says that it is of all.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,9 +11,14 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Select, and_, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
-from service.store.tables import CameraRecord, PredictionRecord, TrackRecord
+from service.store.tables import (
+    CameraRecord,
+    PredictionRecord,
+    SiteReferenceRecord,
+    TrackRecord,
+)
 
 Spans = tuple[tuple[float, float], ...]  # times, from and to
 
@@ -74,9 +83,7 @@ def stored_bytes(session: Session, camera_id: str) -> int:
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
     """When the newest track ended."""
-    return session.scalar(
-        select(func.max(TrackRecord.ended_s)).where(TrackRecord.camera_id == camera_id)
-    )
+    return session.scalar(select(func.max(TrackRecord.ended_s)).where(*_counting(camera_id)))
 
 
 def newest_received_at(session: Session, camera_id: str) -> datetime | None:
@@ -92,7 +99,7 @@ def arrivals(
     """When tracks were stored and when they had ended, of those stored after a time."""
     rows = session.execute(
         select(TrackRecord.received_at, TrackRecord.ended_s).where(
-            TrackRecord.camera_id == camera_id, TrackRecord.received_at > received_after
+            *_counting(camera_id), TrackRecord.received_at > received_after
         )
     )
     return [(received_at, ended_s) for received_at, ended_s in rows]
@@ -101,7 +108,7 @@ def arrivals(
 def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
     """How many tracks ended from one time to another."""
     query = select(func.count()).where(
-        TrackRecord.camera_id == camera_id,
+        *_counting(camera_id),
         TrackRecord.ended_s >= from_s,
         TrackRecord.ended_s <= to_s,
     )
@@ -109,12 +116,12 @@ def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) ->
 
 
 def newest_source(session: Session, camera_id: str) -> str | None:
-    """The source of the newest track."""
+    """The source that counts; where none does yet, that of the newest track."""
     return session.scalar(_newest_source(camera_id))
 
 
 def cameras_fed_by(session: Session, source: str, received_after: datetime) -> set[str]:
-    """The cameras whose newest track is of a source, of those that got one after a time."""
+    """The cameras for which a source counts, of those that got a track after a time."""
     received = (
         select(func.max(TrackRecord.received_at))
         .where(TrackRecord.camera_id == CameraRecord.id)
@@ -151,7 +158,7 @@ def count_from(
 ) -> int:
     """How many tracks started at or after a time and were not seen at others."""
     query = select(func.count()).select_from(TrackRecord)
-    wanted = (*_started_from(camera_id, started_from_s), *_outside(without))
+    wanted = (*_started_from(camera_id, started_from_s), *outside(without))
     return session.scalar(query.where(*wanted)) or 0
 
 
@@ -171,7 +178,7 @@ def first(
     """The first tracks by their ends that started from a time on and were not seen at others."""
     return session.scalars(
         select(TrackRecord)
-        .where(*_started_from(camera_id, started_from_s), *_outside(without))
+        .where(*_started_from(camera_id, started_from_s), *outside(without))
         .order_by(TrackRecord.ended_s, TrackRecord.id)
         .limit(limit)
     ).all()
@@ -198,7 +205,7 @@ def count_still(session: Session, bounds: StillBounds, ended_after_s: float | No
 def count_between(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
     """How many tracks started after one time and before another."""
     query = select(func.count()).where(
-        TrackRecord.camera_id == camera_id,
+        *_counting(camera_id),
         TrackRecord.started_s > from_s,
         TrackRecord.started_s < to_s,
     )
@@ -210,7 +217,7 @@ def a_year(session: Session, camera_id: str) -> float:
     newest = newest_end_s(session, camera_id) or 0.0
     count, first = session.execute(
         select(func.count(), func.min(TrackRecord.ended_s)).where(
-            TrackRecord.camera_id == camera_id, TrackRecord.ended_s >= newest - _RECENT_S
+            *_counting(camera_id), TrackRecord.ended_s >= newest - _RECENT_S
         )
     ).one()
     span_s = max(newest - (first or newest), _DAY_S)
@@ -270,22 +277,13 @@ def predictions(
     ).all()
 
 
-def forget(session: Session, camera_id: str, before_s: float, keep: int, limit: int) -> int:
-    """Delete tracks that ended before a time, and all but the newest so many. Returns how many.
+def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:
+    """Delete what the limits on age and number say. Returns how many.
 
     At most `limit` at once, those first that came first.
     """
-    surplus = (
-        select(TrackRecord.id)
-        .where(TrackRecord.camera_id == camera_id)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .offset(keep)
-    )
-    outlived = (
-        TrackRecord.camera_id == camera_id,
-        (TrackRecord.ended_s < before_s) | TrackRecord.id.in_(surplus),
-    )
-    bite = select(TrackRecord.id).where(*outlived).order_by(TrackRecord.id).limit(limit)
+    outlived = _outlived(camera_id, before, keep)
+    bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
     result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(bite)))
     return int(result.rowcount)  # type: ignore[attr-defined]
 
@@ -295,23 +293,72 @@ def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
 
 
+def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
+    """Whether a track is to be deleted: it came before a time, or so many have come after it.
+
+    By its arrival, not by its own times: what was recorded years ago and is posted today has been
+    acknowledged today, and stays as long as what was walked today. The source that
+    counts has a number of its own: no other can post its tracks away.
+    """
+    number = func.row_number().over(
+        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
+    )
+    numbered = (
+        select(TrackRecord.id, number.label("number"))
+        .where(TrackRecord.camera_id == camera_id)
+        .subquery()
+    )
+    surplus = select(numbered.c.id).where(numbered.c.number > keep)
+    return and_(
+        TrackRecord.camera_id == camera_id,
+        (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus),
+    )
+
+
+def of_counting_source(camera_id: str | InstrumentedAttribute[str]) -> ColumnElement[bool]:
+    """Whether a track is of the source that counts; all are, as long as none does."""
+    counting = _counting_source(camera_id).scalar_subquery()
+    return TrackRecord.source == func.coalesce(counting, TrackRecord.source)
+
+
+def _counting(camera_id: str) -> list[ColumnElement[bool]]:
+    return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
+
+
+def _counting_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str | None]:
+    reference = aliased(SiteReferenceRecord)
+    newest = (
+        select(reference.source)
+        .where(reference.camera_id == camera_id)
+        .order_by(reference.id.desc())
+        .limit(1)
+    )
+    return newest if isinstance(camera_id, str) else newest.correlate(CameraRecord)
+
+
 def _newest_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
-    return (
+    newest = (
         select(TrackRecord.source)
         .where(TrackRecord.camera_id == camera_id)
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .limit(1)
     )
+    if not isinstance(camera_id, str):
+        newest = newest.correlate(CameraRecord)
+    return select(
+        func.coalesce(_counting_source(camera_id).scalar_subquery(), newest.scalar_subquery())
+    )
 
 
 def _started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
-    conditions: list[ColumnElement[bool]] = [TrackRecord.camera_id == camera_id]
+    conditions = _counting(camera_id)
     if started_from_s is not None:
         conditions.append(TrackRecord.started_s >= started_from_s)
     return conditions
 
 
-def _outside(spans: Spans) -> list[ColumnElement[bool]]:
+def outside(spans: Spans) -> list[ColumnElement[bool]]:
+    """That tracks were seen at none of some times."""
     return [
         (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s) for from_s, to_s in spans
     ]
@@ -320,20 +367,20 @@ def _outside(spans: Spans) -> list[ColumnElement[bool]]:
 def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
     newest = (
         select(TrackRecord.id)
-        .where(TrackRecord.camera_id == bounds.camera_id)
+        .where(*_counting(bounds.camera_id))
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .limit(bounds.unsure)
     )
-    later = and_(TrackRecord.id.not_in(newest), *_outside(bounds.without))
+    later = and_(TrackRecord.id.not_in(newest), *outside(bounds.without))
     return [
         *_started_from(bounds.camera_id, bounds.started_from_s),
-        *_outside(bounds.attended),
+        *outside(bounds.attended),
         (TrackRecord.ended_s <= bounds.reference_to_s) | later,
     ]
 
 
 def _window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
-    inside = [*_started_from(bounds.camera_id, bounds.started_from_s), *_outside(bounds.without)]
+    inside = [*_started_from(bounds.camera_id, bounds.started_from_s), *outside(bounds.without)]
     if bounds.ended_after_s is not None:
         inside.append(TrackRecord.ended_s > bounds.ended_after_s)
     if bounds.ended_from_s is not None:

@@ -12,6 +12,8 @@ _DONE = {
     "pose.put_back": "said that the camera is back at its prior pose",
     "pose.false_alarm": "said that the camera never moved",
     "reference.reset": "had the camera learned anew at its prior pose",
+    "source.used": "said whose tracks count; the reference is learned anew",
+    "source.removed": "removed a source of tracks with its tracks",
     "alert.acknowledged": "acknowledged {alert}",
     "alert.silenced": "silenced {alert} until {until}",
     "alert.silence_ended": "ended the silence of {alert}",
@@ -37,6 +39,7 @@ _UNASKED = ("cleared", "camera_removed")
 _BY_ITSELF = {
     "alert.resolved": "The alert “{kind}” ended: {outcome}",
     "alert.silence_ended": "The silence of {alert} ended",
+    "source.used": "Another source's tracks count; the reference is learned anew",
 }
 
 

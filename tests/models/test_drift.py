@@ -6,11 +6,11 @@ import pytest
 
 from models.drift.chart import Reading
 from models.drift.clock import clock_fault
-from models.drift.verdict import DriftLimits, drift_between, judge, pose_after
+from models.drift.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
 from models.geometry.pose import CameraPose
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
-LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, updates=3, clear_ratio=0.7)
+LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7)
 
 
 THREE = ("tilt", "roll", "height")
@@ -42,13 +42,9 @@ def drift(
     return drift_between(values, np.diag(sd**2), told, PRIOR)
 
 
-def verdicts(drifts, drifted=()):
-    streak, out = 0, []
-    for one in drifts:
-        verdict = judge(one, LIMITS, streak, drifted)
-        streak, drifted = verdict.streak, verdict.drifted
-        out.append(verdict.drifting)
-    return out
+def drifting(now, earlier, drifted=()):
+    """Whether a window tells a drift, by all of it and without its newest people."""
+    return judge(now, LIMITS, drifted, earlier=earlier).drifting
 
 
 def test_drift_is_signed_and_roll_goes_round():
@@ -76,11 +72,11 @@ def test_a_told_heading_is_a_drift_clockwise_positive():
     assert math.degrees(found.heading_rad) == pytest.approx(5)
     assert pose_after(found, PRIOR).heading_rad == pytest.approx(PRIOR.heading_rad + 0.0872665)
     assert math.degrees(found.angle_rad) == pytest.approx(5)
-    verdict = judge(found, LIMITS, 2, ())
+    verdict = judge(found, LIMITS, (), earlier=found)
     assert verdict.drifted == ("heading",)
     assert verdict.excess == pytest.approx(2.5)
     untold = drift(heading_deg=5)
-    assert (untold.angle_rad, judge(untold, LIMITS, 2, ()).drifted) == (0.0, ())
+    assert (untold.angle_rad, judge(untold, LIMITS, (), earlier=untold).drifted) == (0.0, ())
     assert pose_after(untold, PRIOR).heading_rad == PRIOR.heading_rad
 
 
@@ -94,32 +90,42 @@ def test_a_heading_goes_round(prior_deg, served_deg):
     assert math.degrees(pose_after(found, prior).heading_rad) == pytest.approx(served_deg)
 
 
-def test_a_single_update_beyond_the_limits_is_no_drift():
-    assert verdicts([drift(5), drift(), drift(5), drift(5), drift()]) == [False] * 5
-
-
-def test_three_in_a_row_are():
-    assert verdicts([drift(5)] * 4) == [False, False, True, True]
-    assert verdicts([drift(-5)] * 3)[-1]
-    assert verdicts([drift(height_m=5.4)] * 3)[-1]
+def test_a_drift_has_to_be_told_without_the_newest_people_too():
+    assert drifting(drift(5), drift(5))
+    assert drifting(drift(-5), drift(-4))
+    assert drifting(drift(height_m=5.4), drift(height_m=5.4))
+    assert not drifting(drift(5), drift())
+    assert not drifting(drift(5), drift(-5))  # the other way is no confirmation
+    assert not drifting(drift(5), drift(roll_deg=5))
+    assert not drifting(drift(5), None)  # too few are left to ask
+    assert not drifting(drift(), drift(5))
 
 
 def test_the_larger_of_floor_and_sd_counts():
-    assert not any(verdicts([drift(1.9)] * 5))
-    assert not any(verdicts([drift(5, sd_deg=1.5)] * 5))
-    assert verdicts([drift(6.1, sd_deg=1.5)] * 3)[-1]
+    assert not drifting(drift(1.9), drift(1.9))
+    assert not drifting(drift(5, sd_deg=1.5), drift(5, sd_deg=1.5))
+    assert drifting(drift(6.1, sd_deg=1.5), drift(6.1, sd_deg=1.5))
 
 
 def test_it_clears_below_a_share_of_the_limits_only():
-    assert verdicts([drift(1.7)] * 6, ("tilt",)) == [True] * 6
-    assert verdicts([drift(1.3)] * 3, ("tilt",)) == [True, True, False]
-    assert verdicts([drift(1.3), drift(1.7), drift(1.3), drift(1.3)], ("tilt",))[-1]
+    assert drifting(drift(1.7), drift(1.7), ("tilt",))
+    assert drifting(drift(1.3), drift(1.7), ("tilt",))
+    assert drifting(drift(1.7), drift(1.3), ("tilt",))
+    assert drifting(drift(1.3), None, ("tilt",))
+    assert not drifting(drift(1.3), drift(1.3), ("tilt",))
 
 
-def test_an_update_that_tells_nothing_changes_nothing():
+def test_a_window_that_tells_nothing_changes_nothing():
     nothing = drift(5, weak=("tilt", "roll", "height"))
-    assert verdicts([drift(5), nothing, drift(5), nothing, drift(5)]) == [False] * 4 + [True]
-    assert verdicts([nothing] * 5, ("tilt",)) == [True] * 5
+    assert not drifting(nothing, nothing)
+    assert drifting(nothing, nothing, ("tilt",))
+
+
+def test_the_second_look_is_asked_for_where_a_verdict_may_change():
+    assert asks_again(drift(5), LIMITS, drifting=False)
+    assert not asks_again(drift(1.9), LIMITS, drifting=False)
+    assert asks_again(drift(1.3), LIMITS, drifting=True)
+    assert not asks_again(drift(1.5), LIMITS, drifting=True)
 
 
 def reading(statistic, number=3):
@@ -135,23 +141,23 @@ def reading(statistic, number=3):
 
 
 def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
-    alarmed = judge(drift(), LIMITS, 0, (), reading(10.5))
+    alarmed = judge(drift(), LIMITS, (), reading(10.5))
     assert (alarmed.drifted, alarmed.streak) == (("heading",), 1)
-    told = judge(drift(5), LIMITS, 0, (), reading(10.5))
+    told = judge(drift(5), LIMITS, (), reading(10.5))
     assert told.drifted == ("tilt",)  # the pose says better which
-    assert not judge(drift(), LIMITS, 0, (), reading(9.5)).drifting
-    streak, drifted = alarmed.streak, alarmed.drifted
-    for statistic, drifting in ((7.5, True), (6.5, True), (6.5, True), (6.5, False)):
-        verdict = judge(drift(), LIMITS, streak, drifted, reading(statistic))
-        streak, drifted = verdict.streak, verdict.drifted
-        assert verdict.drifting == drifting
+    assert not judge(drift(), LIMITS, (), reading(9.5)).drifting
+    for statistic, holds in ((7.5, True), (6.5, False)):
+        still = judge(drift(), LIMITS, alarmed.drifted, reading(statistic), drift())
+        assert still.drifting == holds
+    assert judge(drift(), LIMITS, alarmed.drifted, reading(6.5), drift(1.5)).drifting
     untold = drift(weak=THREE)
-    assert judge(untold, LIMITS, 0, (), reading(10.5)).drifting
+    assert judge(untold, LIMITS, (), reading(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():
-    assert verdicts([drift(weak=("tilt",))] * 5, ("tilt",)) == [True] * 5
-    assert verdicts([drift(weak=("roll",))] * 3, ("tilt",)) == [True, True, False]
+    assert drifting(drift(weak=("tilt",)), drift(weak=("tilt",)), ("tilt",))
+    assert drifting(drift(), drift(weak=("tilt",)), ("tilt",))
+    assert not drifting(drift(weak=("roll",)), drift(weak=("roll",)), ("tilt",))
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():

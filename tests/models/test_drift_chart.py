@@ -13,9 +13,9 @@ from models.drift.chart import (
     DriftChart,
     Knocked,
     ratios_of,
-    read_chart,
     trace,
 )
+from models.drift.chart import read_chart as read_chart_by
 from models.drift.chart_learning import learn_chart
 from models.drift.chart_packing import chart_from_bytes, chart_to_bytes
 from models.drift.clock import may_be_clock
@@ -32,6 +32,10 @@ from tests.models.sites import LENS, PRIOR
 AT = candidate_of(PRIOR)
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = 1000 / 36_500  # a run is 1000 parties: of 100 a day
+
+
+def read_chart(chart, scores, alarms):
+    return read_chart_by(chart, scores, alarms, calm_ratio=0.7, calm_parties=12)
 
 
 def feet(tracks):
@@ -129,6 +133,30 @@ def test_the_newest_parties_count_and_say_since_when():
     assert reading.track_idx == pytest.approx(210, abs=15)
     few = PartyScores(values=values[:15], last=np.arange(15))
     assert read_chart(chart, few, ONE_A_YEAR) is None
+
+
+def test_it_matters_not_after_which_party_it_is_read():
+    """An alarm among parties stays one until the chart has been calm for a dozen."""
+    chart = plain(responses=far_heading())
+    values = np.zeros((160, SCORES))
+    values[30:60, -1] = 2.0
+    path = trace(ratios_of(chart), values)
+    level = chart.level(ONE_A_YEAR)
+    first = int(np.flatnonzero(path.statistic > level)[0])
+    fell = first + int(np.flatnonzero(path.statistic[first:] < 0.7 * level)[0])
+
+    def read(count):
+        return read_chart(
+            chart, PartyScores(values=values[:count], last=np.arange(count)), ONE_A_YEAR
+        )
+
+    assert not read(first).moved
+    for count in range(first + 1, fell + 12):
+        assert read(count).moved
+    assert read(fell + 11).statistic == pytest.approx(path.statistic.max())
+    calmed = read(fell + 12)
+    assert not calmed.moved
+    assert calmed.excess == pytest.approx(path.statistic[fell + 11] / level)
 
 
 def test_no_party_counts_for_more_than_five_of_its_kind():

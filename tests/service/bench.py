@@ -1,6 +1,7 @@
 """A camera with a reference, about whose tracks a test makes up what they come to."""
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -11,7 +12,7 @@ from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
 from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import Evidence, Finding, gather
+from service.recalibration.evidence import Evidence, Finding, asked_enough, gather
 from service.recalibration.trainings import begin_training, publish_model
 from service.store import events, references, trainings
 from service.store.database import Store
@@ -95,8 +96,12 @@ def made_up(
     weak=(),
     change=None,
     paths=False,
+    earlier: CameraPose | None = None,
 ) -> Finding:
-    """What the tracks of a window come to: a pose, whose heading they tell by their `paths`."""
+    """What the tracks of a window come to: a pose, whose heading they tell by their `paths`.
+
+    Without the newest of them, they come to the `earlier` one: the same, if it is not said.
+    """
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
     sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
     joint = JointEstimate(
@@ -119,9 +124,14 @@ def made_up(
             reason="",
             raw=np.append(values, pose.heading_rad) + 0.01,
         )
+    before = fused
+    if earlier is not None:
+        apart = [earlier.tilt_rad, earlier.roll_rad, math.log(earlier.height_m)]
+        before = replace(fused, values=np.array([*apart, earlier.heading_rad]))
     return Finding(
         joint=joint,
         fused=fused,
+        earlier=before if asked_enough(evidence) else None,
         averaged=None,
         reading=None,
         tracks=evidence.tracks,

@@ -64,7 +64,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
 
 
 def test_it_may_have_moved_before_an_alert_says_so(bench):
-    bench.see(moved(tilt_deg=5.0))
+    bench.see(moved(tilt_deg=5.0), earlier=PRIOR)
     assert headline(bench.http) == (
         "It may have moved: it turned 5.0° (tilt +5.0°). The next people will tell."
     )

@@ -25,10 +25,16 @@ DAY_S = 86_400.0
 
 
 def make_street(http, settings, ago_s=20_000.0):
-    changes = {"drift_updates": 2, "flow_unsure_tracks": UNSURE, "flow_half_life_days": 10.0}
+    changes = {"flow_unsure_tracks": UNSURE, "flow_half_life_days": 10.0}
     street = Street(http, settings.model_copy(update=changes))
     street.clock_s = time.time() - ago_s
     return street
+
+
+@pytest.fixture
+def settings(settings):
+    """People of the next minutes are taken, so that they come after what a person said now."""
+    return settings.model_copy(update={"max_ahead_s": 3600.0})
 
 
 @pytest.fixture(params=[20_000.0])

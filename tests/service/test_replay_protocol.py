@@ -32,7 +32,6 @@ CASES = [("pets2009_s2l1_v001_sort", "knock", 2), ("wildtrack_c1", "pan", 3)]
 @pytest.mark.parametrize(("scene_id", "knock", "seed"), CASES)
 def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, scene_id, knock, seed):
     folder = SCENES / scene_id
-    service.start_again(drift_updates=1)
     done = subprocess.run(
         [sys.executable, "-m", "service.cli", "replay", str(folder), "--url", service.url]
         + ["--protocol", str(seed), "--knock", knock],

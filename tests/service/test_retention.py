@@ -211,3 +211,13 @@ def test_the_log_is_emptied(room):
         assert log.stat().st_size > 3e6
         room.retain()
         assert log.stat().st_size == 0
+
+
+def test_what_was_recorded_years_ago_and_came_now_stays(room):
+    room.fill("tracks", 3, camera_id="corner", source="s", track_id=str, started_s=1.7e9,
+              ended_s=1.7e9, received_at=when(0), points=b"x")  # fmt: skip
+    room.fill("tracks", 2, camera_id="corner", source="s", track_id=lambda n: f"l{n}",
+              started_s=time.time(), ended_s=time.time(), received_at=when(31),
+              points=b"x")  # fmt: skip
+    room.retain()
+    assert room.count("tracks") == room.count("tracks", "started_s = 1.7e9") == 3

@@ -182,10 +182,9 @@ def test_a_camera_that_was_not_put_back_after_all_alarms_anew(bench):
         bench.see(moved(tilt_deg=5.0))
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
     bench.http.post(url, json={"outcome": "put_back"}).raise_for_status()
-    for _ in range(2):
-        bench.see(moved(tilt_deg=5.0))
+    bench.see(moved(tilt_deg=5.0), people=8)
     assert bench.alerts(state="firing") == []
-    bench.see(moved(tilt_deg=5.0))
+    bench.see(moved(tilt_deg=5.0), people=8)
     (alert,) = bench.alerts(state="firing")
     resolved = next(alert for alert in bench.alerts() if alert["state"] == "resolved")
     assert datetime.fromisoformat(alert["changed_at"]) > datetime.fromisoformat(

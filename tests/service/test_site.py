@@ -27,7 +27,7 @@ WANTED = 60
 @pytest.fixture
 def street(http, settings):
     http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-    return Street(http, settings.model_copy(update={"drift_updates": 2}))
+    return Street(http, settings)
 
 
 @pytest.fixture

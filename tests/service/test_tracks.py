@@ -1,17 +1,21 @@
 """Tracks in all their forms, and bad input that loses nothing beside it."""
 
 import json
+import re
 import time
 
 import numpy as np
 import pytest
+from fastapi.testclient import TestClient
 from sqlalchemy import select
 
+from service.app import create_app
+from service.recalibration.retention import limits_of_camera
 from service.settings import Settings
 from service.store.database import Store
 from service.store.packing import unpack
 from service.store.tables import TrackRecord
-from tests.conftest import track
+from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 
 T0 = 1_700_000_000.0
@@ -77,20 +81,6 @@ def test_ndjson_has_a_track_a_line(corner, settings):
     assert {record.source for record in stored(settings)} == {"nd"}
 
 
-def test_motchallenge_text_in_any_order_of_lines(corner, settings):
-    rows = [f"{n * 10},7,100,50,40,{150 + n},1,-1,-1,-1" for n in range(8)]
-    rows += ["5,7,0,0,10,10,0,-1,-1,-1"]  # conf 0: to be ignored
-    answer = corner.post(
-        "/cameras/corner/tracks?frame_rate_hz=10&started_at=2023-11-14T22:13:20Z",
-        content="\n".join(reversed(rows)),
-        headers={"Content-Type": "text/csv"},
-    )
-    assert answer.json() == {"accepted": 1, "duplicates": 0, "rejected": []}
-    points = unpack(stored(settings)[0].points, 3)
-    np.testing.assert_allclose(points[:, 0] - T0, np.arange(8))
-    assert points[3].tolist()[1:] == [120.0, 203.0]
-
-
 # Bad input: the good are stored, the bad are named.
 
 
@@ -150,10 +140,41 @@ def test_milliseconds_are_no_seconds(corner):
     assert refused(corner, bad)["code"] == "time_out_of_range"
 
 
-def test_a_track_from_the_future_cannot_push_the_others_out_of_the_window(corner):
-    ahead = track("ahead", start_s=time.time() + 2 * 86_400)
-    assert refused(corner, ahead)["code"] == "time_out_of_range"
-    assert post(corner, [track("now", start_s=time.time())])["accepted"] == 1
+def test_a_track_from_the_future_cannot_own_the_window(corner, settings):
+    rejection = refused(corner, track("ahead", start_s=time.time() + 3600))
+    assert rejection["code"] == "time_out_of_range"
+    assert "at most 60 s ahead of this service's clock" in rejection["detail"]
+    ahead_s = float(re.search(r"this is ([\d.]+) s ahead", rejection["detail"])[1])
+    assert ahead_s == pytest.approx(3600, abs=30)
+    assert post(corner, [track("now", start_s=time.time() + 30)])["accepted"] == 1
+    assert {record.track_id for record in stored(settings)} == {"good", "fine", "now"}
+
+
+def test_what_is_taken_as_ahead_is_a_setting(settings):
+    ahead = settings.model_copy(update={"max_ahead_s": 7200.0})
+    with TestClient(create_app(ahead)) as http:
+        http.post("/cameras", json=CAMERA).raise_for_status()
+        assert post(http, [track("ahead", start_s=time.time() + 3600)])["accepted"] == 1
+
+
+def test_a_recording_of_years_ago_outlives_retention(corner, settings):
+    assert post(corner, [track("old", start_s=T0)])["accepted"] == 1
+    with Store(settings).write() as session:
+        assert next(limits_of_camera(settings, "corner")).bite(session) == 0
+    assert len(stored(settings)) == 1
+
+
+def test_a_body_of_which_nothing_was_taken_is_no_success(corner, settings):
+    bad = [{"id": "a"}, {"id": "b", "points": [[T0, 1, 1], [T0 + 0.8, 2, 2]]}]
+    answer = corner.post("/cameras/corner/tracks", json={"tracks": bad})
+    document = problem(answer, 422, "nothing_taken")
+    assert [error["pointer"] for error in document["errors"]] == ["/tracks/0", "/tracks/1"]
+    assert document["errors"][1]["reason"].startswith("too_short: 2 points over 0.8 s")
+    assert "none of 2" in document["detail"]
+    assert post(corner, [])["accepted"] == 0  # there was nothing to take
+    assert post(corner, [track("1"), *bad])["accepted"] == 1
+    again = post(corner, [track("1"), *bad])
+    assert (again["accepted"], again["duplicates"], len(again["rejected"])) == (0, 1, 2)
 
 
 def test_too_short(corner):
@@ -165,7 +186,8 @@ def test_too_short(corner):
         "detail": "2 points over 0.8 s; at least 5 points over 2 s are needed",
     }
     quick = {"id": "q", "points": [[T0 + 0.1 * n, 1, 1] for n in range(20)]}
-    assert post(corner, [quick])["rejected"][0]["code"] == "too_short"
+    answer = post(corner, [track("another"), quick])
+    assert answer["rejected"][0]["code"] == "too_short"
 
 
 def test_five_points_over_two_seconds_are_enough(corner):
@@ -209,21 +231,6 @@ def test_half_broken_batch(corner, settings):
     assert [record.track_id for record in stored(settings)] == ["1", "2"]
 
 
-def test_malformed_text_costs_only_its_own_track(corner, settings):
-    lines = [f"{n * 25},1,100,50,40,150,1" for n in range(6)]
-    lines += [f"{n * 25},2,100,50,40,150,1" for n in range(6)]
-    lines[8] = "50,2,oops,50,40,150,1"
-    answer = corner.post(
-        "/cameras/corner/tracks?started_at=2023-11-14T22:13:20Z",
-        content="\n".join(lines),
-        headers={"Content-Type": "text/csv"},
-    ).json()
-    assert answer["accepted"] == 1
-    assert answer["rejected"][0]["id"] == "2"
-    assert "line 9" in answer["rejected"][0]["detail"]
-    assert [record.track_id for record in stored(settings)] == ["1"]
-
-
 def test_a_malformed_line_of_ndjson_is_named(corner):
     lines = f"{json.dumps(track('1'))}\n{{broken\n{json.dumps(track('2'))}"
     answer = corner.post(
@@ -243,16 +250,6 @@ def test_a_body_that_is_no_batch_is_refused_whole(corner, body):
         headers={"Content-Type": "application/json"},
     )
     assert problem(answer, 422, "malformed")["errors"][0]["reason"]
-
-
-def test_csv_that_is_none_or_lacks_its_clock(corner):
-    headers = {"Content-Type": "text/csv"}
-    url = "/cameras/corner/tracks"
-    problem(corner.post(url, content="1,1,1,1,1,1,1", headers=headers), 422, "malformed")
-    answer = corner.post(f"{url}?started_at=1700000000", content="a;b;c", headers=headers)
-    problem(answer, 422, "malformed")
-    answer = corner.post(f"{url}?started_at=2023-11-14T22:13:20Z", content="a;b", headers=headers)
-    problem(answer, 422, "malformed")
 
 
 def test_too_many_tracks(corner, settings):

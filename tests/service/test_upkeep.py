@@ -2,12 +2,11 @@
 
 import time
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from models.geometry.pose import CameraPose
-from service.formats.track import Batch, Clock, read_track
+from service.formats.track import Batch, Clock, Limits, read_track
 from service.recalibration import upkeep
 from service.recalibration.cameras import add_prior_pose
 from service.recalibration.looking import begin_look, end_look
@@ -20,7 +19,7 @@ from service.recalibration.trainings import (
     report_progress,
     request_estimate,
 )
-from service.store import tracks, trainings, workers
+from service.store import tracks, trainings
 from service.store.database import Store
 from service.store.tables import CameraRecord
 from service.store.tracks import WindowBounds
@@ -35,6 +34,9 @@ class Recorder:
 
     def enqueue_training(self, session, camera_id, training_id):
         self.trainings.append(training_id)
+
+    def requeue_training(self, session, camera_id, training_id):
+        return False
 
     def enqueue_estimate(self, session, camera_id):
         self.estimates.append(camera_id)
@@ -69,7 +71,8 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         for k, point in enumerate(raw["points"]):
             point[0] = start_s + n + step_s * k
         clock = Clock(frame_rate_hz=None, started_at_s=None)
-        batch.append(read_track(raw, "t", clock, (1280, 720)))
+        limits = Limits(width=1280, height=720, now_s=time.time(), max_ahead_s=60.0)
+        batch.append(read_track(raw, "t", clock, limits))
     return receive_tracks(session, Recorder(), "corner", Batch(tracks=tuple(batch), rejections=()))
 
 
@@ -160,18 +163,6 @@ def test_a_cancelled_training_publishes_nothing(session, settings):
     publish_model(session, Recorder(), attempt, weights_sha256="1" * 64, metrics={})
     assert trainings.find(session, attempt.training_id).state == "cancelled"
     assert trainings.newest_model(session, "corner") is None
-
-
-def test_a_lost_worker_is_named_once(session, settings):
-    upkeep.heartbeat(session, "w1", 1)
-    upkeep.heartbeat(session, "w2", 2)
-    session.flush()
-    lost = workers.silent_since(session, datetime.max.replace(tzinfo=UTC))
-    lost[0].heartbeat_at -= timedelta(seconds=settings.worker_lost_s + 5)
-    session.flush()
-    assert upkeep.take_lost_workers(session, settings) == ["w1"]
-    session.flush()
-    assert upkeep.take_lost_workers(session, settings) == []
 
 
 def test_the_window_is_the_newest_tracks_by_their_own_times(session):

@@ -136,6 +136,19 @@ const ACTS = {
     if (body) await put("Noted: a new reference begins.", "POST", `${path}/reference/reset`, body);
   },
 
+  async "use-source"({ source }) {
+    const yes = await confirmed({
+      title: `Let the tracks of ${source} count?`,
+      detail:
+        "The camera is judged by this source alone from now on. Its reference is learned anew, " +
+        "of tracks that were seen while the camera was where it should be.",
+      yes: "Let it count",
+    });
+    const body = yes && (await asMe());
+    const url = `${path}/sources/${encodeURIComponent(source)}/use`;
+    if (body) await put("It counts from now on.", "POST", url, body);
+  },
+
   async train() {
     await put("A training is queued.", "POST", `${path}/trainings`, signed());
   },

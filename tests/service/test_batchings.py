@@ -1,0 +1,79 @@
+"""The same tracks come to the same state and alerts, however they were posted."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import CAMERA
+from tests.service.street import KNOCKED, PRIOR, Street
+
+REFERENCE, STILL, LATER = 40, 20, 40
+
+
+class Recording(Street):
+    """People who are taken down, to be posted in whatever portions."""
+
+    def __init__(self, http, settings):
+        super().__init__(http, settings)
+        self.people = []
+
+    def _post(self):
+        self.people += self._bodies
+        self._bodies.clear()
+
+    def play(self, sizes):
+        """Post them in portions of these sizes, and look at the camera after each."""
+        done = 0
+        for size in sizes:
+            part = self.people[done : done + size]
+            done += size
+            answer = self.http.post("/cameras/corner/tracks", json={"tracks": part})
+            assert answer.json()["accepted"] == len(part), answer.text
+            self.look()
+        assert done >= len(self.people)
+
+    def end(self):
+        """What it has come to."""
+        return self.pose()["state"], [alert["kind"] for alert in self.alerts(state="firing")]
+
+
+@pytest.fixture
+def recording(http, settings):
+    http.post("/cameras", json={**CAMERA, "reference_tracks": REFERENCE}).raise_for_status()
+    return Recording(http, settings)
+
+
+def at_once(count):
+    return [count]
+
+
+def at_random(seed):
+    rng = np.random.default_rng(seed)
+    return lambda count: [int(size) for size in rng.integers(3, 40, count)][: count // 3]
+
+
+def one_by_one(count):
+    return [REFERENCE, *([1] * (count - REFERENCE))]
+
+
+BATCHINGS = [
+    pytest.param(at_once, id="at once"),
+    pytest.param(at_random(1), id="at random", marks=pytest.mark.slow),
+    pytest.param(one_by_one, id="one by one", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("sizes", BATCHINGS)
+@pytest.mark.parametrize(
+    ("later", "end"),
+    [
+        pytest.param([PRIOR], ("ok", []), id="still"),
+        pytest.param([KNOCKED], ("drifting", ["drift"]), id="knocked"),
+        pytest.param([KNOCKED, PRIOR], ("ok", []), id="knocked and put back"),
+    ],
+)
+def test_it_matters_not_how_tracks_were_posted(recording, later, end, sizes):
+    recording.walk(PRIOR, REFERENCE + STILL)
+    for pose in later:
+        recording.walk(pose, LATER)
+    recording.play(sizes(len(recording.people)))
+    assert recording.end() == end
