@@ -57,7 +57,7 @@ def routes_of(app):
 
 
 def filled(path):
-    return re.sub(r"{\w+}", "corner", path)
+    return re.sub(r"{[\w:]+}", "corner", path)
 
 
 def test_every_route_says_what_it_needs(settings):
