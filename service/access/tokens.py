@@ -136,6 +136,8 @@ def _check(spec: TokenSpec, now: datetime) -> None:
     unknown = [scope for scope in spec.scopes if scope not in SCOPES]
     if not 0 < len(spec.name.strip()) <= MAX_NAME:
         _refuse("name", f"1 to {MAX_NAME} characters are needed, got {len(spec.name.strip())}")
+    if not spec.name.isprintable():
+        _refuse("name", "letters that can be printed, on one line, are needed")
     if unknown or not spec.scopes:
         got = ", ".join(unknown) or "none"
         _refuse("scopes", f"some of {', '.join(SCOPES)} are needed, got {got:.80}")

@@ -26,6 +26,7 @@ _WORDS = {
     412: "If-Match names another version than the stored one",
     413: "Larger than a stated limit",
     415: "A content type that is not taken",
+    421: "This service does not go by the name in Host",
     422: "Malformed; `errors` names each field",
     428: "If-Match is needed",
     429: "Too much at once; Retry-After says when to come back",
@@ -68,7 +69,7 @@ def _statuses(path: str, method: str, operation: dict[str, Any]) -> Iterator[int
         return
     taken = {(parameter["in"], parameter["name"]) for parameter in operation.get("parameters", ())}
     places = {place for place, _ in taken}
-    yield from (401, 403, 429, 503)
+    yield from (401, 403, 421, 429, 503)
     if "path" in places:
         yield 404
     if places or "requestBody" in operation:

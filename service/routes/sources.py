@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from service.recalibration import sources
-from service.routes.state import ReadDep, StateDep, WriteDep
+from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.sources import SourceList, SourceOut, UseBody
 
 router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
@@ -22,16 +22,19 @@ def use(
     source: str,
     state: StateDep,
     session: WriteDep,
+    actor: ActorDep,
     body: UseBody | None = None,
 ) -> SourceList:
     """Say that a source is to count: the reference is learned anew, of its tracks."""
-    by = None if body is None else body.by
+    by = name_of(actor, None if body is None else body.by)
     sources.use_source(session, state.queue, state.settings, camera_id, source, by)
     found = sources.list_sources(session, state.settings, camera_id)
     return SourceList(items=[SourceOut.from_value(value) for value in found])
 
 
 @router.delete("/{source:path}", status_code=204)
-def remove(camera_id: str, source: str, session: WriteDep, by: str | None = None) -> None:
+def remove(
+    camera_id: str, source: str, session: WriteDep, actor: ActorDep, by: str | None = None
+) -> None:
     """Delete a source that does not count, with its tracks."""
-    sources.remove_source(session, camera_id, source, by)
+    sources.remove_source(session, camera_id, source, name_of(actor, by))

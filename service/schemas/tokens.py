@@ -3,11 +3,11 @@
 from datetime import UTC, datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, Field
+from pydantic import BaseModel, Field
 
 from service.access.callers import Scope
 from service.access.tokens import MAX_NAME, MadeToken, TokenSpec
-from service.schemas.base import Body
+from service.schemas.base import Body, Moment
 from service.schemas.cameras import CameraId
 from service.store.access_tables import TokenRecord
 
@@ -18,7 +18,7 @@ class TokenBody(Body):
     name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=4)]
     cameras: Annotated[list[CameraId], Field(min_length=1, max_length=1000)] | None = None
-    expires_at: AwareDatetime | None = None
+    expires_at: Moment | None = None
 
     def to_spec(self) -> TokenSpec:
         """What the use case takes."""

@@ -46,6 +46,7 @@ _GOOD: dict[str, dict[str, Any]] = {
     "silence": {"until": _LATER, "reason": "known"},
     "resolve": {"outcome": "false_alarm"},
     "trainings": {"recipe": "default", "seed": 1},
+    "tokens": {"name": "gate", "scopes": ["ingest"], "cameras": ["ok"], "expires_at": _LATER},
 }
 # What JSON can say and a store or a clock cannot hold.
 NASTY_WORDS = ("\x00", "", "9" * 30, "0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00", "é")

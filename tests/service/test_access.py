@@ -57,7 +57,7 @@ def routes_of(app):
 
 
 def filled(path):
-    return re.sub(r"{\w+}", "corner", path)
+    return re.sub(r"{[\w:]+}", "corner", path)
 
 
 def test_every_route_says_what_it_needs(settings):
@@ -146,7 +146,9 @@ def test_a_token_is_shown_once_and_kept_as_a_hash(closed, made, on):
     ("body", "field"),
     [
         ({"name": "", "scopes": ["read"]}, "name"),
+        ({"name": "a\nb", "scopes": ["read"]}, "name"),
         ({"name": "a", "scopes": []}, "scopes"),
+        ({"name": "a", "scopes": ["read"], "expires_at": "9999-12-31T23:59:59-14:00"}, "expires"),
         ({"name": "a", "scopes": ["root"]}, "scopes"),
         ({"name": "a", "scopes": ["read"], "cameras": ["corner"]}, "cameras"),
         ({"name": "a", "scopes": ["read"], "expires_at": "2020-01-01T00:00:00Z"}, "expires_at"),

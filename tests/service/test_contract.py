@@ -133,6 +133,12 @@ def test_no_value_in_a_good_body_or_query_is_too_hard_to_take(watched):
         "/alerts/x/silence": silence,
         "/alerts/x/resolve": {"outcome": "false_alarm", "note": "x"},
         "/webhooks": {"url": "http://127.0.0.1:9/"},
+        "/tokens": {
+            "name": "gate",
+            "scopes": ["ingest"],
+            "cameras": ["ok"],
+            "expires_at": "2099-01-01T00:00:00Z",
+        },
     }
     broken = set()
     with TestClient(watched.app, raise_server_exceptions=False) as http:
