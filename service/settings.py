@@ -108,10 +108,10 @@ class Settings(BaseSettings):
     )
 
     keep_days: float = Field(30.0, gt=0, description="days from a track's arrival to its deletion")
-    keep_tracks: int = Field(
-        20_000, ge=5, description="tracks kept of a camera: the last to arrive"
+    keep_tracks: int = Field(20_000, ge=5, description="tracks kept of a camera: the last to come")
+    keep_mb: float = Field(
+        200.0, gt=0, description="MB of tracks kept for each camera: 10 kB for each of keep_tracks"
     )
-    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
@@ -177,7 +177,7 @@ class Settings(BaseSettings):
     )
     max_cameras: int = Field(2000, ge=1, description="cameras that may be registered")
     min_free_mb: float = Field(
-        64.0, ge=0, description="MiB of free disk below which /readyz warns; 0: any"
+        64.0, ge=0, description="MiB of free disk below which /readyz is not ready; 0: any"
     )
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")

@@ -38,6 +38,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     try:
         with store.write() as session:
             probes.write(session, now)
+        with store.read() as session:
             heartbeat = workers.newest_heartbeat(session)
             due = cameras.longest_due(session)
     except (SQLAlchemyError, OverloadedError) as error:

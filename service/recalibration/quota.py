@@ -29,7 +29,7 @@ class Quota:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._most = settings.keep_mb * 2**20 * _BEYOND
+        self._most = settings.keep_mb * 1e6 * _BEYOND
         self._counts: dict[str, _Count] = {}
         self._lock = threading.Lock()
 
@@ -39,8 +39,6 @@ class Quota:
         Raises:
             QuotaError: well more is stored than retention will leave.
         """
-        if not self._most:
-            return
         coming = sum(
             track.points.nbytes + (0 if track.boxes is None else track.boxes.nbytes)
             for track in batch.tracks
@@ -57,8 +55,8 @@ class Quota:
             self._counts[camera_id] = count
             if count.stored + coming > self._most:
                 raise QuotaError(
-                    f"tracks: {count.stored / 2**20:.1f} MiB of this camera are stored; "
-                    f"{self._most / _BEYOND / 2**20:g} MiB are kept (SUREFOOT_KEEP_MB), and at "
+                    f"tracks: {count.stored / 1e6:.1f} MB of this camera are stored; "
+                    f"{self._most / _BEYOND / 1e6:g} MB are kept (SUREFOOT_KEEP_MB), and at "
                     f"most {_BEYOND:g} times that until older ones are deleted",
                     retry_after_s=_COME_BACK_S,
                 )

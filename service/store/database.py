@@ -96,8 +96,10 @@ def _prepare_sqlite(connection: Any, patience_s: float) -> None:
     # newest commit, the first write takes the write lock at once.
     connection.isolation_level = "IMMEDIATE"
     connection.execute(f"PRAGMA busy_timeout={round(patience_s * 1000)}")
-    # Of a new file only, before its first page is written: retention gives pages back to the disk.
-    connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
+    # Before its first page is written: retention gives pages back to the disk. Asked of a file
+    # that has pages, it waits for whoever writes, and readers must not.
+    if connection.execute("PRAGMA page_count").fetchone() == (0,):
+        connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
     connection.execute("PRAGMA journal_mode=WAL")
     connection.execute(f"PRAGMA journal_size_limit={_WAL_BYTES}")
     connection.execute("PRAGMA synchronous=FULL")  # an answer of 202 survives power loss

@@ -62,8 +62,8 @@ def _camera_key() -> Any:
     return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
 
 
-def _prior_pose_key() -> Any:
-    return mapped_column(ForeignKey("prior_poses.id", ondelete="CASCADE"), index=True)
+def _key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
+    return mapped_column(ForeignKey(target, ondelete=gone), **options)
 
 
 class CameraRecord(Record):
@@ -129,7 +129,7 @@ class SiteReferenceRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = _prior_pose_key()
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     origin: Mapped[str]  # registered, changed, accepted, reset, put_back, source
     source: Mapped[str | None]
     requested_by: Mapped[str | None]
@@ -162,9 +162,7 @@ class FlowMapRecord(Record):
 
     __tablename__ = "flow_maps"
 
-    reference_id: Mapped[int] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE"), primary_key=True
-    )
+    reference_id: Mapped[int] = _key("site_references.id", primary_key=True)
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     chart: Mapped[bytes | None] = mapped_column(LargeBinary)
     tracks: Mapped[int]
@@ -206,7 +204,7 @@ class TrainingRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = _prior_pose_key()
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
@@ -233,10 +231,8 @@ class ModelRecord(Record):
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    prior_pose_id: Mapped[int] = _prior_pose_key()
-    training_id: Mapped[str] = mapped_column(
-        ForeignKey("trainings.id", ondelete="CASCADE"), unique=True
-    )
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
+    training_id: Mapped[str] = _key("trainings.id", unique=True)
     weights_sha256: Mapped[str] = mapped_column(String(64))
     config: Mapped[dict[str, Any]]
     seed: Mapped[int]
@@ -252,9 +248,7 @@ class PredictionRecord(Record):
 
     __tablename__ = "predictions"
 
-    model_id: Mapped[str] = mapped_column(
-        ForeignKey("models.id", ondelete="CASCADE"), primary_key=True
-    )
+    model_id: Mapped[str] = _key("models.id", primary_key=True)
     track_pk: Mapped[int] = mapped_column(
         ForeignKey("tracks.id", ondelete="CASCADE"), primary_key=True, index=True
     )
@@ -279,13 +273,9 @@ class EstimateRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
-    model_id: Mapped[str | None] = mapped_column(
-        ForeignKey("models.id", ondelete="SET NULL"), index=True
-    )
-    prior_pose_id: Mapped[int] = _prior_pose_key()
-    reference_id: Mapped[int | None] = mapped_column(
-        ForeignKey("site_references.id", ondelete="CASCADE"), index=True
-    )
+    model_id: Mapped[str | None] = _key("models.id", "SET NULL", index=True)
+    prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
+    reference_id: Mapped[int | None] = _key("site_references.id", index=True)
     state: Mapped[str]  # learning, ok, drifting, out_of_range
     reason: Mapped[str]
     told: Mapped[list[str]]  # of tilt, roll, height, heading
@@ -330,9 +320,7 @@ class AlertRecord(Record):
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     camera_id: Mapped[str | None] = _camera_key()
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
-    group_id: Mapped[str | None] = mapped_column(
-        ForeignKey("alerts.id", ondelete="SET NULL"), index=True
-    )
+    group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
     kind: Mapped[str]  # drift, no_data, out_of_range, clock, tracker
     state: Mapped[str]  # firing, resolved

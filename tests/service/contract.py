@@ -145,7 +145,7 @@ class Ground:
             trainings.queue_training(session, queue, settings, "ok")
             if session.scalar(select(WebhookRecord).limit(1)) is None:
                 spec = WebhookSpec(url=URL, name="a", kinds=None, format="webhook", enabled=True)
-                made = webhooks.create_webhook(session, spec)
+                made = webhooks.create_webhook(session, settings, spec).record
                 add_delivery(session, made, "test", {}, now)
             for name, column, order in (
                 ("alert_id", AlertRecord.id, AlertRecord.opened_at),

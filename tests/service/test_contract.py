@@ -74,7 +74,13 @@ def failures_of(recorder):
 @pytest.fixture
 def watched(settings):
     changed = settings.model_copy(
-        update={"snapshots": True, "webhook_allow": "127.0.0.0/8", "worker_lost_s": 1e6}
+        update={
+            "snapshots": True,
+            "webhook_allow": "127.0.0.0/8",
+            "worker_lost_s": 1e6,
+            "caller_rate": 0,
+            "camera_rate": 0,
+        }
     )
     app = create_app(changed)
     made = Ground(app, changed)

@@ -198,8 +198,10 @@ def test_a_false_alarm_lets_it_grow_on(known):
     assert due(known) is None
     answer = {"outcome": "false_alarm"}
     known.http.post(f"/alerts/{'a' * 32}/resolve", json=answer).raise_for_status()
+    assert due(known) is None  # whoever comes from now on has to show that it stands still
+    known.keep_to_lanes(PRIOR, 40)
     known.look()
-    assert map_of(known).tracks == WANTED + 100 - UNSURE
+    assert map_of(known).tracks == WANTED + 140 - UNSURE
 
 
 def test_a_change_that_nobody_has_explained_stops_it(known):

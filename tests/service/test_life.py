@@ -460,6 +460,8 @@ def lives(examples: int, steps: int, **more: Any) -> settings:
     )
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(0 if STEPS else 300)
 def test_all_places_say_the_same_whatever_is_done(
     migrated: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,7 +89,7 @@ def test_so_many_cameras(settings):
 
 
 def test_a_camera_has_its_bytes(settings, monkeypatch):
-    """A track of 20 points has 480 bytes: 0.02 MiB are kept, and half more until some go."""
+    """A track of 20 points has 480 bytes: 0.02 MB are kept, and half more until some go."""
     with client_of(settings, keep_mb=0.02) as client:
         taken = 0
         for n in range(10):
@@ -101,7 +101,7 @@ def test_a_camera_has_its_bytes(settings, monkeypatch):
         document = problem(answer, 429, "quota_exceeded")
         assert "SUREFOOT_KEEP_MB" in document["detail"]
         assert int(answer.headers["retry-after"]) >= 60
-        assert 0.02 * 2**20 <= taken * 480 <= 0.03 * 2**20
+        assert 0.02 * 1e6 <= taken * 480 <= 0.03 * 1e6
         assert client.get("/cameras/corner").json()["tracks"] == taken
         # Retention makes room; the count is taken anew.
         with Store(settings).write() as session:

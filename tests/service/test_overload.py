@@ -61,7 +61,7 @@ def test_no_connection_in_time_is_told_so(settings):
 
 
 def test_who_cannot_write_in_time_is_told_so_and_reads_go_on(settings):
-    with client_of(settings, http_wait_s=0.3, http_at_once=4) as client:
+    with client_of(settings, http_wait_s=1.0, http_at_once=4) as client:
         with somebody_writing(settings), ThreadPoolExecutor(12) as pool:
             posts = [
                 pool.submit(client.post, "/cameras/corner/tracks", json={"tracks": [track(str(n))]})
