@@ -9,6 +9,7 @@ import service.store.delivery_tables  # noqa: F401 - its tables are among Record
 import service.store.probe_tables  # noqa: F401 - its tables are among Record's
 import service.store.snapshot_tables  # noqa: F401 - its tables are among Record's
 import service.store.source_tables  # noqa: F401 - its tables are among Record's
+import service.store.worker_tables  # noqa: F401 - its tables are among Record's
 from service.settings import Settings
 from service.store.database import engine_for
 from service.store.tables import Record, UtcDateTime

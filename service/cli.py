@@ -58,6 +58,7 @@ def worker(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Run a worker alone, beside an API that runs elsewhere on this machine."""
+    from service.jobs import exits
     from service.jobs.worker import WorkerRunningError, run_worker
     from service.migrate import migrate as run_migrations
 
@@ -69,7 +70,8 @@ def worker(
     try:
         run_worker(settings, name, follow_stdin)
     except WorkerRunningError as error:
-        raise typer.BadParameter(str(error)) from error
+        Console(stderr=True).print(f"[red]worker refused:[/] {error}")
+        raise typer.Exit(exits.REFUSED) from error
 
 
 @app.command()

@@ -4,20 +4,24 @@ Jobs are rows of the same SQLite file, so enqueueing is part of the caller's tra
 here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs.
 """
 
+import contextlib
 import logging
+import secrets
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
+from dbos._error import DBOSQueueDeduplicatedError  # its public home names it in a docstring only
 from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
+from service.store import engine_jobs
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
-TRAIN_QUEUE, ESTIMATE_QUEUE, HOUSEKEEPING_QUEUE = "train", "estimate", "housekeeping"
-DELIVER_QUEUE = "deliver"
+TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
+_UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
 # Of the engine's tables those that nothing works without.
 ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
@@ -44,20 +48,49 @@ class JobQueue:
             training_id,
         )
 
-    def enqueue_estimate(self, session: Session, camera_id: str) -> None:
-        """Queue a look at a camera's new tracks; at most one of a camera runs at once."""
+    def requeue_training(self, session: Session, camera_id: str, training_id: str) -> bool:
+        """Queue a training again whose job has failed or is gone; False where it is under way."""
+        known = engine_jobs.statuses(session, f"train-{training_id}")
+        if any(status in _UNDER_WAY for status in known):
+            return False
         self._enqueue(
             session,
             {
-                "workflow_name": ESTIMATE_JOB,
-                "queue_name": ESTIMATE_QUEUE,
+                "workflow_name": TRAIN_JOB,
+                "queue_name": TRAIN_QUEUE,
+                "workflow_id": f"train-{training_id}-again-{secrets.token_hex(4)}",
                 "queue_partition_key": camera_id,
             },
-            camera_id,
+            training_id,
         )
+        return True
+
+    def enqueue_estimate(self, session: Session, camera_id: str) -> None:
+        """Queue a look at a camera's new tracks, unless one waits or runs already.
+
+        While one runs, the camera's mark "due" stays: the next round of the upkeep sees it.
+        """
+        options: EnqueueOptions = {
+            "workflow_name": ESTIMATE_JOB,
+            "queue_name": ESTIMATE_QUEUE,
+            "deduplication_id": camera_id,
+        }
+        # On SQLite a refused insert leaves the caller's transaction as it was; another database
+        # would need a savepoint around it.
+        with contextlib.suppress(DBOSQueueDeduplicatedError):
+            self._enqueue(session, options, camera_id)
+
+    def cameras_under_way(self, session: Session) -> set[str]:
+        """The cameras for which an estimate job waits or runs."""
+        return engine_jobs.deduplicated(session, ESTIMATE_QUEUE)
 
     def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
-        """Queue the sending of what a webhook is due; at most one of a webhook runs at once."""
+        """Queue the sending of what a webhook is due, unless a job waits to start that does.
+
+        At most one of a webhook runs at once.
+        """
+        if engine_jobs.waits(session, DELIVER_QUEUE, webhook_id):
+            return
         self._enqueue(
             session,
             {

@@ -15,6 +15,7 @@ from service.access.tokens import count_tokens
 from service.app import create_app
 from service.connections import ConnectionGuard, protocol_factory
 from service.data_dir import StartError, held_alone, make_private
+from service.jobs import exits
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -56,7 +57,11 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
             timeout_graceful_shutdown=3,
         )
         server = uvicorn.Server(config)
-        with local_workers(settings):
+
+        def give_up() -> None:
+            server.should_exit = True
+
+        with local_workers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             # So long waits each step of the loop for threads that compute.
@@ -66,6 +71,8 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
                 signal.signal(number, lambda *_: None)
             server.run(sockets=[listener])
     log.info("stopped")
+    if workers.refused:
+        raise SystemExit(exits.REFUSED)
 
 
 def _require_way_in(settings: Settings) -> None:

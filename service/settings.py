@@ -58,7 +58,10 @@ class Settings(BaseSettings):
     )
     seed: int = Field(0, ge=0, description="seed of trainings and bootstraps")
     trainings_at_once: int = Field(1, ge=1, description="over all workers")
-    training_threads: int = Field(1, ge=1, description="CPU threads of a worker process")
+    training_nice: int = Field(
+        19, ge=0, le=19, description="how much a training yields to all else; 0: not at all"
+    )
+    training_threads: int = Field(1, ge=1, description="CPU threads of a training")
 
     window_tracks: int = Field(400, ge=5, description="newest tracks that an estimate uses")
     window_days: float = Field(
@@ -108,10 +111,10 @@ class Settings(BaseSettings):
     )
 
     keep_days: float = Field(30.0, gt=0, description="days from a track's arrival to its deletion")
-    keep_tracks: int = Field(20_000, ge=5, description="tracks kept of a camera: the last to come")
-    keep_mb: float = Field(
-        200.0, gt=0, description="MB of tracks kept for each camera: 10 kB for each of keep_tracks"
+    keep_tracks: int = Field(
+        20_000, ge=5, description="tracks kept of a camera: the last to arrive"
     )
+    keep_mb: float = Field(200.0, ge=0, description="MiB of tracks kept for a camera; 0: any")
     keep_estimates: int = Field(20_000, ge=1, description="history kept for each camera")
     keep_activity_days: float = Field(
         1825.0, ge=30, description="age at which entries of the log of what was done are deleted"
@@ -181,6 +184,24 @@ class Settings(BaseSettings):
     )
 
     reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
+    estimate_rest: float = Field(
+        1.0, ge=0, le=60, description="a camera rests so many times as long as its last look took"
+    )
+    stale_after_s: float = Field(
+        600.0, gt=1, description="tracks that wait for longer make their camera's alert `stale`"
+    )
+    stale_failures: int = Field(3, ge=1, description="and so many looks in a row that fail")
+    estimate_limit_s: float = Field(
+        600.0, gt=1, description="a look at a camera that takes longer hangs: its worker is ended"
+    )
+    delivery_limit_s: float = Field(300.0, gt=60, description="the same of a delivery job")
+    upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a round of the upkeep")
+    training_limit_s: float = Field(
+        21_600.0, gt=1, description="a training that takes longer has failed"
+    )
+    worker_max_mb: int = Field(
+        1_500, ge=50, description="a worker that grows beyond ends its jobs and is started anew"
+    )
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
     @field_validator("secret_key")

@@ -13,7 +13,8 @@ ROOT = Path(__file__).parent.parent
 SERVICE_ROOMS = [
     {"data_dir", "process"},
     {"settings", "errors", "logs"},
-    {"formats", "store", "job_queue", "delivery", "reach"},
+    {"formats", "store", "delivery", "reach"},
+    {"job_queue"},
     {"recalibration"},
     {"access"},
     {"backup", "schemas", "jobs", "web"},
@@ -93,7 +94,7 @@ def test_only_routes_and_the_application_see_schemas():
 def test_only_one_module_knows_the_engine_outside_the_worker():
     for path in sources("service"):
         if any(name.split(".")[0] == "dbos" for name in imports(path)):
-            assert path.name in ("job_queue.py", "worker.py"), path
+            assert path.name in ("job_queue.py", "engine.py"), path
 
 
 def test_torch_stays_in_its_rooms():
@@ -112,7 +113,7 @@ def test_files_stay_small():
 
 def test_the_http_process_imports_no_torch():
     program = (
-        "import sys; import service.serve, service.app; "
+        "import sys; import service.serve, service.app, service.local_workers; "
         "print(sorted({'torch', 'cv2', 'matplotlib', 'scipy'} & set(sys.modules)))"
     )
     output = subprocess.run(

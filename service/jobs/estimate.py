@@ -1,40 +1,72 @@
 """The estimate job: new tracks to predictions, a reference, a stored estimate."""
 
 import logging
+import time
+from dataclasses import replace
 
 from service.jobs.context import JobContext
 from service.jobs.predictions import predict_pending
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
 from service.recalibration.growth import grow, keep_growth, take_growth
+from service.recalibration.lacks import Lacks
 from service.recalibration.learning import keep_reference, learn_period, take_period
-from service.recalibration.looking import begin_look, end_look
+from service.recalibration.looking import (
+    begin_look,
+    end_look,
+    fail_look,
+    leave_poisoned,
+    note_lacks,
+)
 
 log = logging.getLogger("surefoot.jobs")
+
+_GROWTH_RESTS_S = 3600.0
 
 
 def run_estimate(context: JobContext, camera_id: str) -> None:
     """Bring a camera's reference and estimate up to date with its tracks.
 
-    The mark "due" is taken off first: tracks that arrive from then on queue a job of their own.
-    No transaction is open while anything is computed.
+    What fails beside the served estimate is said and stops nothing. Where that itself fails, the
+    camera rests, longer each time, and the failure is told; others are not held up.
     """
-    store, settings = context.store, context.settings
-    with store.write() as session:
+    with context.store.write() as session:
+        if leave_poisoned(session, camera_id):
+            log.warning("estimate_postponed", extra={"camera_id": camera_id})
+            return
+        # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
         newest_pk = begin_look(session, camera_id)
-    predict_pending(context, camera_id)
+    try:
+        _look(context, camera_id, newest_pk)
+    except Exception as error:
+        with context.store.write() as session:
+            fail_look(session, camera_id, repr(error))
+        raise
+
+
+def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
+    """Look at all tracks up to one. No transaction is open while anything is computed."""
+    store, settings = context.store, context.settings
+    begun_s, lacks = time.monotonic(), Lacks(camera_id)
+    missing = predict_pending(context, camera_id)
+    if missing:
+        lacks.add("averaged estimate", missing)
     learn_if_due(context, camera_id)
     with store.read() as session:
         evidence = gather(session, settings, camera_id)
     finding = None if evidence is None else weigh(evidence, settings.seed)
+    if finding is not None:
+        finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
     with store.write() as session:
         if evidence is not None and finding is not None:
             record = store_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
-        end_look(session, camera_id, newest_pk)
-    grow_if_due(context, camera_id)
+        said = lacks.said if finding is None else finding.lacks
+        rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
+        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks="; ".join(said) or None)
+    _grow_unless_failed(context, camera_id)
 
 
 def learn_if_due(context: JobContext, camera_id: str) -> None:
@@ -67,3 +99,15 @@ def grow_if_due(context: JobContext, camera_id: str) -> None:
     if grown:
         fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
         log.info("flow_map_grown", extra=fields)
+
+
+def _grow_unless_failed(context: JobContext, camera_id: str) -> None:
+    """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
+    if time.monotonic() < context.no_growth_before_s.get(camera_id, 0.0):
+        return
+    lacks = Lacks(camera_id)
+    lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id))
+    if lacks.said:
+        context.no_growth_before_s[camera_id] = time.monotonic() + _GROWTH_RESTS_S
+        with context.store.write() as session:
+            note_lacks(session, camera_id, lacks.said)

@@ -1,14 +1,44 @@
-"""The periodic job of every few seconds: reconcile."""
+"""The rounds of the upkeep that come often: sweep twice a second, reconcile every few."""
 
 import logging
+import time
+from datetime import timedelta
 
 from service.jobs.context import JobContext
 from service.recalibration import deliveries, upkeep
+from service.recalibration.staleness import StaleWatch
 
 log = logging.getLogger("surefoot.jobs")
+_JUMP_S = 2.0
 
 
-def run_reconcile(context: JobContext) -> None:
+class ClockWatch:
+    """Sees that the clock was set back, and has what waits for a time wait no longer for it."""
+
+    def __init__(self) -> None:
+        self._ahead_s = time.time() - time.monotonic()
+
+    def look(self, context: JobContext) -> None:
+        """Compare the clock with the monotonic one, that nobody sets."""
+        ahead_s = time.time() - time.monotonic()
+        back_s, self._ahead_s = self._ahead_s - ahead_s, ahead_s
+        if back_s < _JUMP_S:
+            return
+        with context.store.write() as session:
+            moved = deliveries.follow_clock(session, timedelta(seconds=back_s))
+        log.warning("clock_set_back", extra={"by_s": round(back_s), "deliveries": moved})
+
+
+def run_sweep(context: JobContext) -> None:
+    """Queue a look at cameras that were posted to while they were looked at, or rested."""
+    with context.store.read() as session:
+        overlooked = upkeep.overlooked(session, context.queue)
+    if overlooked:
+        with context.store.write() as session:
+            upkeep.queue_overlooked(session, context.queue, overlooked)
+
+
+def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
     """Enqueue what the store says should be under way; a lost nudge costs seconds."""
     with context.store.read() as session:
         ids = upkeep.camera_ids(session)
@@ -24,3 +54,6 @@ def run_reconcile(context: JobContext) -> None:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
     with context.store.write() as session:
         upkeep.reconcile_alerts(session)
+        changed = stale.watch(session, context.settings)
+    for camera_id, change in changed.items():
+        log.warning("stale", extra={"camera_id": camera_id, "alert": change})

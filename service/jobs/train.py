@@ -1,25 +1,23 @@
-"""The training job: minutes of CPU, no transaction open, published in one at its end."""
+"""The training job: minutes of CPU elsewhere, no transaction open, published in one at its end."""
 
 import logging
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import asdict
 
 from models.errors import CalibrationError
-from models.regression.checkpoint import save_weights
-from models.regression.training import TrainingProgress, check_held_out, train
 from service.jobs.context import JobContext
+from service.jobs.training_child import Progress, Trained, TrainingDiedError, train_apart
 from service.recalibration.trainings import (
     TrainingAttempt,
     begin_training,
     end_training,
+    is_wanted,
     publish_model,
     report_progress,
 )
 
 log = logging.getLogger("surefoot.jobs")
-_REPORT_EVERY_S = 0.5
+_TRIES = 3  # of processes that die: by a lack of memory, say
 
 
 class TrainingStoppedError(Exception):
@@ -28,21 +26,38 @@ class TrainingStoppedError(Exception):
 
 def run_training(context: JobContext, training_id: str) -> None:
     """Carry out a queued training. Harmless when run twice: an ended training is left alone."""
-    with context.store.write() as session:
-        attempt = begin_training(session, context.settings, training_id)
-    if attempt is None:
-        return
-    fields = {"camera_id": attempt.camera_id, "job_id": training_id, "attempt": attempt.attempt}
+    for left in reversed(range(_TRIES)):
+        with context.store.write() as session:
+            attempt = begin_training(session, context.settings, training_id)
+        if attempt is None:
+            return
+        try:
+            _carry_out(context, attempt)
+            return
+        except TrainingDiedError as error:
+            fields = {"camera_id": attempt.camera_id, "job_id": training_id, "why": str(error)}
+            log.error("training_died", extra=fields)
+            if not left:
+                with context.store.write() as session:
+                    end_training(session, attempt, "failed", str(error))
+
+
+def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
+    fields = {
+        "camera_id": attempt.camera_id,
+        "job_id": attempt.training_id,
+        "attempt": attempt.attempt,
+    }
     log.info("training_started", extra=fields)
     try:
-        network, metrics = train(attempt.plan, _reporter(context, attempt))
-        check_held_out(metrics)
-        digest = save_weights(network, context.settings.weights_dir)
+        trained = _train(context, attempt)
     except TrainingStoppedError:
         log.info("training_cancelled", extra=fields)
         with context.store.write() as session:
             end_training(session, attempt, "cancelled")
         return
+    except TrainingDiedError:
+        raise
     except Exception as error:
         foreseen = isinstance(error, CalibrationError)
         log.log(
@@ -56,29 +71,46 @@ def run_training(context: JobContext, training_id: str) -> None:
         return
     with context.store.write() as session:
         publish_model(
-            session, context.queue, attempt, weights_sha256=digest, metrics=asdict(metrics)
+            session,
+            context.queue,
+            attempt,
+            weights_sha256=trained.weights_sha256,
+            metrics=trained.metrics,
         )
     log.info("training_ended", extra=fields)
 
 
-def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[TrainingProgress], None]:
-    """A callback that writes progress twice a second and ends a training that is to stop."""
-    reported_at = 0.0
+class _ParkedError(Exception):
+    """The worker is about to end, and the training with it."""
 
-    def report(progress: TrainingProgress) -> None:
-        nonlocal reported_at
+
+def _train(context: JobContext, attempt: TrainingAttempt) -> Trained:
+    try:
+        return train_apart(attempt.plan, context.settings, _reporter(context, attempt))
+    except _ParkedError:
+        # Coming back from here would end the job as done; left where it is, the engine runs it
+        # again at the next start.
+        threading.Event().wait()
+        raise
+
+
+def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[Progress | None], None]:
+    """A callback that writes progress and ends a training that is to stop."""
+    written: Progress | None = None
+
+    def report(progress: Progress | None) -> None:
+        nonlocal written
         if context.stopping.is_set():
-            # The process is about to end. Coming back from here would end the job as done; left
-            # where it is, the engine runs it again at the next start.
-            threading.Event().wait()
-        now = time.monotonic()
-        if now - reported_at < _REPORT_EVERY_S:
-            return
-        reported_at = now
-        with context.store.write() as session:
-            goes_on = report_progress(
-                session, attempt, progress.step, progress.steps, progress.loss, progress.eta_s
-            )
+            raise _ParkedError
+        if progress is None or progress == written:
+            with context.store.read() as session:
+                goes_on = is_wanted(session, attempt)
+        else:
+            written = progress
+            with context.store.write() as session:
+                goes_on = report_progress(
+                    session, attempt, progress.step, progress.steps, progress.loss, progress.eta_s
+                )
         if not goes_on:
             raise TrainingStoppedError(attempt.training_id)
 

@@ -1,4 +1,4 @@
-"""The worker process: runs the engine's jobs until it is told to stop."""
+"""The worker process: runs the engine's jobs until it is told to stop, or should start anew."""
 
 import fcntl
 import logging
@@ -6,42 +6,27 @@ import os
 import signal
 import sys
 import threading
-from datetime import datetime, timedelta
-from typing import Any
+import time
 
-import torch
-from dbos import DBOS
-from dbos._recovery import recover_pending_workflows  # private; pinned, see take_over
+from sqlalchemy.exc import SQLAlchemyError
 
-from service.job_queue import (
-    DELIVER_JOB,
-    DELIVER_QUEUE,
-    ESTIMATE_JOB,
-    ESTIMATE_QUEUE,
-    HOUSEKEEPING_QUEUE,
-    TRAIN_JOB,
-    TRAIN_QUEUE,
-    JobQueue,
-    engine_config,
-)
+from service.errors import OverloadedError
+from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
+from service.jobs import engine, exits
 from service.jobs.context import JobContext
-from service.jobs.deliver import run_deliver
-from service.jobs.estimate import run_estimate
-from service.jobs.housekeeping import run_reconcile
-from service.jobs.retention import run_retention
-from service.jobs.rhythms import run_rhythms
-from service.jobs.train import run_training
-from service.recalibration import upkeep
+from service.jobs.in_hand import InHand
+from service.jobs.memory import give_back, resident_mb, settle_allocator
+from service.jobs.pulse import BEAT_S, start_pulse
+from service.jobs.rounds import UPKEEP, start_rounds
+from service.recalibration.workforce import Watch, heartbeat, register_worker
 from service.settings import Settings
 from service.store.database import Store
 
 log = logging.getLogger("surefoot.worker")
 
-_HEARTBEAT_S = 2.0
-_POLL_S = 0.2
-_KEEP_FINISHED = timedelta(hours=1)
-_ESTIMATES_AT_ONCE = 2
-_DELIVERIES_AT_ONCE = 16  # they wait for other machines most of the time
+_TRIM_EVERY_S = 30.0
+# A training in hand would start over: the ceiling waits for its end, up to here.
+_CEILING_IN_TRAINING = 1.5
 
 
 class WorkerRunningError(RuntimeError):
@@ -61,130 +46,85 @@ def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         raise WorkerRunningError(f"name: worker {name!r} is running already") from error
-    torch.set_num_threads(settings.training_threads)
+    settle_allocator()
     store = Store(settings)
-    context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
+    context = JobContext(
+        settings=settings,
+        store=store,
+        queue=JobQueue(store.engine),
+        in_hand=InHand(limits_s=_limits_s(settings)),
+    )
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: context.stopping.set())
     if follow_stdin:
         threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
-    _launch(context, name)
+    start_pulse(context, tells=follow_stdin)
+    with store.write() as session:
+        register_worker(session, name, os.getpid())
+    engine.launch(context, name)
+    start_rounds(context)
     log.info("worker_started", extra={"worker": name, "pid": os.getpid()})
-    while not context.stopping.wait(_HEARTBEAT_S):
-        with store.write() as session:
-            upkeep.heartbeat(session, name, os.getpid())
-            lost = upkeep.take_lost_workers(session, settings)
-        if lost:
-            _take_over(lost)
+    status = _mind(context, name)
     log.info("worker_stopping", extra={"worker": name})
-    DBOS.destroy(workflow_completion_timeout_sec=0)
+    if status == 0:
+        engine.stop(0.0).join(BEAT_S)
     # A training in hand is parked, not ended (see jobs/train.py); its thread is not waited for.
     logging.shutdown()
-    os._exit(0)
+    os._exit(status)
 
 
-def _launch(context: JobContext, name: str) -> None:
-    settings = context.settings
-    DBOS(config=engine_config(settings, name))
-
-    @DBOS.workflow(name=TRAIN_JOB)
-    def train(training_id: str) -> None:
-        _guarded(run_training, context, training_id)
-
-    @DBOS.workflow(name=ESTIMATE_JOB)
-    def estimate(camera_id: str) -> None:
-        _guarded(run_estimate, context, camera_id)
-
-    @DBOS.workflow(name=DELIVER_JOB)
-    def deliver(webhook_id: str) -> None:
-        _guarded(run_deliver, context, webhook_id)
-
-    @DBOS.workflow(name="reconcile")
-    def reconcile(at: datetime, _: Any) -> None:
-        _guarded(run_reconcile, context)
-
-    @DBOS.workflow(name="retention")
-    def retention(at: datetime, _: Any) -> None:
-        _guarded(run_rhythms, context)
-        _guarded(run_retention, context)
-        _forget_finished()
-
-    DBOS.launch()
-    with context.store.write() as session:
-        upkeep.heartbeat(session, name, os.getpid())
-    DBOS.register_queue(
-        TRAIN_QUEUE,
-        partition_concurrency=1,
-        global_concurrency=settings.trainings_at_once,
-        polling_interval_sec=_POLL_S,
-        on_conflict="always_update",
-    )
-    DBOS.register_queue(
-        ESTIMATE_QUEUE,
-        partition_concurrency=1,
-        worker_concurrency=_ESTIMATES_AT_ONCE,
-        polling_interval_sec=_POLL_S,
-        on_conflict="always_update",
-    )
-    DBOS.register_queue(
-        DELIVER_QUEUE,
-        partition_concurrency=1,
-        worker_concurrency=_DELIVERIES_AT_ONCE,
-        polling_interval_sec=_POLL_S,
-        on_conflict="always_update",
-    )
-    DBOS.register_queue(HOUSEKEEPING_QUEUE, global_concurrency=1, on_conflict="always_update")
-    DBOS.apply_schedules(
-        [
-            {
-                "schedule_name": "reconcile",
-                "workflow_fn": reconcile,
-                "schedule": f"*/{settings.reconcile_s} * * * * *",
-                "queue_name": HOUSEKEEPING_QUEUE,
-            },
-            {
-                "schedule_name": "retention",
-                "workflow_fn": retention,
-                "schedule": "17 7 * * * *",
-                "queue_name": HOUSEKEEPING_QUEUE,
-            },
-        ]
-    )
+def _mind(context: JobContext, name: str) -> int:
+    """Beat, take over from lost workers, keep below the ceiling; returns the exit status."""
+    watch, settings = Watch(), context.settings
+    trimmed_s, draining = time.monotonic(), None
+    while not context.stopping.wait(BEAT_S):
+        try:
+            with context.store.write() as session:
+                alive = heartbeat(session, name, os.getpid())
+                lost = watch.take_lost(session, settings.worker_lost_s) if alive else []
+            if not alive:
+                log.error("worker_given_up", extra={"worker": name})
+                return exits.GIVEN_UP
+            if lost and draining is None:
+                engine.take_over(lost)
+        except (
+            SQLAlchemyError,
+            OverloadedError,
+        ) as error:  # a full disk, say: the store's trouble, not ours
+            log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
+        if draining is not None:
+            # A training beyond its own ceiling is not waited for: it would be minutes.
+            if not draining.is_alive() or not context.in_hand.of_kind(ESTIMATE_JOB, DELIVER_JOB):
+                return exits.FULL
+            continue
+        if time.monotonic() - trimmed_s > _TRIM_EVERY_S:
+            give_back()
+            trimmed_s = time.monotonic()
+        if _is_full(context):
+            fields = {"resident_mb": round(resident_mb()), "limit_mb": settings.worker_max_mb}
+            log.warning("worker_full", extra={"worker": name, **fields})
+            draining = engine.stop(settings.estimate_limit_s)
+    return 0
 
 
-def _guarded(job: Any, context: JobContext, *args: str) -> None:
-    """Run a job; what it did not foresee is logged, and the reconcile finds the work again."""
-    try:
-        job(context, *args)
-    except Exception:
-        log.exception("job_failed", extra={"job": job.__name__, "arguments": args})
-        raise
+def _is_full(context: JobContext) -> bool:
+    """Whether a worker has grown beyond its ceiling, after all that is free was given back."""
+    limit_mb: float = context.settings.worker_max_mb
+    if context.in_hand.of_kind(TRAIN_JOB):
+        limit_mb *= _CEILING_IN_TRAINING
+    if resident_mb() <= limit_mb:
+        return False
+    give_back()
+    return resident_mb() > limit_mb
 
 
-def _take_over(lost: list[str]) -> None:
-    """Give the unfinished jobs of lost workers back to the queue.
-
-    The engine offers this only with its paid conductor; the call is private, so the version is
-    pinned and `tests/service/test_workers.py` kills a worker to try it.
-    """
-    from dbos._dbos import _get_dbos_instance
-
-    log.warning("workers_lost", extra={"workers": lost})
-    recover_pending_workflows(_get_dbos_instance(), lost)
-
-
-def _forget_finished() -> None:
-    """Delete the engine's rows of jobs that ended a while ago."""
-    before = (datetime.now().astimezone() - _KEEP_FINISHED).isoformat()
-    ended = DBOS.list_workflows(
-        status=["SUCCESS", "ERROR", "CANCELLED"],
-        end_time=before,
-        limit=5000,
-        load_input=False,
-        load_output=False,
-    )
-    if ended:
-        DBOS.delete_workflows([workflow.workflow_id for workflow in ended])
+def _limits_s(settings: Settings) -> dict[str, float]:
+    """How long a task of each kind may take; trainings mind their time themselves."""
+    return {
+        ESTIMATE_JOB: settings.estimate_limit_s,
+        DELIVER_JOB: settings.delivery_limit_s,
+        UPKEEP: settings.upkeep_limit_s,
+    }
 
 
 def _stop_at_end_of_stdin(context: JobContext) -> None:

@@ -38,7 +38,8 @@ def open_alert(
     What a reference doubts does not overwrite what estimates have found; they take over its alert.
     """
     now = datetime.now(UTC)
-    if maintenance.under_way(session, camera_id, now) is not None:
+    attended = maintenance.under_way(session, camera_id, now) is not None
+    if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
     if record is not None:

@@ -152,6 +152,19 @@ def reconcile_webhook(session: Session, queue: JobQueue, webhook_id: str) -> Non
         wake(session, queue, webhook, datetime.now(UTC))
 
 
+def follow_clock(session: Session, set_back_by: timedelta) -> int:
+    """Bring forward what waits for a time, after the clock was set back; returns how many."""
+    now = datetime.now(UTC)
+    waiting = webhooks.waiting(session, now)
+    for delivery in waiting:
+        assert delivery.next_attempt_at is not None
+        delivery.next_attempt_at -= set_back_by
+    for webhook in webhooks.enabled(session):
+        if webhook.held_until is not None:
+            webhook.held_until -= set_back_by
+    return len(waiting)
+
+
 def _is_open(webhook: WebhookRecord, now: datetime) -> bool:
     held = webhook.held_until is not None and webhook.held_until > now
     return webhook.enabled and not held
@@ -161,7 +174,8 @@ def _needs_refresh(settings: Settings, webhook: WebhookRecord, now: datetime) ->
     if webhook.format != "alertmanager":
         return False
     every = timedelta(seconds=settings.alertmanager_refresh_s)
-    return webhook.refreshed_at is None or now - webhook.refreshed_at >= every
+    # Either way: one of the future was before the clock was set back.
+    return webhook.refreshed_at is None or abs(now - webhook.refreshed_at) >= every
 
 
 def _has_refresh(

@@ -121,7 +121,7 @@ def _judge(
     if not set(NUMBERS) <= set(drift.told):
         words.append(finding.joint.reason)
     words.append(reference.doubt)
-    record.reason = "; ".join(word for word in words if word)
+    record.reason = "; ".join(word for word in (*words, *finding.lacks) if word)
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.number == CLOCK:
         clock = describe_reading(reading)
@@ -222,7 +222,8 @@ def _record(
         from_s=min(track.started_s for track in finding.tracks),
         to_s=finding.tracks[-1].ended_s,
         newest_track_pk=finding.newest_pk,
-        created_at=datetime.now(UTC),
+        # A clock that was set back must not make it older than the reference that it was held to.
+        created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
     )
 
 

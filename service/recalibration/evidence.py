@@ -1,8 +1,8 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -11,7 +11,6 @@ from models.drift.chart import RUN, DriftChart, Reading, read_chart
 from models.drift.chart_packing import chart_from_bytes
 from models.drift.party_scores import Usual, score_parties
 from models.drift.verdict import DriftLimits
-from models.errors import CheckpointError
 from models.estimation.averaged import (
     FEWEST_TRACKS,
     PoseEstimate,
@@ -31,6 +30,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import fired_by_estimate
 from service.recalibration.changes import change_among
+from service.recalibration.lacks import Lacks
 from service.recalibration.limits import drift_limits
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
 from service.recalibration.second_look import drift_of, look_again
@@ -44,8 +44,6 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
 )
-
-log = logging.getLogger("surefoot.recalibration")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +91,7 @@ class Finding:
     `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
     for it. `reading` is what the drift chart says of the tracks after the change, or of all where
     these are too few, long before a pose can say how far; None where there is no chart.
+    `lacks` names what should be there beside the served pose and failed.
     """
 
     joint: JointEstimate
@@ -102,6 +101,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    lacks: tuple[str, ...] = ()
 
     @property
     def newest_pk(self) -> int:
@@ -162,6 +162,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     lens, prior = evidence.intrinsics, evidence.prior
     seen, change, first = evidence.tracks, None, 0
     reading = earlier = None
+    lacks = Lacks(evidence.camera_id)
     if evidence.site is None:
         joint = joint_estimate(
             observations, prior, assumed_reference(observations, prior, evidence.walk)
@@ -169,21 +170,27 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         fused = by_speeds_alone(joint, prior)
     else:
         site = reference_from_bytes(evidence.site)
-        flow = None if evidence.flow is None else flow_from_bytes(evidence.flow)
-        chart = _chart_of(evidence)
+        flow, chart = _paths_of(evidence, lacks)
         ends_s = np.array([track.ended_s for track in seen])
         every = observations
-        found, observations, joint = change_among(every, ends_s, lens, prior, site, flow)
+        among = partial(change_among, every, ends_s, lens, prior, site)
+        changed = None if flow is None else lacks.unless_failed("flow_map", partial(among, flow))
+        if changed is None:
+            flow = None
+        found, observations, joint = changed or among(None)
         if found is not None:
             change = seen[found]
             seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
             first = len(evidence.tracks) - len(seen)
         if flow is not None and chart is not None:
-            reading = _read(evidence, every, flow, chart, first)
-        if flow is None:
-            fused = by_speeds_alone(joint, prior)
-        else:
-            fused = fused_estimate(observations, lens, prior, joint, flow)
+            reading = lacks.unless_failed(
+                "chart", partial(_read, evidence, every, flow, chart, first)
+            )
+        fused = by_speeds_alone(joint, prior)
+        if flow is not None:
+            by_map = partial(fused_estimate, observations, lens, prior, joint, flow)
+            found_by_map = lacks.unless_failed("flow_map", by_map)
+            fused, flow = (fused, None) if found_by_map is None else (found_by_map, flow)
         if asked_enough(evidence):
             earlier = look_again(
                 observations,
@@ -199,7 +206,7 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
     if len(predictions) >= FEWEST_TRACKS:
-        averaged = averaged_estimate(predictions, seed)
+        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
     return Finding(
         joint=joint,
         fused=fused,
@@ -208,21 +215,21 @@ def weigh(evidence: Evidence, seed: int) -> Finding | None:
         reading=reading,
         tracks=seen,
         change=change,
+        lacks=tuple(lacks.said),
     )
 
 
-def _chart_of(evidence: Evidence) -> DriftChart | None:
-    """The drift chart; None where there is none, or one of another release.
+def _paths_of(evidence: Evidence, lacks: Lacks) -> tuple[FlowReference | None, DriftChart | None]:
+    """The flow map and its chart, of which the pose needs neither; None where there is none.
 
-    The pose judges the camera until the next growth of the map brings a new one.
+    One of another release cannot be read: the next growth of the map brings new ones.
     """
-    if evidence.chart is None:
-        return None
-    try:
-        return chart_from_bytes(evidence.chart)
-    except CheckpointError as error:
-        log.warning("chart_unreadable", extra={"camera_id": evidence.camera_id, "why": str(error)})
-        return None
+    flow, chart = None, None
+    if evidence.flow is not None:
+        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+    if flow is not None and evidence.chart is not None:
+        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
+    return flow, chart
 
 
 def _read(

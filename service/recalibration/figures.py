@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from service.recalibration.camera_state import PoseState, Standing, standings
 from service.recalibration.outbox import is_silenced
 from service.settings import Settings
-from service.store import cameras, events, figures, webhooks
+from service.store import cameras, events, figures, unseen, webhooks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,13 +50,20 @@ class WebhookFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """Everything at one moment. Heartbeats are seconds since the Unix epoch."""
+    """Everything at one moment. Heartbeats are seconds since the Unix epoch.
+
+    `unseen_s` is the age of the oldest track of a camera that nothing has looked at, where there is
+    one; `failing` are the cameras whose last look failed.
+    """
 
     cameras: tuple[CameraFigures, ...]
     alerts: tuple[AlertFigures, ...]
     webhooks: tuple[WebhookFigures, ...]
     trainings: dict[str, int]
     heartbeats_s: dict[str, float]
+    worker_starts: dict[str, int]
+    unseen_s: dict[str, float]
+    failing: tuple[str, ...]
     queue_lag_s: float
     events: int
 
@@ -64,8 +71,11 @@ class Figures:
 def take_figures(session: Session, settings: Settings) -> Figures:
     """The figures now, by a dozen statements for all cameras."""
     now = datetime.now(UTC)
-    due = cameras.longest_due(session)
-    beats = figures.heartbeats(session).items()
+    unseen_s = {
+        camera_id: max((now - at).total_seconds(), 0.0)
+        for camera_id, (_, at) in unseen.since(session).items()
+    }
+    workers = figures.workers(session)
     return Figures(
         cameras=_cameras(standings(session, settings)),
         alerts=tuple(
@@ -80,8 +90,11 @@ def take_figures(session: Session, settings: Settings) -> Figures:
         ),
         webhooks=_webhooks(session, now),
         trainings=figures.trainings_by_state(session),
-        heartbeats_s={name: at.timestamp() for name, at in beats},
-        queue_lag_s=0.0 if due is None else max((now - due).total_seconds(), 0.0),
+        heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in workers},
+        worker_starts={worker.name: worker.starts for worker in workers},
+        unseen_s=unseen_s,
+        failing=tuple(camera.id for camera in cameras.failing(session)),
+        queue_lag_s=max(unseen_s.values(), default=0.0),
         events=events.newest_id(session),
     )
 

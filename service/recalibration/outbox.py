@@ -95,7 +95,8 @@ def add_delivery(
 def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetime) -> None:
     """Queue a delivery job of a webhook, unless one waits to start that covers this."""
     queued_at = webhook.job_queued_at
-    if webhook.enabled and (queued_at is None or now - queued_at > _JOB_LOST):
+    # Either way: a clock that was set back must not keep messages waiting for it.
+    if webhook.enabled and (queued_at is None or abs(now - queued_at) > _JOB_LOST):
         webhook.job_queued_at = now
         queue.enqueue_deliver(session, webhook.id)
 

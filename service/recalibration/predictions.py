@@ -44,3 +44,8 @@ def keep_predictions(session: Session, model_id: str, rows: Sequence[dict[str, A
     existing = tracks.existing(session, [row["track_pk"] for row in rows])
     if trainings.model_exists(session, model_id):
         tracks.add_predictions(session, [row for row in rows if row["track_pk"] in existing])
+
+
+def drop_model(session: Session, model_id: str) -> None:
+    """Take a model whose weights cannot be read out of use; the reconcile has another trained."""
+    trainings.delete_model(session, model_id)

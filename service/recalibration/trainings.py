@@ -15,6 +15,7 @@ from models.trajectory import choose_step_s
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
 from service.recalibration.activity import note
+from service.recalibration.looking import may_look
 from service.settings import Settings
 from service.store import cameras, events, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
@@ -140,7 +141,7 @@ def begin_training(
     if record is None or record.state not in trainings.UNFINISHED:
         return None
     if record.cancel_requested:
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
         return None
     camera = cameras.find(session, record.camera_id)
     assert camera is not None
@@ -183,12 +184,18 @@ def camera_step_s(session: Session, camera_id: str) -> float:
     return choose_step_s([trajectory_of(track) for track in newest])
 
 
+def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
+    """Whether a training is to go on: neither cancelled, deleted nor taken over."""
+    record = trainings.find(session, attempt.training_id)
+    return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
+
+
 def report_progress(
     session: Session, attempt: TrainingAttempt, step: int, steps: int, loss: float, eta_s: float
 ) -> bool:
     """Write how far a training is; False tells the worker to stop."""
     record = trainings.find(session, attempt.training_id)
-    if record is None or record.attempt != attempt.attempt or record.cancel_requested:
+    if record is None or not is_wanted(session, attempt):
         return False
     # Twenty events a training are enough for a progress bar.
     tells = steps > 0 and step * 20 // steps != record.step * 20 // steps
@@ -214,7 +221,7 @@ def publish_model(
     if record is None or record.attempt != attempt.attempt or record.state != "running":
         return
     if record.cancel_requested:
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
         return
     session.add(
         ModelRecord(
@@ -232,7 +239,7 @@ def publish_model(
     )
     record.metrics = metrics
     record.step, record.eta_s = record.steps, 0.0
-    _finish(session, record, "succeeded")
+    finish(session, record, "succeeded")
     request_estimate(session, queue, record.camera_id)
 
 
@@ -242,24 +249,30 @@ def end_training(
     """Mark this attempt as failed or cancelled; another attempt's record stays as it is."""
     record = trainings.find(session, attempt.training_id)
     if record is not None and record.attempt == attempt.attempt and record.state == "running":
-        _finish(session, record, state, error)
+        finish(session, record, state, error)
 
 
 def request_estimate(session: Session, queue: JobQueue, camera_id: str) -> None:
-    """Have a camera's tracks looked at; requests that wait already cover this one."""
+    """Have a camera's tracks looked at; requests that wait already cover this one.
+
+    One that rests, or is being looked at, is queued by the upkeep when its time has come.
+    """
     camera = cameras.find(session, camera_id)
     if camera is not None and camera.estimate_due_at is None:
-        camera.estimate_due_at = datetime.now(UTC)
-        queue.enqueue_estimate(session, camera_id)
+        now = datetime.now(UTC)
+        camera.estimate_due_at = now
+        if may_look(camera, now):
+            queue.enqueue_estimate(session, camera_id)
 
 
 def _stop(session: Session, record: TrainingRecord) -> None:
     record.cancel_requested = True
     if record.state == "queued":
-        _finish(session, record, "cancelled")
+        finish(session, record, "cancelled")
 
 
-def _finish(session: Session, record: TrainingRecord, state: str, error: str | None = None) -> None:
+def finish(session: Session, record: TrainingRecord, state: str, error: str | None = None) -> None:
+    """End a training, and tell of it."""
     record.state = state
     record.error = error
     record.finished_at = datetime.now(UTC)

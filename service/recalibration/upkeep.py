@@ -1,12 +1,14 @@
 """Level-triggered upkeep: what should be under way."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_empty_groups
+from service.recalibration.looking import may_look
+from service.recalibration.lost_trainings import requeue_lost
 from service.recalibration.maintenance import note_ends
 from service.recalibration.presence import watch_presence
 from service.recalibration.references import window_of
@@ -19,13 +21,11 @@ from service.store import (
     references,
     tracks,
     trainings,
-    workers,
 )
 from service.store.tables import CameraRecord
 
 # A model reads tracks at another step than its own, but less well the farther they are apart.
 _STEP_RATIO = 1.3
-_DUE_LOST_S = 30.0
 
 
 def reconcile_camera(
@@ -40,10 +40,9 @@ def reconcile_camera(
     if reason is not None:
         queue_training(session, queue, settings, camera_id)
         found.append(reason)
-    due = camera.estimate_due_at
-    lost = due is not None and datetime.now(UTC) - due > timedelta(seconds=_DUE_LOST_S)
-    if lost or (due is None and _is_behind(session, settings, camera)):
-        camera.estimate_due_at = None
+    if requeue_lost(session, queue, camera_id):
+        found.append("training without a job")
+    if camera.estimate_due_at is None and _is_behind(session, settings, camera):
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
     source = watch_sources(session, queue, settings, camera_id, datetime.now(UTC))
@@ -57,6 +56,25 @@ def reconcile_camera(
     return found
 
 
+def overlooked(session: Session, queue: JobQueue) -> list[str]:
+    """Cameras that are due and may be looked at, without a job that waits or runs.
+
+    They were posted to while they were looked at or rested, or the engine has lost their job.
+    """
+    now = datetime.now(UTC)
+    due = [camera.id for camera in cameras.due(session) if may_look(camera, now)]
+    if not due:
+        return []
+    under_way = queue.cameras_under_way(session)
+    return [camera_id for camera_id in due if camera_id not in under_way]
+
+
+def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
+    """Queue a look at each of some cameras; those first that have been due for longest."""
+    for camera_id in camera_ids:
+        queue.enqueue_estimate(session, camera_id)
+
+
 def reconcile_alerts(session: Session) -> None:
     """End silences that have come to their time, and groups whose cameras are gone."""
     end_silences(session)
@@ -66,21 +84,6 @@ def reconcile_alerts(session: Session) -> None:
 def camera_ids(session: Session) -> Sequence[str]:
     """The ids of all cameras."""
     return [camera.id for camera in cameras.every(session)]
-
-
-def heartbeat(session: Session, name: str, pid: int) -> None:
-    """Record that a worker is alive."""
-    workers.beat(session, name, pid, datetime.now(UTC))
-
-
-def take_lost_workers(session: Session, settings: Settings) -> list[str]:
-    """Names of workers that have fallen silent; each is named once."""
-    limit = datetime.now(UTC) - timedelta(seconds=settings.worker_lost_s)
-    lost = workers.silent_since(session, limit)
-    names = [worker.name for worker in lost]
-    for worker in lost:
-        session.delete(worker)
-    return names
 
 
 def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:

@@ -33,6 +33,7 @@ class FiguresCollector(Collector):
         """All metrics."""
         yield InfoMetricFamily("surefoot_build", "Version.", value={"version": version("surefoot")})
         yield from _of_cameras(self._figures)
+        yield from _of_looks(self._figures)
         yield from _of_alerts(self._figures)
         yield from _of_webhooks(self._figures)
         yield from _of_service(self._figures)
@@ -70,6 +71,23 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
         ["camera_id"],
         {(c.camera_id,): c.drift_height_m for c in figures.cameras if c.drift_height_m is not None},
     )
+
+
+def _of_looks(figures: Figures) -> Iterator[Metric]:
+    yield _gauge(
+        "surefoot_camera_oldest_unseen_track_seconds",
+        "Age of a camera's oldest track that nothing has looked at; 0: there is none.",
+        ["camera_id"],
+        {(c.camera_id,): figures.unseen_s.get(c.camera_id, 0.0) for c in figures.cameras},
+    )
+    yield _gauge(
+        "surefoot_camera_estimate_failing",
+        "1 for a camera whose last look failed.",
+        ["camera_id"],
+        {(c.camera_id,): c.camera_id in figures.failing for c in figures.cameras},
+    )
+    failing = "Cameras whose last look failed."
+    yield GaugeMetricFamily("surefoot_cameras_failing", failing, value=len(figures.failing))
 
 
 def _of_alerts(figures: Figures) -> Iterator[Metric]:
@@ -120,7 +138,15 @@ def _of_service(figures: Figures) -> Iterator[Metric]:
         ["worker"],
         {(name,): at_s for name, at_s in figures.heartbeats_s.items()},
     )
-    lag = "How long the tracks of the camera that waits longest have waited."
+    restarts = CounterMetricFamily(
+        "surefoot_worker_restarts",
+        "How often a worker has been started anew, by whoever minds it.",
+        labels=["worker"],
+    )
+    for name, starts in figures.worker_starts.items():
+        restarts.add_metric([name], max(starts - 1, 0))
+    yield restarts
+    lag = "Age of the oldest track that nothing has looked at, of all cameras."
     yield GaugeMetricFamily("surefoot_queue_lag_seconds", lag, value=figures.queue_lag_s)
     yield CounterMetricFamily("surefoot_events", "Events ever written.", value=figures.events)
 

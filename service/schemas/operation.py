@@ -14,13 +14,14 @@ class HealthOut(BaseModel):
 
 
 class ReadyOut(BaseModel):
-    """Whether the service can do its work."""
+    """Whether the service can do its work; some problems are named while it can."""
 
     status: Literal["ready", "not_ready"]
     store_writable: bool
     worker_alive: bool
     worker_silent_s: float | None
     queue_lag_s: float
+    failing_cameras: int
     problems: list[str]
 
     @classmethod
@@ -32,5 +33,6 @@ class ReadyOut(BaseModel):
             worker_alive=value.worker_alive,
             worker_silent_s=value.worker_silent_s,
             queue_lag_s=value.queue_lag_s,
+            failing_cameras=value.failing_cameras,
             problems=list(value.problems),
         )

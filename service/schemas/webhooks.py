@@ -9,7 +9,7 @@ from service.recalibration.webhooks import DeliveryView, SecretMade, WebhookView
 from service.schemas.base import Body
 from service.store.delivery_tables import WebhookRecord
 
-AlertKind = Literal["drift", "no_data", "out_of_range", "clock", "tracker"]
+AlertKind = Literal["drift", "no_data", "out_of_range", "clock", "stale", "tracker"]
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
 DeliveryState = Literal["pending", "delivered", "failed"]
 

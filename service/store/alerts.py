@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session, aliased
 from service.store.tables import AlertRecord
 
 POSE_KINDS = ("drift", "clock", "out_of_range")  # that hold a camera against its prior pose
+SERVICE_KINDS = ("stale",)  # about the service itself, whatever is done at the camera
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +38,19 @@ def firing(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
             AlertRecord.state == "firing",
         )
     ).first()
+
+
+def firing_cameras(session: Session, kind: str) -> set[str]:
+    """The cameras about which an alert of a kind is open."""
+    return set(
+        session.scalars(
+            select(AlertRecord.camera_id).where(
+                AlertRecord.kind == kind,
+                AlertRecord.state == "firing",
+                AlertRecord.camera_id.is_not(None),
+            )
+        )
+    )
 
 
 def newest(session: Session, camera_id: str, kind: str) -> AlertRecord | None:

@@ -1,7 +1,6 @@
 """Statements on cameras and their prior poses."""
 
 from collections.abc import Sequence
-from datetime import datetime
 
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
@@ -79,11 +78,19 @@ def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int
     return int(result.rowcount)  # type: ignore[attr-defined]
 
 
-def longest_due(session: Session) -> datetime | None:
-    """Since when the tracks of the camera that waits longest have waited."""
+def due(session: Session) -> Sequence[CameraRecord]:
+    """Cameras that are to be looked at, those first that have been due for longest."""
     return session.scalars(
-        select(CameraRecord.estimate_due_at)
+        select(CameraRecord)
         .where(CameraRecord.estimate_due_at.is_not(None))
-        .order_by(CameraRecord.estimate_due_at)
-        .limit(1)
-    ).first()
+        .order_by(CameraRecord.estimate_due_at, CameraRecord.id)
+    ).all()
+
+
+def failing(session: Session) -> Sequence[CameraRecord]:
+    """Cameras whose last look failed."""
+    return session.scalars(
+        select(CameraRecord)
+        .where(CameraRecord.estimate_failing_since.is_not(None))
+        .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
+    ).all()

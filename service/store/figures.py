@@ -16,9 +16,9 @@ from service.store.tables import (
     SiteReferenceRecord,
     TrackRecord,
     TrainingRecord,
-    WorkerRecord,
 )
 from service.store.tracks import of_counting_source
+from service.store.worker_tables import WorkerRecord
 
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None
@@ -74,10 +74,9 @@ def trainings_by_state(session: Session) -> dict[str, int]:
     return {state: count for state, count in rows}
 
 
-def heartbeats(session: Session) -> dict[str, datetime]:
-    """When each worker was last heard of."""
-    rows = session.execute(select(WorkerRecord.name, WorkerRecord.heartbeat_at))
-    return {name: at for name, at in rows}
+def workers(session: Session) -> Sequence[WorkerRecord]:
+    """All workers, those that are lost among them."""
+    return session.scalars(select(WorkerRecord).order_by(WorkerRecord.name)).all()
 
 
 def backlogs(session: Session) -> dict[str, Backlog]:

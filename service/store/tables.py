@@ -70,6 +70,9 @@ class CameraRecord(Record):
     """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
 
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
+    `estimate_tries` counts the looks since the last one that came to its end. If they fail,
+    `estimate_error` says why and `estimate_failing_since` since when. None is begun before
+    `estimate_after`. `estimate_lacks` names what failed beside the served estimate.
     """
 
     __tablename__ = "cameras"
@@ -90,6 +93,11 @@ class CameraRecord(Record):
     version: Mapped[int]
     estimate_due_at: Mapped[datetime | None]
     looked_at_pk: Mapped[int | None]
+    estimate_tries: Mapped[int] = mapped_column(default=0)
+    estimate_error: Mapped[str | None]
+    estimate_failing_since: Mapped[datetime | None]
+    estimate_after: Mapped[datetime | None]
+    estimate_lacks: Mapped[str | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
@@ -189,6 +197,7 @@ class TrackRecord(Record):
     __table_args__ = (
         UniqueConstraint("camera_id", "source", "track_id", "started_s"),
         Index(None, "camera_id", "ended_s", "source"),
+        Index(None, "camera_id", "id"),
         # What counts is counted without its points; when it came is the camera's rhythm.
         Index(None, "camera_id", "received_at", "ended_s", "source"),
     )
@@ -310,9 +319,9 @@ class AlertRecord(Record):
     """An alert; at most one of a camera and kind is firing.
 
     `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
-    rhythm, or a group. A group's alert has no camera but `camera_ids`, and its members have its id
-    as `group_id`; at most one of a `track_source` and kind is firing. `told` says whether an event
-    told of the alert by itself.
+    rhythm, the upkeep, or a group. A group's alert has no camera but `camera_ids`, and its members
+    have its id as `group_id`; at most one of a `track_source` and kind is firing. `told` says
+    whether an event told of the alert by itself.
     """
 
     __tablename__ = "alerts"
@@ -322,9 +331,9 @@ class AlertRecord(Record):
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
     group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
-    kind: Mapped[str]  # drift, no_data, out_of_range, clock, tracker
+    kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale, tracker
     state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference, rhythm, group, tracks
+    source: Mapped[str]  # estimate, reference, rhythm, upkeep, group, tracks
     told: Mapped[bool] = mapped_column(default=False)
     severity: Mapped[str]  # warning, critical
     reason: Mapped[str]
@@ -375,14 +384,3 @@ class EventRecord(Record):
     created_at: Mapped[datetime]
 
     __table_args__ = ({"sqlite_autoincrement": True},)  # an id is never given twice
-
-
-class WorkerRecord(Record):
-    """A worker process and when it was last heard of."""
-
-    __tablename__ = "workers"
-
-    name: Mapped[str] = mapped_column(primary_key=True)
-    pid: Mapped[int]
-    started_at: Mapped[datetime]
-    heartbeat_at: Mapped[datetime]

@@ -86,3 +86,10 @@ def weights_in_use(session: Session) -> set[str]:
 def model_exists(session: Session, model_id: str) -> bool:
     """Whether a model is still stored."""
     return session.get(ModelRecord, model_id) is not None
+
+
+def delete_model(session: Session, model_id: str) -> None:
+    """Delete a model and what it says of tracks."""
+    record = session.get(ModelRecord, model_id)
+    if record is not None:
+        session.delete(record)

@@ -96,6 +96,15 @@ def due(session: Session, now: datetime) -> set[str]:
     )
 
 
+def waiting(session: Session, now: datetime) -> Sequence[DeliveryRecord]:
+    """Deliveries whose next attempt is yet to come."""
+    return session.scalars(
+        select(DeliveryRecord).where(
+            DeliveryRecord.state == "pending", DeliveryRecord.next_attempt_at > now
+        )
+    ).all()
+
+
 def bring_forward(session: Session, webhook_id: str, now: datetime, refused: Sequence[int]) -> None:
     """Make due what waits on a webhook that answers again, but for what it itself refused."""
     session.execute(

@@ -19,6 +19,7 @@ KINDS = {
     "clock": "The clock looks wrong",
     "out_of_range": "Beyond the model's range",
     "no_data": "No people come",
+    "stale": "Its estimate is not being made",
     "tracker": "Another tracker posts",
 }
 OUTCOMES = {

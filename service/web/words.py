@@ -20,6 +20,8 @@ def situation(camera: FleetCamera, now: datetime) -> str:
     """What a camera does, in one line."""
     if camera.state == "drifting" and any(alert.kind == "clock" for alert in camera.alerts):
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+    if camera.alert is not None and camera.alert.kind == "stale":
+        return "its estimate is not being made: what was seen last may be long ago"
     if camera.state == "learning":
         return _learning(camera)
     if camera.state == "no_data":

@@ -11,7 +11,7 @@ from pathlib import Path
 from dbos import DBOS
 
 from service.job_queue import engine_config
-from service.jobs import worker
+from service.jobs import engine
 from service.settings import Settings
 
 settings = Settings(data_dir=Path(sys.argv[1]))
@@ -22,12 +22,13 @@ def noop():
     pass
 
 DBOS.launch()
-for _ in range(3):
+for _ in range(7):
     noop()
-worker._forget_finished()
+engine.forget_finished()
 print(len(DBOS.list_workflows()))
-worker._KEEP_FINISHED = timedelta(hours=-1)
-worker._forget_finished()
+engine._KEEP_FINISHED = timedelta(hours=-1)
+engine._FORGET_AT_ONCE = 3
+engine.forget_finished()
 print(len(DBOS.list_workflows()))
 DBOS.destroy()
 """
@@ -41,4 +42,4 @@ def test_jobs_that_ended_a_while_ago_are_forgotten(settings):
         check=False,
         timeout=60,
     )
-    assert done.stdout.split() == ["3", "0"], done.stderr
+    assert done.stdout.split() == ["7", "0"], done.stderr

@@ -11,7 +11,8 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families 
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.app import create_app
-from service.recalibration import alerts, upkeep
+from service.recalibration import alerts
+from service.recalibration.workforce import register_worker
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 
@@ -98,7 +99,7 @@ def test_alerts_workers_and_deliveries_in_figures(post_room):
     with post_room.store.write() as session:
         until = datetime.now(UTC) + timedelta(hours=1)
         alerts.show_alert(session, first).silenced_until = until
-        upkeep.heartbeat(session, "local-0", 1)
+        register_worker(session, "local-0", 1)
     labels = {"webhook_id": hook["id"], "webhook_name": 'the "pager"\\'}
     found = scrape(post_room.http)
     assert value(found, "surefoot_alert_silenced", camera_id="corner", kind="drift") == 1

@@ -10,7 +10,8 @@ import pytest
 import yaml
 from prometheus_client.parser import text_string_to_metric_families as families
 
-from service.recalibration import alerts, upkeep
+from service.recalibration import alerts
+from service.recalibration.workforce import register_worker
 from tests.service.bench import moved
 from tests.service.test_metrics import PROMTOOL, needs_promtool
 
@@ -39,7 +40,7 @@ def series(bench):
         bench.see(moved(tilt_deg=14.0))
     bench.http.post("/webhooks", json={"url": "http://1.1.1.1/"}).raise_for_status()
     with bench.store.write() as session:
-        upkeep.heartbeat(session, "local-0", 1)
+        register_worker(session, "local-0", 1)
         record = alerts.show_alert(session, bench.alerts()[0]["id"])
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
         alerts.show_alert(session, bench.alerts()[1]["id"]).group_id = record.id

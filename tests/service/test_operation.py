@@ -2,7 +2,7 @@ import os
 import sqlite3
 
 from service.job_queue import JobQueue
-from service.recalibration import upkeep
+from service.recalibration.workforce import register_worker
 from service.store.database import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
@@ -17,7 +17,7 @@ def test_ready_needs_a_worker(http, settings):
     assert body.status_code == 503
     assert "worker: none was ever heard of" in body.json()["problems"][0]
     with Store(settings).write() as session:
-        upkeep.heartbeat(session, "w", os.getpid())
+        register_worker(session, "w", os.getpid())
     body = http.get("/readyz")
     assert body.status_code == 200
     assert body.json()["status"] == "ready"

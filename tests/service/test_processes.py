@@ -12,6 +12,7 @@ import httpx
 import psutil
 import pytest
 
+from service.jobs import exits
 from tests.conftest import CAMERA, pid_exists, track, wait_for
 
 pytestmark = pytest.mark.slow
@@ -70,8 +71,9 @@ def test_the_http_process_holds_no_torch_and_little_memory(service):
     assert process.memory_info().rss < 200e6
     maps = [region.path for region in process.memory_maps()]
     assert not [path for path in maps if "torch" in path]
-    worker = psutil.Process(service.worker_pid())
-    assert [region for region in worker.memory_maps() if "torch" in region.path]
+    (training,) = wait_for(psutil.Process(service.worker_pid()).children)
+    wait_for(lambda: [region for region in training.memory_maps() if "torch" in region.path])
+    assert training.nice() == service.settings.training_nice
 
 
 def test_a_worker_killed_in_training_trains_again_and_once(service):
@@ -175,7 +177,7 @@ def test_two_workers_of_one_name_do_not_run_beside_each_other(service):
         timeout=60,
         check=False,
     )
-    assert second.returncode == 2
+    assert second.returncode == exits.REFUSED
     assert "running already" in second.stderr
 
 

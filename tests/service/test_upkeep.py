@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 
 import pytest
 
@@ -20,7 +19,7 @@ from service.recalibration.trainings import (
     report_progress,
     request_estimate,
 )
-from service.store import tracks, trainings, workers
+from service.store import tracks, trainings
 from service.store.database import Store
 from service.store.tables import CameraRecord
 from service.store.tracks import WindowBounds
@@ -35,6 +34,9 @@ class Recorder:
 
     def enqueue_training(self, session, camera_id, training_id):
         self.trainings.append(training_id)
+
+    def requeue_training(self, session, camera_id, training_id):
+        return False
 
     def enqueue_estimate(self, session, camera_id):
         self.estimates.append(camera_id)
@@ -161,18 +163,6 @@ def test_a_cancelled_training_publishes_nothing(session, settings):
     publish_model(session, Recorder(), attempt, weights_sha256="1" * 64, metrics={})
     assert trainings.find(session, attempt.training_id).state == "cancelled"
     assert trainings.newest_model(session, "corner") is None
-
-
-def test_a_lost_worker_is_named_once(session, settings):
-    upkeep.heartbeat(session, "w1", 1)
-    upkeep.heartbeat(session, "w2", 2)
-    session.flush()
-    lost = workers.silent_since(session, datetime.max.replace(tzinfo=UTC))
-    lost[0].heartbeat_at -= timedelta(seconds=settings.worker_lost_s + 5)
-    session.flush()
-    assert upkeep.take_lost_workers(session, settings) == ["w1"]
-    session.flush()
-    assert upkeep.take_lost_workers(session, settings) == []
 
 
 def test_the_window_is_the_newest_tracks_by_their_own_times(session):
