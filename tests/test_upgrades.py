@@ -58,6 +58,7 @@ CALLED = {
     "delivery_attempts": {"id": 1, "delivery_number": 1, "status_code": 204},
     "maintenance_windows": {"id": "n" * 32, "from_at": "2026-11-20 08:00:00"},
     "camera_rhythms": {"profile": None, "counts": '{"tracks": {}, "latest_s": {}}'},
+    "access_tokens": {"id": "some"},
     "snapshots": {"jpeg": b"a picture", "sha256": "0" * 64, "width": 1280, "height": 720},
     "activity": {"what": "camera.registered", "by": "Ada", "details": "{}"},
 }  # fmt: skip
