@@ -58,6 +58,9 @@ class Settings(BaseSettings):
     )
     seed: int = Field(0, ge=0, description="seed of trainings and bootstraps")
     trainings_at_once: int = Field(1, ge=1, description="over all workers")
+    worker_nice: int = Field(
+        5, ge=0, le=19, description="how far workers yield to the API on a busy machine"
+    )
     training_nice: int = Field(
         19, ge=0, le=19, description="how much a training yields to all else; 0: not at all"
     )

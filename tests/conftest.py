@@ -62,7 +62,9 @@ def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def settings(tmp_path: Path, migrated: Path) -> Settings:
     shutil.copytree(migrated, tmp_path / "data")
     # Beside other tests a training that yields as it should would hardly get on.
-    return Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1, training_nice=1)
+    # Beside other processes of a test run, who yields much hardly moves.
+    nice = {"worker_nice": 0, "training_nice": 1}
+    return Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1, **nice)
 
 
 def track(track_id: str, start_s: float = 1_700_000_000.0, count: int = 20) -> dict[str, Any]:

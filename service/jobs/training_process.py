@@ -4,7 +4,6 @@ The process knows no store. It reads its plan from stdin, tells its progress and
 stdout, a line of JSON each, and ends when stdin does: when its worker ends, in whatever way.
 """
 
-import contextlib
 import json
 import logging
 import os
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from service.jobs.memory import settle_allocator
+from service.jobs.niceness import yield_to_others
 from service.logs import configure_logs
 
 log = logging.getLogger("surefoot.jobs")
@@ -29,8 +29,7 @@ def main() -> None:
     order = json.loads(sys.stdin.buffer.readline())
     threading.Thread(target=_end_with_stdin, daemon=True).start()
     # Beside this, even the idle class would let a busy machine stop trainings for good.
-    with contextlib.suppress(OSError):
-        os.nice(order["nice"])
+    yield_to_others(order["nice"])
     settle_allocator()
     configure_logs()
     tells.write(json.dumps(_train(order, tells)) + "\n")

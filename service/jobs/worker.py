@@ -16,6 +16,7 @@ from service.jobs import engine, exits
 from service.jobs.context import JobContext
 from service.jobs.in_hand import InHand
 from service.jobs.memory import give_back, resident_mb, settle_allocator
+from service.jobs.niceness import yield_to_others
 from service.jobs.pulse import BEAT_S, start_pulse
 from service.jobs.rounds import UPKEEP, start_rounds
 from service.recalibration.workforce import Watch, heartbeat, register_worker
@@ -47,6 +48,7 @@ def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
     except OSError as error:
         raise WorkerRunningError(f"name: worker {name!r} is running already") from error
     settle_allocator()
+    yield_to_others(settings.worker_nice)
     store = Store(settings)
     context = JobContext(
         settings=settings,
