@@ -1,6 +1,7 @@
 """`surefoot serve`: the API and its local workers, one command."""
 
 import contextlib
+import gc
 import logging
 import os
 import signal
@@ -64,6 +65,10 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         with local_workers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # What was imported stays: to look through it for garbage again and again takes 0.1 s
+            # each time, in which nobody is answered.
+            gc.collect()
+            gc.freeze()
             # So long waits each step of the loop for threads that compute.
             sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
