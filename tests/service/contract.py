@@ -20,9 +20,10 @@ from PIL import Image
 from sqlalchemy import delete, select
 
 from service.formats.still import read_still
-from service.recalibration import cameras, trainings, upkeep, webhooks
+from service.recalibration import cameras, trainings, webhooks
 from service.recalibration.outbox import add_delivery
 from service.recalibration.webhooks import WebhookSpec
+from service.recalibration.workforce import register_worker
 from service.settings import Settings
 from service.store import cameras as stored_cameras
 from service.store import snapshots
@@ -129,7 +130,7 @@ class Ground:
         for kind in ("drift", "no_data", "clock"):
             self.fleet.knock("moved", kind=kind)
         with self.store.write() as session:
-            upkeep.heartbeat(session, "made-up", 1)
+            register_worker(session, "made-up", 1)
             window = session.get(MaintenanceRecord, "window-busy")
             if window is None:
                 window = MaintenanceRecord(

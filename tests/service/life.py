@@ -29,6 +29,7 @@ from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import Evidence, gather
 from service.recalibration.learning import LearnedReference, keep_reference, take_period
 from service.recalibration.looking import begin_look, end_look
+from service.recalibration.staleness import StaleWatch
 from service.recalibration.trainings import begin_training, end_training, publish_model
 from service.settings import Settings
 from service.store import tracks, trainings
@@ -82,6 +83,7 @@ class Life:
         self.store = Store(self.settings)
         self.queue = JobQueue(self.store.engine)
         self.context = JobContext(settings=self.settings, store=self.store, queue=self.queue)
+        self.stale = StaleWatch()
         self.http = TestClient(create_app(self.settings))
         self.http.__enter__()
 
@@ -177,7 +179,7 @@ class Life:
                 end_training(session, attempt, outcome, "it made no progress")
 
     def reconcile(self) -> None:
-        run_reconcile(self.context)
+        run_reconcile(self.context, self.stale)
 
     def retain(self) -> None:
         run_retention(self.context)

@@ -50,7 +50,20 @@ class PostRoom:
             alerts.end_alert(session, "corner", kind, "cleared")
 
     def send(self, hook: dict[str, Any]) -> None:
+        """Run the job that waits for a webhook."""
+        self.take(hook)
         run_deliver(self.context, hook["id"])
+
+    def take(self, hook: dict[str, Any]) -> None:
+        """Have the engine take up the job that waits for a webhook."""
+        with self.store.write() as session:
+            session.execute(
+                text(
+                    "UPDATE workflow_status SET status = 'PENDING' "
+                    "WHERE queue_name = 'deliver' AND queue_partition_key = :hook"
+                ),
+                {"hook": hook["id"]},
+            )
 
     def send_now(self, hook: dict[str, Any]) -> None:
         """The same when the time of everything that waits has come."""

@@ -10,6 +10,7 @@ from service.delivery.alertmanager import alert_name, postable_alerts
 from service.jobs.housekeeping import run_reconcile
 from service.recalibration import alerts
 from service.recalibration.outbox import alert_body
+from service.recalibration.staleness import StaleWatch
 from tests.service.conftest import problem
 from tests.service.receiver import receiver
 
@@ -135,7 +136,7 @@ def test_all_that_fires_is_told_again_without_a_row_in_the_log(post_room, inbox,
     assert post_room.awaited() == []
     post_room.change(manager, refreshed_at=datetime.now(UTC) - timedelta(seconds=61))
     before = len(post_room.jobs())
-    run_reconcile(post_room.context)
+    run_reconcile(post_room.context, StaleWatch())
     assert len(post_room.jobs()) == before + 1
     post_room.send(manager)
     again = checked(inbox.received[-1])

@@ -311,7 +311,7 @@ def test_the_commands_on_a_service_that_runs(service, tmp_path):
     def run(*words, code=0):
         ended = subprocess.run(
             [sys.executable, "-m", "service.cli", *words],
-            env=service.settings.as_environment(),
+            env={**service.settings.as_environment(), "COLUMNS": "300"},  # of its tables
             capture_output=True,
             text=True,
             check=False,

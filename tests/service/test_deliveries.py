@@ -15,6 +15,7 @@ from service.jobs.deliver import run_deliver
 from service.jobs.housekeeping import run_reconcile
 from service.jobs.retention import run_retention
 from service.recalibration.deliveries import next_attempt, record_attempt
+from service.recalibration.staleness import StaleWatch
 from service.settings import Settings
 from tests.service.receiver import receiver
 
@@ -64,7 +65,7 @@ def test_nothing_is_sent_before_its_time_and_the_reconcile_finds_it_then(post_ro
     assert len(inbox.received) == 1
     assert post_room.awaited() == []
     before = len(post_room.jobs())
-    run_reconcile(post_room.context)
+    run_reconcile(post_room.context, StaleWatch())
     assert len(post_room.jobs()) == before
     with post_room.store.write() as session:
         session.connection().exec_driver_sql(
@@ -72,11 +73,15 @@ def test_nothing_is_sent_before_its_time_and_the_reconcile_finds_it_then(post_ro
         )
     post_room.change(hook, held_until=None)
     assert post_room.awaited() == [hook["id"]]
-    run_reconcile(post_room.context)
-    run_reconcile(post_room.context)
+    run_reconcile(post_room.context, StaleWatch())
+    run_reconcile(post_room.context, StaleWatch())
     assert len(post_room.jobs()) == before + 1  # the first of them covers the second
     post_room.change(hook, job_queued_at=datetime.now(UTC) - timedelta(minutes=1))
-    run_reconcile(post_room.context)
+    run_reconcile(post_room.context, StaleWatch())
+    assert len(post_room.jobs()) == before + 1  # it waits, however long
+    post_room.take(hook)
+    post_room.change(hook, job_queued_at=datetime.now(UTC) - timedelta(minutes=1))
+    run_reconcile(post_room.context, StaleWatch())
     assert len(post_room.jobs()) == before + 2  # a job that was lost is queued again
 
 
