@@ -13,10 +13,11 @@ from typing import TextIO
 log = logging.getLogger("surefoot.data_dir")
 
 SERVE_LOCK, MIGRATE_LOCK, KEY_FILE = "serve.lock", "migrate.lock", "secret.key"
+ROUNDS_LOCK = "rounds.lock"  # of the worker that does the upkeep, which has one of its own
 DATABASE, WEIGHTS, COPIES = "surefoot.sqlite", "weights", "copies"
 _OURS = (
     *(DATABASE + end for end in ("", "-wal", "-shm", "-journal")),
-    *(WEIGHTS, COPIES, SERVE_LOCK, MIGRATE_LOCK, "worker-*.lock"),
+    *(WEIGHTS, COPIES, SERVE_LOCK, MIGRATE_LOCK, ROUNDS_LOCK, "worker-*.lock"),
     *(KEY_FILE, KEY_FILE + ".*", "restored", "restoring-*", "replaced-*"),
 )
 
@@ -95,7 +96,7 @@ def running_in(folder: Path, but: tuple[str, ...] = ()) -> list[str]:
     """The processes that hold locks of a data directory: `serve, pid 17`, `worker local-0`."""
     found = []
     for path in sorted(folder.glob("*.lock")):
-        if path.name in (MIGRATE_LOCK, *but):
+        if path.name in (MIGRATE_LOCK, ROUNDS_LOCK, *but):
             continue
         with path.open() as lock:
             try:

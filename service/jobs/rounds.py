@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from service.data_dir import ROUNDS_LOCK
 from service.jobs import engine
 from service.jobs.context import JobContext
 from service.jobs.housekeeping import ClockWatch, run_reconcile, run_sweep
@@ -55,7 +56,7 @@ def start_rounds(context: JobContext) -> None:
 
 
 def _go(context: JobContext) -> None:
-    with (context.settings.data_dir / "rounds.lock").open("w") as lock:
+    with (context.settings.data_dir / ROUNDS_LOCK).open("w") as lock:
         while not _taken(lock.fileno()):
             if context.stopping.wait(1.0):
                 return

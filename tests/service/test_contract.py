@@ -113,7 +113,7 @@ def test_every_path_answers_as_it_is_documented(watched):
     lines = [f"{count} x {key}\n{example}" for key, (count, example) in found.items()]
     lines += [f"{count} x {crash}" for crash, count in watched.crashes.items()]
     assert not lines, "\n\n".join(lines)
-    paths = {route for route, _, _ in watched.counts}
+    paths = {route.replace(":path}", "}") for route, _, _ in watched.counts}
     assert set(watched.app.openapi()["paths"]) - paths == {"/events"}
 
 
