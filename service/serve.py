@@ -17,6 +17,7 @@ from service.app import create_app
 from service.connections import ConnectionGuard, protocol_factory
 from service.data_dir import StartError, held_alone, make_private
 from service.jobs import exits
+from service.jobs.memory import settle_allocator
 from service.listener import listen
 from service.local_workers import local_workers
 from service.migrate import migrate
@@ -41,6 +42,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     if follow_stdin:
         threading.Thread(target=_stop_at_end_of_stdin, daemon=True).start()
     make_private(settings.data_dir)
+    settle_allocator()
     with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
