@@ -9,6 +9,7 @@ import random
 import traceback
 from collections import Counter
 from collections.abc import Iterator
+from copy import deepcopy
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from typing import Any
@@ -211,7 +212,7 @@ class Ground:
             # Each field by its own bit: all as they were made up, some, or none.
             for bit, (name, value) in enumerate(good.items()):
                 if chance >> bit & 1 or chance % 3:
-                    case.body[name] = value
+                    case.body[name] = deepcopy(value)  # it may be spoilt
             if chance % 3 == 1:
                 for name in set(case.body) - set(good):
                     del case.body[name]
