@@ -17,9 +17,9 @@ from service.app import create_app
 from service.connections import ConnectionGuard, protocol_factory
 from service.data_dir import StartError, held_alone, make_private
 from service.jobs import exits
-from service.jobs.memory import settle_allocator
 from service.listener import listen
 from service.local_workers import local_workers
+from service.memory import settle_allocator
 from service.migrate import migrate
 from service.reach import auth_on, is_loopback
 from service.settings import Settings

@@ -198,7 +198,7 @@ class Settings(BaseSettings):
         600.0, gt=1, description="a look at a camera that takes longer hangs: its worker is ended"
     )
     delivery_limit_s: float = Field(300.0, gt=60, description="the same of a delivery job")
-    upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a round of the upkeep")
+    upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a step of the upkeep")
     training_limit_s: float = Field(
         21_600.0, gt=1, description="a training that takes longer has failed"
     )

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from service.errors import FieldError, MalformedError
+from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.batch import check_count, collect, malformed, refuse
 from service.formats.track import (
     MAX_ID_LENGTH,
@@ -18,6 +18,7 @@ from service.formats.track import (
     track_name,
 )
 
+MAX_LINES = 500_000  # some seconds of reading
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
 _CONF, _CLASS, _VISIBILITY = 6, 7, 8
 _WITH_CLASS = (8, 9)  # lines of ten have a place in the world there
@@ -57,7 +58,7 @@ def read_mot(
     Raises:
         MalformedError: the rate or the start is missing, no line at all can be read, or none of a
             person.
-        TooLargeError: too many tracks.
+        TooLargeError: too many lines or tracks.
     """
     if clock.frame_rate_hz is None or clock.started_at_s is None:
         raise malformed("", "query: frame_rate_hz and started_at are needed with text/csv")
@@ -106,6 +107,12 @@ def read_classes(text: str) -> frozenset[int]:
 
 def _read_lines(body: bytes) -> _Lines:
     lines = _Lines()
+    count = body.count(b"\n")
+    if count > MAX_LINES:
+        raise TooLargeError(
+            f"lines: at most {MAX_LINES} a request are taken, got {count}; "
+            "post a part of the time at once"
+        )
     text = body.decode("utf-8", errors="replace")
     for line_no, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or (line_no == 1 and line.lower().startswith("frame")):

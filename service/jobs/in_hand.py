@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+UPKEEP = "upkeep"  # the kind of the rounds
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:

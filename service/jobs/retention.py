@@ -3,6 +3,7 @@
 import logging
 
 from service.jobs.context import JobContext
+from service.jobs.in_hand import UPKEEP
 from service.recalibration import retention, upkeep
 from service.recalibration.retention import BITE, Limit
 from service.store import files
@@ -34,7 +35,7 @@ def run_retention(context: JobContext) -> None:
 def _apply(context: JobContext, limit: Limit, camera_id: str | None) -> None:
     deleted, bite = 0, BITE
     while bite >= BITE and not context.stopping.is_set():
-        with context.store.write() as session:
+        with context.in_hand.task(UPKEEP, limit.name), context.store.write() as session:
             bite = limit.bite(session)
         deleted += bite
         if bite:
@@ -54,7 +55,8 @@ def _shrink(context: JobContext) -> None:
         if free <= _PAGES_LEFT or free == left or not files.shrinks(path):
             break
         left = free
-        files.give_back(path, min(_PAGES_AT_ONCE, free - _PAGES_LEFT))
+        with context.in_hand.task(UPKEEP, "shrink"):
+            files.give_back(path, min(_PAGES_AT_ONCE, free - _PAGES_LEFT))
     files.wipe_log(path, patience_ms=200)
     if files.size(path) < before:
         log.info("shrunk", extra={"bytes": files.size(path), "from_bytes": before})

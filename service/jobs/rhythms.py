@@ -4,6 +4,7 @@ import logging
 from datetime import UTC, datetime
 
 from service.jobs.context import JobContext
+from service.jobs.in_hand import UPKEEP
 from service.recalibration import upkeep
 from service.recalibration.rhythms import keep_rhythm, learn, take_arrivals
 
@@ -16,13 +17,18 @@ def run_rhythms(context: JobContext) -> None:
         ids = upkeep.camera_ids(session)
     learned = 0
     for camera_id in ids:
-        now = datetime.now(UTC)
-        with context.store.read() as session:
-            arrivals = take_arrivals(session, camera_id, now)
-        if arrivals is None:
-            continue
-        rhythm, counts = learn(arrivals, context.settings, now)
-        with context.store.write() as session:
-            keep_rhythm(session, camera_id, rhythm, counts, now)
-        learned += rhythm is not None
+        with context.in_hand.task(UPKEEP, "rhythms", camera_id):
+            learned += _learn(context, camera_id)
     log.info("rhythms_learned", extra={"cameras": learned})
+
+
+def _learn(context: JobContext, camera_id: str) -> bool:
+    now = datetime.now(UTC)
+    with context.store.read() as session:
+        arrivals = take_arrivals(session, camera_id, now)
+    if arrivals is None:
+        return False
+    rhythm, counts = learn(arrivals, context.settings, now)
+    with context.store.write() as session:
+        keep_rhythm(session, camera_id, rhythm, counts, now)
+    return rhythm is not None

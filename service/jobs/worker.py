@@ -14,11 +14,11 @@ from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.jobs import engine, exits
 from service.jobs.context import JobContext
-from service.jobs.in_hand import InHand
-from service.jobs.memory import give_back, resident_mb, settle_allocator
+from service.jobs.in_hand import UPKEEP, InHand
 from service.jobs.niceness import yield_to_others
 from service.jobs.pulse import BEAT_S, start_pulse
-from service.jobs.rounds import UPKEEP, start_rounds
+from service.jobs.rounds import start_rounds
+from service.memory import give_back, resident_mb, settle_allocator
 from service.recalibration.workforce import Watch, heartbeat, register_worker
 from service.settings import Settings
 from service.store.database import Store

@@ -10,8 +10,10 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
+from service.routes.scopes import need_of
 from service.schemas.problem import Problem
 
+_SCHEME = "token"
 _REF = "#/components/schemas/{model}"
 _MEDIA_TYPE = "application/problem+json"
 _SAFE = frozenset(("get", "head", "options"))
@@ -55,12 +57,21 @@ def _correct(document: dict[str, Any]) -> None:
         schemas.pop(name, None)
     _, made = models_json_schema([(Problem, "serialization")], ref_template=_REF)
     schemas |= made["$defs"]
+    document["components"]["securitySchemes"] = {
+        _SCHEME: {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "A token of `surefoot token add`; none is asked for where access is off",
+        }
+    }
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             answers = operation["responses"]
             answers.pop("422", None)
             for status in _statuses(path, method, operation):
                 answers.setdefault(str(status), _answer(status))
+            need = need_of(method.upper(), path)[0]
+            operation["security"] = [] if need == "open" else [{_SCHEME: [need]}]
 
 
 def _statuses(path: str, method: str, operation: dict[str, Any]) -> Iterator[int]:

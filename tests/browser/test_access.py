@@ -118,6 +118,28 @@ def test_a_page_whose_session_is_over_leads_to_the_login(closed, chromium):
     context.close()
 
 
+def test_who_may_only_look_is_offered_no_acts(closed, chromium):
+    assert closed.http.post("/cameras", json=CAMERA).status_code in (201, 409)
+    offered = {}
+    for scope in ("read", "operate"):
+        context = chromium.new_context(base_url=closed.url)
+        page = context.new_page()
+        log_in(page, "/", make_token(closed.settings, scope, name=scope))
+        page.get_by_text("Live").wait_for()
+        page.goto("/ui/cameras/corner")
+        page.get_by_role("heading", name="What can be done").wait_for()
+        buttons = page.locator("[data-act]:visible").evaluate_all(
+            "all => all.map(b => b.dataset.act)"
+        )
+        offered[scope] = set(buttons)
+        if scope == "read":
+            assert page.get_by_text("Your token lets you look").is_visible()
+            assert axe(page) == []
+        context.close()
+    assert offered["read"] == set()
+    assert {"put-back", "relearn", "train", "maintain"} <= offered["operate"]
+
+
 def seeded(http):
     """What is there to be changed or read, and how that is looked at from outside."""
     assert http.post("/cameras", json=CAMERA).status_code in (201, 409)

@@ -21,6 +21,15 @@ def test_errors_are_described_as_problem_documents(http):
     assert set(schemas["Problem"]["required"]) <= set(body) <= set(schemas["Problem"]["properties"])
 
 
+def test_it_says_which_scope_a_route_needs(http):
+    document = http.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
+    paths = document["paths"]
+    assert paths["/cameras/{camera_id}/tracks"]["post"]["security"] == [{"token": ["ingest"]}]
+    assert paths["/cameras/{camera_id}"]["patch"]["security"] == [{"token": ["admin"]}]
+    assert paths["/healthz"]["get"]["security"] == []
+
+
 def test_only_what_a_route_takes_can_be_wrong_about_it(http):
     assert set(answers(http, "/healthz", "get")) == {200}
     assert 404 not in answers(http, "/alerts", "get")

@@ -144,6 +144,23 @@ class LifeOfCameras(RuleBasedStateMachine):
         for _ in range(4 if camera_id != STREET else 1):
             self.see(camera_id, ())
 
+    @has_camera
+    @rule(n=some, place=st.sampled_from(["knocked", "raised", "far"]), visit=st.booleans())
+    def turn_for_sure(self, n: int, place: str, visit: bool) -> None:
+        """One that is known is knocked until it is told; at times somebody goes there at once."""
+        camera_id = self.camera(n)
+        if camera_id == STREET:
+            return
+        self.life.stands[camera_id] = "prior"
+        for _ in range(2):
+            self.see(camera_id, ())
+        self.life.stands[camera_id] = place
+        for _ in range(4):
+            self.see(camera_id, ())
+        if visit:
+            self.maintain(camera_id, None, 0.5)
+            self.stop_maintaining(camera_id, 0)
+
     def see(self, camera_id: str, weak: tuple[str, ...]) -> None:
         """People walk, and the job looks at them."""
         self.life.post(camera_id, WANTED if camera_id != STREET else 4 * WANTED)
@@ -274,15 +291,21 @@ class LifeOfCameras(RuleBasedStateMachine):
     @has_camera
     @rule(n=some, begins=st.sampled_from([None, -3.0, 1.0]), lasts=st.sampled_from([0.5, 4.0]))
     def plan_maintenance(self, n: int, begins: float | None, lasts: float) -> None:
+        self.maintain(self.camera(n), begins, lasts)
+
+    def maintain(self, camera_id: str, begins: float | None, lasts: float) -> None:
         body = {"to": self.at((begins or 0.0) + lasts), "by": "Cy"}
         if begins is not None:
             body["from"] = self.at(begins)
-        self.call("POST", f"/cameras/{self.camera(n)}/maintenance", json=body)
+        self.call("POST", f"/cameras/{camera_id}/maintenance", json=body)
 
     @has_camera
     @rule(n=some, which=some)
     def end_maintenance(self, n: int, which: int) -> None:
-        url = f"/cameras/{self.camera(n)}/maintenance"
+        self.stop_maintaining(self.camera(n), which)
+
+    def stop_maintaining(self, camera_id: str, which: int) -> None:
+        url = f"/cameras/{camera_id}/maintenance"
         windows = self.life.call("GET", url).json()["items"]
         if windows:
             window = windows[which % len(windows)]

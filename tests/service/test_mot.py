@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
+from service.formats import mot
 from service.store.database import Store
 from service.store.packing import unpack
 from service.store.tables import TrackRecord
@@ -94,6 +95,13 @@ def test_malformed_text_costs_only_its_own_track(corner, settings):
     assert answer["rejected"][0]["id"] == "2"
     assert "line 9" in answer["rejected"][0]["detail"]
     assert [record.track_id for record in stored(settings)] == ["1"]
+
+
+def test_a_text_of_too_many_lines_is_refused_before_it_is_read(corner, monkeypatch):
+    monkeypatch.setattr(mot, "MAX_LINES", 5)
+    answer = send(corner, walk("7", count=7), frame_rate_hz="25")
+    body = problem(answer, 413, "too_large")
+    assert "at most 5 a request are taken, got 6" in body["detail"]
 
 
 def test_what_is_no_such_text_or_lacks_its_clock(corner):
