@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.observations import Steps
-from models.geometry.ground_flow import ground_flow, ground_of_rays, rotation_and_turns
+from models.geometry.ground import ground_of_rays
+from models.geometry.ground_flow import ground_flow, rotation_and_turns
 from models.geometry.rotation import Array, Mask
 
 _LEAST_RAY = 1e-9
@@ -42,8 +43,8 @@ def place_steps(steps: Steps, candidate: Array) -> Placement:
     tilt, roll, log_height, heading = (float(number) for number in candidate)
     height_m = float(np.exp(log_height))
     rotation, turns = rotation_and_turns(tilt, roll, heading)
-    start, start_valid = ground_of_rays(steps.start_rays, rotation)
-    end, end_valid = ground_of_rays(steps.end_rays, rotation)
+    start, start_valid = ground_of_rays(steps.start_rays, rotation, beyond=0.0)
+    end, end_valid = ground_of_rays(steps.end_rays, rotation, beyond=0.0)
     valid = start_valid & end_valid
     across = end - start
     length = np.maximum(np.linalg.norm(across, axis=1), 1e-12)

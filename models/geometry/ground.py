@@ -5,7 +5,10 @@ import numpy as np
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
 
-_HORIZON_SINE = 1e-3  # a ray less than 0.06 deg below the horizon hits no ground we trust
+# Of the angle below the horizon: 0.3 deg, 200 camera heights away. A pixel of a street camera is
+# 0.05 deg, so that one of noise there moves a place by a fifth of its distance; nearer to the
+# horizon a place is noise, and its derivatives, which estimators follow, are more so.
+LOWEST_SINE = 5e-3
 
 
 def pixel_from_ground(
@@ -37,20 +40,24 @@ def ground_from_pixel(
 ) -> tuple[Array, Mask]:
     """Ground points x, y (..., N, 2) in metres of pixels (..., N, 2), and which are valid.
 
-    A pixel at or above the horizon, or that no ray reaches, is NaN and not valid. Shapes as in
-    `pixel_from_ground`, whose inverse this is.
+    A pixel that is not clearly below the horizon, or that no ray reaches, is NaN and not valid.
+    Shapes as in `pixel_from_ground`, whose inverse this is.
     """
-    rays, valid = intrinsics.rays(uv)
-    return ground_from_ray(rotation, centre_m, rays, valid)
-
-
-def ground_from_ray(
-    rotation: Array, centre_m: Array, rays: Array, valid: Mask
-) -> tuple[Array, Mask]:
-    """`ground_from_pixel` for rays (..., N, 3) of the camera frame that are already undistorted."""
-    world = rays @ rotation  # rows are points: (R.T @ ray).T
-    down = -world[..., 2] / np.linalg.norm(world, axis=-1)
-    hits = valid & (down > _HORIZON_SINE)
-    scale = centre_m[..., None, 2] / np.where(hits, -world[..., 2], 1.0)
-    ground = centre_m[..., None, :2] + scale[..., None] * world[..., :2]
+    rays, known = intrinsics.rays(uv)
+    ground, below = ground_of_rays(rays, rotation)
+    hits = known & below
+    ground = centre_m[..., None, :2] + centre_m[..., None, 2:] * ground
     return np.where(hits[..., None], ground, np.nan), hits
+
+
+def ground_of_rays(rays: Array, rotation: Array, beyond: float = np.nan) -> tuple[Array, Mask]:
+    """Ground points (..., N, 2) of rays (..., N, 3) of the camera frame, and which are valid.
+
+    In camera heights from the camera's foot, axes as the world's. A ray that is less than 0.3 deg
+    below the horizon has no place that is worth anything: it is not valid, and `beyond`, which
+    is 0 for those whose sums over all rays have to stay finite.
+    """
+    world = rays @ rotation  # rows are points: (R.T @ ray).T
+    valid = -world[..., 2] > LOWEST_SINE * np.linalg.norm(world, axis=-1)
+    down = np.where(valid, -world[..., 2], 1.0)[..., None]
+    return np.where(valid[..., None], world[..., :2] / down, beyond), valid

@@ -1,13 +1,11 @@
-"""Ground points of fixed rays, and how they move when the camera turns.
+"""How the ground points of fixed rays move when the camera turns.
 
 Points are in camera heights, relative to the camera's foot point, axes as the world's.
 """
 
 import numpy as np
 
-from models.geometry.rotation import Array, Mask, rotation_and_derivatives
-
-_LOWEST_SINE = 5e-3  # of the angle below the horizon: 0.3 deg, 200 camera heights away
+from models.geometry.rotation import Array, rotation_and_derivatives
 
 
 def rotation_and_turns(
@@ -16,14 +14,6 @@ def rotation_and_turns(
     """The rotation (3, 3), and for tilt and roll a T (3, 3): a ray's direction w moves by w T."""
     rotation, derivatives = rotation_and_derivatives(tilt_rad, roll_rad, heading_rad)
     return rotation, [rotation.T @ turned for turned in derivatives]
-
-
-def ground_of_rays(rays: Array, rotation: Array) -> tuple[Array, Mask]:
-    """Ground points (M, 2) of rays (M, 3), 0 where above the horizon, and which are below it."""
-    world = rays @ rotation
-    valid = -world[:, 2] > _LOWEST_SINE * np.linalg.norm(world, axis=1)
-    down = np.where(valid, -world[:, 2], 1.0)[:, None]
-    return np.where(valid[:, None], world[:, :2] / down, 0.0), valid
 
 
 def ground_flow(ground: Array, turn: Array) -> tuple[Array, Array]:

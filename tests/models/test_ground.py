@@ -1,5 +1,5 @@
 from dataclasses import replace
-from math import cos, pi, radians, sin, tan
+from math import asin, cos, pi, radians, sin, tan
 
 import cv2
 import numpy as np
@@ -8,7 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from models.geometry.ground import ground_from_pixel, ground_from_ray, pixel_from_ground
+from models.geometry.ground import (
+    LOWEST_SINE,
+    ground_from_pixel,
+    ground_of_rays,
+    pixel_from_ground,
+)
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from tests.strategies import image_points, intrinsics, poses
@@ -69,12 +74,16 @@ def test_straight_down_the_picture_is_a_map_with_north_up() -> None:
     assert_allclose(back, [[3, 4], [4, 6]], atol=1e-9)
 
 
-def test_ground_of_a_ray_scales_with_the_height() -> None:
+def test_ground_of_a_ray_is_in_camera_heights_and_scales_with_them() -> None:
     rays = np.array([[0.0, 0.5, 1.0], [0.2, 0.25, 1.0]])
-    low, _ = ground_from_ray(LEVEL.rotation, np.array([0, 0, 5.0]), rays, np.ones(2, bool))
-    high, _ = ground_from_ray(LEVEL.rotation, np.array([0, 0, 15.0]), rays, np.ones(2, bool))
-    assert_allclose(low, [[0, 10], [4, 20]])
-    assert_allclose(high, 3 * low)
+    ground, valid = ground_of_rays(rays, LEVEL.rotation)
+    assert valid.all()
+    assert_allclose(ground, [[0, 2], [0.8, 4]])
+    uv = rays[:, :2] * (LENS.fx, LENS.fy) + (LENS.cx, LENS.cy)
+    for height_m in (5.0, 15.0):
+        centre = np.array([3.0, -1.0, height_m])
+        places, _ = ground_from_pixel(LENS, LEVEL.rotation, centre, uv)
+        assert_allclose(places, centre[:2] + height_m * ground)
 
 
 # Round trips
@@ -152,6 +161,22 @@ def test_pixels_at_and_above_the_horizon_have_no_ground() -> None:
     assert valid.tolist() == [True, False, False, False]
     assert_allclose(ground[0], [0, 400])  # 5 m * 800 / 10
     assert np.isnan(ground[1:]).all()
+
+
+def test_the_ground_ends_at_one_angle_below_the_horizon_for_pixels_and_for_rays() -> None:
+    """0.3 deg, 200 camera heights away; what is beyond is NaN, or what the caller says."""
+    sines = np.array([1.02, 0.98, 0.2, -1.0]) * LOWEST_SINE
+    rays = np.stack([np.zeros(4), np.tan(np.arcsin(sines)), np.ones(4)], axis=1)
+    ground, valid = ground_of_rays(rays, LEVEL.rotation)
+    assert valid.tolist() == [True, False, False, False]
+    assert_allclose(ground[0], [0, 1 / tan(asin(1.02 * LOWEST_SINE))])
+    assert np.isnan(ground[1:]).all()
+    zeroed, _ = ground_of_rays(rays, LEVEL.rotation, beyond=0.0)
+    assert_allclose(zeroed, np.nan_to_num(ground))
+    uv = rays[:, :2] * (LENS.fx, LENS.fy) + (LENS.cx, LENS.cy)
+    places, hits = grounds(LENS, LEVEL, *uv)
+    assert (hits == valid).all()
+    assert np.isnan(places[1:]).all()
 
 
 def test_the_horizon_is_tilted_by_roll() -> None:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.observations import Rows, Steps, Tops
-from models.geometry.ground_flow import down_to, ground_flow, ground_of_rays, rotation_and_turns
+from models.geometry.ground import ground_of_rays
+from models.geometry.ground_flow import down_to, ground_flow, rotation_and_turns
 from models.geometry.rotation import Array, Mask
 from models.geometry.upright import stature_ratio
 
@@ -47,15 +48,15 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
     """
     height_m = float(np.exp(candidate[2]))
     rotation, turns = rotation_and_turns(candidate[0], candidate[1], heading_rad)
-    start, start_valid = ground_of_rays(steps.start_rays, rotation)
-    end, end_valid = ground_of_rays(steps.end_rays, rotation)
+    start, start_valid = ground_of_rays(steps.start_rays, rotation, beyond=0.0)
+    end, end_valid = ground_of_rays(steps.end_rays, rotation, beyond=0.0)
     valid = start_valid & end_valid
     across = end - start
     length = _norm(across)
     direction = across / np.maximum(length, 1e-12)[:, None]
     place = (start + end) / 2
     aside = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-    swayed, swayed_valid = ground_of_rays(steps.swayed_rays, rotation)
+    swayed, swayed_valid = ground_of_rays(steps.swayed_rays, rotation, beyond=0.0)
     off = np.where(swayed_valid, ((swayed - end) * aside).sum(axis=1), 0.0)
     turned = off / np.maximum(length / 2, 1e-12)
     toward, beside = (direction * place).sum(axis=1), (aside * place).sum(axis=1)
@@ -91,7 +92,7 @@ def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measur
     """Log heights of people, from feet to the tops of their boxes."""
     height_m = float(np.exp(candidate[2]))
     rotation, turns = rotation_and_turns(candidate[0], candidate[1], heading_rad)
-    place, valid = ground_of_rays(tops.foot_rays, rotation)
+    place, valid = ground_of_rays(tops.foot_rays, rotation, beyond=0.0)
     feet = np.where(valid[:, None], tops.foot_rays, (0.0, 1e6, 1.0))
     ratio, _ = stature_ratio(rotation, feet, tops.top_y)
     valid = valid & (ratio > 0.01)
