@@ -44,6 +44,7 @@ MODEL_ROOMS = [
     {"regression"},
     {"flow"},
     {"drift"},
+    {"recalibration"},
     {"evaluation"},
 ]
 TORCH_ROOMS = {"models/regression", "service/jobs", "service/centred.py"}

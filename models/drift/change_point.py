@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.fit import Fit, fit_pose, per_track, track_goodness
-from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
@@ -29,13 +29,17 @@ class ChangePoint:
 def find_change(
     observations: Observations, prior: CameraPose, reference: SiteReference
 ) -> ChangePoint | None:
-    """The move within tracks that are in time order; None where one pose explains them all.
+    """The move within tracks; None where one pose explains them all.
 
     The scores of the tracks, linear in a small move, say where to cut first (a likelihood ratio
     over all cuts); then both sides are fitted, each track is given to the side that explains it
     better, and the cut moves to where that is most so. The two poses must then differ beyond
     doubt, by their own covariances.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
     """
+    check_in_time(observations)
     if observations.tracks < 2 * FEWEST_BESIDE:
         return None
     cut = _first_cut(observations, prior, reference)

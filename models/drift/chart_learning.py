@@ -14,7 +14,7 @@ from models.drift.chart import (
     trace,
 )
 from models.drift.party_scores import SCORES, Usual, scores_at
-from models.estimation.joint.observations import Observations, of_tracks
+from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.reference import relearned
 from models.estimation.joint.site import SiteReference
 from models.flow.folds import Fold, Folds
@@ -53,12 +53,16 @@ def learn_chart(
     blocks are all drawn anew.
 
     Args:
-        observations: of the tracks, in the order of time.
+        observations: of the tracks, in the order of their ends.
         prior: where the camera stood.
         site: how people walk, learned of these or of other tracks.
         folds: the quarters and the maps of the others.
         seed: of the bootstrap.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
     """
+    check_in_time(observations)
     asked: list[_Asked] = []
     known = 0
     for fold in folds.each:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from models.estimation.joint.fit import Learned, per_track
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
-from models.estimation.joint.observations import Observations, Steps
+from models.estimation.joint.observations import Observations, Steps, check_in_time
 from models.estimation.joint.site import SiteReference, channels_of
 from models.estimation.numbers import numbers_of
 from models.flow.evidence import Walkers, walkers_of
@@ -52,7 +52,12 @@ class PartyScores:
 def score_parties(
     observations: Observations, usual: Usual, walkers: Walkers | None = None
 ) -> PartyScores:
-    """The scores of all parties among tracks that are in the order of time, at the prior pose."""
+    """The scores of all parties among tracks, at the prior pose.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    check_in_time(observations)
     if walkers is None:
         walkers = walkers_of(observations, candidate_of(usual.prior))
     _, _, last = parties_in_time(walkers)

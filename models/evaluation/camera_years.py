@@ -8,18 +8,15 @@ import numpy as np
 from models.drift.chart import trace
 from models.drift.party_scores import score_parties
 from models.errors import DegenerateGeometryError
-from models.estimation.joint.observations import of_tracks
-from models.estimation.joint.reference import learn_reference
 from models.evaluation.alarms import DAYS, AlarmResults, Delay, knocks_of
-from models.evaluation.study_site import Place, draw_place, observe_feet
+from models.evaluation.study_site import SPEED_TRACKS, Place, draw_place, observe_feet
 from models.evaluation.watch import Watch, first_alarm, watch_over
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.recalibration import learn_site
 from models.simulation.habits import HabitConfig, draw_mixes, walk_days
-from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 
-_SPEED_TRACKS = 400  # of the reference: a site's speeds are known by then
 _WEEK = 7
 _LONGEST_TRACKS = 900  # that a knock is waited for
 
@@ -53,15 +50,8 @@ def live_year(
         first += next(life)
         day += 1
     reference = observe_feet(first[:reference_tracks], place.intrinsics)
-    some = of_tracks(reference, np.arange(min(_SPEED_TRACKS, reference.tracks)))
-    watch = watch_over(
-        reference,
-        place.intrinsics,
-        place.prior,
-        learn_reference(some, place.prior, WalkConfig(), 0),
-        alarms_a_year=alarms_a_year,
-        parties_a_day=tracks_a_day,
-    )
+    learned = learn_site(reference, place.intrinsics, place.prior, speed_tracks=SPEED_TRACKS)
+    watch = watch_over(learned, alarms_a_year=alarms_a_year, parties_a_day=tracks_a_day)
     assert watch is not None
     apart = []
     for _ in range(0, days, _WEEK):

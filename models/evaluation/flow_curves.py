@@ -7,13 +7,11 @@ from typing import Literal
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.estimation.joint.observations import Observations, observe, of_tracks
-from models.estimation.joint.reference import learn_reference
-from models.evaluation.flow_runs import fused_answer
+from models.estimation.joint.observations import of_tracks
+from models.evaluation.flow_runs import served_answer
 from models.evaluation.protocol import PANNED, KnockRange, ProtocolCase, draw_case, judge_answer
 from models.evaluation.scenes import Scene
-from models.flow.reference import learn_flow
-from models.simulation.walkers import WalkConfig
+from models.recalibration import Observations, learn_site, observe
 
 _SEED = 0
 Varied = Literal["reference", "seen"]
@@ -72,9 +70,8 @@ def _error_deg(
     case: ProtocolCase, known: Observations, after: Sequence[Observations]
 ) -> list[float]:
     """The whole angle off, for each set of new tracks, with one reference for all."""
-    site = learn_reference(known, case.prior_pose, WalkConfig(), _SEED)
-    flow = learn_flow(known, case.intrinsics, case.prior_pose, _SEED)
-    answers = [fused_answer(case, seen, site, flow) for seen in after]
+    site = learn_site(known, case.intrinsics, case.prior_pose, seed=_SEED, chart=False)
+    answers = [served_answer(seen, site) for seen in after]
     return [judge_answer(case, "fused", answer, 0.0).angle_error_deg for answer in answers]
 
 

@@ -33,8 +33,8 @@ def plot_flow(learned: Learned, poses: Mapping[str, CameraPose], path: Path) -> 
     arrow, or, where about as many come as go, a line.
     The camera is a triangle, its view's edge on the ground is dashed. Axes are the world's.
     """
-    assert learned.flow is not None
-    flow = learned.flow.flow
+    assert learned.site.flow is not None
+    flow = learned.site.flow.flow
     pyplot = pyplot_of_files()
     count = len(poses)
     low, high = _window(flow)

@@ -1,21 +1,19 @@
-"""The flow map as the protocol runs it: with the joint estimate, and alone."""
+"""The flow map as the protocol runs it: in the pose that is served, and alone."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import Observations
-from models.estimation.joint.site import SiteReference
 from models.estimation.numbers import NUMBERS, TELLING_SD
-from models.evaluation.joint_runs import joint_answer
 from models.evaluation.learned import Learned
-from models.evaluation.protocol import Answer, ProtocolCase, nothing_told
+from models.evaluation.protocol import Answer, nothing_told
+from models.evaluation.served import served_pose
 from models.flow.evidence import Walkers, walkers_of
-from models.flow.fusion import elsewhere, fused_estimate
-from models.flow.reference import FlowReference, candidate_of
+from models.flow.fusion import elsewhere
+from models.flow.reference import candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.rotation import Array
+from models.recalibration import CameraSite, Observations
 
 _HEADINGS = np.radians(np.arange(-24.0, 25.0, 4.0))
 # Tilts and rolls around the prior's: paths are narrow, a climb from 8 deg off ends beside them.
@@ -27,33 +25,26 @@ _FEWEST = 5
 
 
 def fused(learned: Learned) -> Answer:
-    """The joint estimate and the flow map together: the heading too."""
-    return fused_answer(learned.case, learned.seen, learned.site, learned.flow)
+    """As it is served: speeds and places together, from the newest change on; the heading too."""
+    return served_answer(learned.seen, learned.site)
 
 
-def fused_answer(
-    case: ProtocolCase, seen: Observations, site: SiteReference, flow: FlowReference | None
-) -> Answer:
-    """The fused pose of what is seen; without a map, or with too few people, the joint one."""
-    estimate = joint_estimate(seen, case.prior_pose, site)
-    answer = joint_answer(estimate)
-    if flow is None:
-        return answer
-    found = fused_estimate(seen, case.intrinsics, case.prior_pose, estimate, flow)
-    answer = replace(
-        answer,
-        values=found.values[:3],
-        covariance=found.covariance[:3, :3],
-        weak=tuple(name for name in NUMBERS if name not in found.told),
+def served_answer(seen: Observations, site: CameraSite) -> Answer:
+    """The pose that the service would serve of what is seen."""
+    found = served_pose(seen, site)
+    pose = found.fused
+    answer = Answer(
+        values=pose.values[:3],
+        covariance=pose.covariance[:3, :3],
+        tracks=found.joint.walkers,
+        weak=tuple(name for name in NUMBERS if name not in pose.told),
     )
-    return (
-        _with_heading(answer, found.values, found.covariance) if "heading" in found.told else answer
-    )
+    return _with_heading(answer, pose.values, pose.covariance) if "heading" in pose.told else answer
 
 
 def registration(learned: Learned) -> Answer:
     """The flow map alone, around the prior pose: nothing is known of speeds."""
-    case, reference = learned.case, learned.flow
+    case, reference = learned.case, learned.site.flow
     if reference is None:
         return nothing_told(case)
     mean = candidate_of(case.prior_pose)

@@ -22,13 +22,13 @@ _SEED = 0
 
 
 def joint(learned: Learned) -> Answer:
-    """As it is served: the site learned from the reference, boxes where they tell something."""
-    return joint_answer(joint_estimate(learned.seen, learned.case.prior_pose, learned.site))
+    """By speeds alone: the site learned from the reference, boxes where they tell something."""
+    return joint_answer(joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speeds))
 
 
 def joint_feet(learned: Learned) -> Answer:
     """Without boxes."""
-    return joint_answer(joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_site))
+    return joint_answer(joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speeds))
 
 
 def joint_assumed(learned: Learned) -> Answer:

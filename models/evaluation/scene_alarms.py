@@ -14,19 +14,19 @@ import numpy as np
 from models.drift.chart import trace
 from models.drift.chart_learning import drawn_blocks
 from models.drift.party_scores import score_parties
-from models.drift.verdict import DriftLimits, drift_between, judge
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.drift.verdict import DriftLimits, judge
+from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
 from models.evaluation.alarms import DAYS, AlarmResults, knocks_of
 from models.evaluation.learned import Learned, learn_case
 from models.evaluation.protocol import STILL, draw_case
 from models.evaluation.scenes import Scene, knock_trajectory
+from models.evaluation.served import served_pose
 from models.evaluation.watch import first_alarm, watch_over
 from models.flow.evidence import walkers_of
-from models.flow.fusion import fused_estimate
 from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
+from models.recalibration import Observations, observe
 from models.trajectory import Trajectory
 
 _LONGEST = 1200  # parties that a knock is waited for
@@ -46,14 +46,11 @@ def judge_scene(
 ) -> AlarmResults | None:
     """False alarms and delays on a recorded scene; None where too few people walk for a chart."""
     case = draw_case(scene, seed, STILL)
-    learned = learn_case(case)
+    learned = learn_case(case, chart=True)
     reference = observe(case.reference, case.intrinsics)
     rng = np.random.default_rng([seed, 5])
     parties_a_track = _parties_a_track(reference, case.prior_pose)
     watch = watch_over(
-        reference,
-        case.intrinsics,
-        case.prior_pose,
         learned.site,
         alarms_a_year=alarms_a_year,
         parties_a_day=tracks_a_day * parties_a_track,
@@ -107,13 +104,9 @@ def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> fl
 
 def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
     """The largest told drift of the pose by what is seen, in units of its limit."""
-    case, flow = learned.case, learned.flow
-    if flow is None or seen.walkers < FEWEST_WALKERS:
+    if learned.site.flow is None or seen.walkers < FEWEST_WALKERS:
         return 0.0
-    joint = joint_estimate(seen, case.prior_pose, learned.site)
-    fused = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, flow)
-    drift = drift_between(fused.values, fused.covariance, fused.told, case.prior_pose)
-    return judge(drift, limits, ()).excess
+    return judge(served_pose(seen, learned.site).drift, limits, ()).excess
 
 
 def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Observations:
@@ -121,7 +114,7 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
         knock_trajectory(track, scene.intrinsics, scene.true_pose, moved) for track in tracks
     )
     kept = [track for track in knocked if track is not None and track.long_enough]
-    return observe(kept, scene.intrinsics)
+    return observe(sorted(kept, key=lambda track: float(track.time_s[-1])), scene.intrinsics)
 
 
 def _parties_a_track(observations: Observations, prior: CameraPose) -> float:

@@ -7,20 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.errors import DegenerateGeometryError, TooFewTrajectoriesError
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import Observations, observe, of_tracks
-from models.estimation.joint.reference import learn_reference
-from models.estimation.joint.site import SiteReference
-from models.flow.fusion import FusedEstimate, fused_estimate
-from models.flow.reference import FlowReference, learn_flow
+from models.evaluation.served import served_pose
+from models.flow.fusion import FusedEstimate
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.recalibration import CameraSite, Observations, learn_site, observe
 from models.simulation.site import Lane, SiteConfig, draw_lanes, walk_site
-from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 
 # Of the reference: a site's speeds are known by then, and learning them from more is slow.
-_SPEED_TRACKS = 400
+SPEED_TRACKS = 400
 _MOST_DRAWS = 20
 _SEED = 0
 
@@ -40,14 +36,11 @@ class LearnedPlace:
     """A place with what its reference tracks told: learned once, whatever happens after."""
 
     place: Place
-    speeds: SiteReference
-    flow: FlowReference
+    site: CameraSite
 
     def fused(self, tracks: Observations) -> FusedEstimate:
-        """The fused pose that tracks tell."""
-        lens, prior = self.place.intrinsics, self.place.prior
-        joint = joint_estimate(tracks, prior, self.speeds)
-        return fused_estimate(tracks, lens, prior, joint, self.flow)
+        """The pose that would be served of tracks."""
+        return served_pose(tracks, self.site).fused
 
 
 def draw_place(rng: np.random.Generator) -> Place:
@@ -86,12 +79,17 @@ def learn_place(place: Place, reference: Observations) -> LearnedPlace:
     Raises:
         TooFewTrajectoriesError: fewer than 12 people walk.
     """
-    some = of_tracks(reference, np.arange(min(_SPEED_TRACKS, reference.tracks)))
-    speeds = learn_reference(some, place.prior, WalkConfig(), _SEED)
-    flow = learn_flow(reference, place.intrinsics, place.prior, _SEED)
-    if flow is None:
+    site = learn_site(
+        reference,
+        place.intrinsics,
+        place.prior,
+        seed=_SEED,
+        speed_tracks=SPEED_TRACKS,
+        chart=False,
+    )
+    if site.flow is None:
         raise TooFewTrajectoriesError("tracks: 12 that walk are needed for a flow map")
-    return LearnedPlace(place=place, speeds=speeds, flow=flow)
+    return LearnedPlace(place=place, site=site)
 
 
 def seen_from(place: Place, pose: CameraPose, count: int, rng: np.random.Generator) -> Observations:
@@ -105,5 +103,9 @@ def seen_from(place: Place, pose: CameraPose, count: int, rng: np.random.Generat
 
 
 def observe_feet(tracks: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:
-    """What is read of simulated feet; simulated boxes are truer than any detector's."""
-    return observe([replace(track, top_v=None) for track in tracks], intrinsics)
+    """What is read of simulated feet, in the order that the service sees: of the tracks' ends.
+
+    Simulated boxes are truer than any detector's, and left out.
+    """
+    feet = [replace(track, top_v=None) for track in tracks]
+    return observe(sorted(feet, key=lambda track: float(track.time_s[-1])), intrinsics)

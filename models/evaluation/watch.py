@@ -6,19 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.drift.chart import RUN, DriftChart, Ratios, ratios_of, trace
-from models.drift.chart_learning import learn_chart
 from models.drift.party_scores import PartyScores, Usual
-from models.estimation.joint.observations import Observations
-from models.estimation.joint.site import SiteReference
 from models.evaluation.alarms import DAYS
-from models.flow.folds import fold_maps
-from models.flow.reference import candidate_of, learn_flow
-from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.recalibration import CameraSite
 
 _MOST_ALARMS = 50
-_SEED = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,28 +39,15 @@ class Watch:
         return found
 
 
-def watch_over(
-    reference: Observations,
-    intrinsics: Intrinsics,
-    prior: CameraPose,
-    site: SiteReference,
-    *,
-    alarms_a_year: float,
-    parties_a_day: float,
-) -> Watch | None:
-    """A chart of reference tracks, as the service learns it; None where too few people walk."""
-    folds = fold_maps(reference, intrinsics, candidate_of(prior), _SEED)
-    if folds is None:
-        return None
-    flow = learn_flow(reference, intrinsics, prior, _SEED, folds=folds)
-    chart = learn_chart(reference, prior, site, folds, _SEED)
-    if flow is None or chart is None:
+def watch_over(site: CameraSite, *, alarms_a_year: float, parties_a_day: float) -> Watch | None:
+    """The chart of a learned site at a level; None where too few people walked to learn one."""
+    if site.flow is None or site.chart is None:
         return None
     return Watch(
-        chart=chart,
-        usual=Usual(prior=prior, paces=chart.paces, paths=flow.site(intrinsics)),
-        ratios=ratios_of(chart),
-        level=chart.level(RUN * alarms_a_year / (parties_a_day * DAYS)),
+        chart=site.chart,
+        usual=site.usual(site.flow, site.chart),
+        ratios=ratios_of(site.chart),
+        level=site.chart.level(RUN * alarms_a_year / (parties_a_day * DAYS)),
     )
 
 

@@ -18,6 +18,7 @@ from service.recalibration.looking import (
     leave_poisoned,
     note_lacks,
 )
+from service.recalibration.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -47,13 +48,13 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
 def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     """Look at all tracks up to one. No transaction is open while anything is computed."""
     store, settings = context.store, context.settings
-    begun_s, lacks = time.monotonic(), Lacks(camera_id)
-    missing = predict_pending(context, camera_id)
+    begun_s, lacks, unpacked = time.monotonic(), Lacks(camera_id), Unpacked()
+    missing = predict_pending(context, camera_id, unpacked)
     if missing:
         lacks.add("averaged estimate", missing)
-    learn_if_due(context, camera_id)
+    learn_if_due(context, camera_id, unpacked)
     with store.read() as session:
-        evidence = gather(session, settings, camera_id)
+        evidence = gather(session, settings, camera_id, unpacked)
     finding = None if evidence is None else weigh(evidence, settings.seed)
     if finding is not None:
         finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
@@ -66,13 +67,13 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
         said = lacks.said if finding is None else finding.lacks
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
         end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks="; ".join(said) or None)
-    _grow_unless_failed(context, camera_id)
+    _grow_unless_failed(context, camera_id, unpacked)
 
 
-def learn_if_due(context: JobContext, camera_id: str) -> None:
+def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Learn a camera's reference, once its tracks are there."""
     with context.store.read() as session:
-        period = take_period(session, context.settings, camera_id)
+        period = take_period(session, context.settings, camera_id, unpacked)
     if period is None:
         return
     learned = learn_period(period, context.settings.seed)
@@ -84,13 +85,13 @@ def learn_if_due(context: JobContext, camera_id: str) -> None:
     )
 
 
-def grow_if_due(context: JobContext, camera_id: str) -> None:
+def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Learn a camera's flow map anew, once enough tracks have come that are known to be still.
 
     A worker that dies here leaves the map as it was; the next job finds it due again.
     """
     with context.store.read() as session:
-        period = take_growth(session, context.settings, camera_id)
+        period = take_growth(session, context.settings, camera_id, unpacked)
     if period is None:
         return
     learned = grow(period, context.settings.seed)
@@ -101,12 +102,12 @@ def grow_if_due(context: JobContext, camera_id: str) -> None:
         log.info("flow_map_grown", extra=fields)
 
 
-def _grow_unless_failed(context: JobContext, camera_id: str) -> None:
+def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
     if time.monotonic() < context.no_growth_before_s.get(camera_id, 0.0):
         return
     lacks = Lacks(camera_id)
-    lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id))
+    lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id, unpacked))
     if lacks.said:
         context.no_growth_before_s[camera_id] = time.monotonic() + _GROWTH_RESTS_S
         with context.store.write() as session:

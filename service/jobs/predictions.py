@@ -9,20 +9,21 @@ from service.recalibration.predictions import (
     keep_predictions,
     take_pending,
 )
+from service.recalibration.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
 
 _BATCH = 500
 
 
-def predict_pending(context: JobContext, camera_id: str) -> str:
+def predict_pending(context: JobContext, camera_id: str, unpacked: Unpacked) -> str:
     """Have the model in use look at all tracks of the window that it has not seen.
 
     What it says is never served, so what fails here is logged and said, and stops nobody: returns
     why, or nothing. A model whose weights cannot be read is given up; the reconcile trains another.
     """
     try:
-        _predict_all(context, camera_id)
+        _predict_all(context, camera_id, unpacked)
     except CheckpointError as error:
         log.error("weights_unreadable", extra={"camera_id": camera_id, "why": str(error)})
         return "the weights of its model cannot be read, and it is trained again"
@@ -32,7 +33,7 @@ def predict_pending(context: JobContext, camera_id: str) -> str:
     return ""
 
 
-def _predict_all(context: JobContext, camera_id: str) -> None:
+def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     while True:
         with context.store.read() as session:
             pending = take_pending(session, context.settings, camera_id, _BATCH)
@@ -41,7 +42,7 @@ def _predict_all(context: JobContext, camera_id: str) -> None:
         from service.jobs.regressor import predict  # torch: 200 MB that not every worker needs
 
         try:
-            rows = predict(context.settings.weights_dir, pending)
+            rows = predict(context.settings.weights_dir, pending, unpacked)
         except CheckpointError:
             with context.store.write() as session:
                 drop_model(session, pending.model_id)

@@ -14,7 +14,7 @@ from models.regression.prediction import predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.trajectory import cut_windows
 from service.recalibration.predictions import PendingTracks
-from service.store.packing import trajectory_of
+from service.recalibration.unpacked import Unpacked
 from service.store.tables import TrackRecord
 
 _NETWORKS = 64  # kept in memory, of the cameras that were looked at last
@@ -22,7 +22,7 @@ _NETWORKS = 64  # kept in memory, of the cameras that were looked at last
 torch.set_num_threads(1)  # these networks are small: more threads wait for one another
 
 
-def predict(weights_dir: Path, pending: PendingTracks) -> list[dict[str, Any]]:
+def predict(weights_dir: Path, pending: PendingTracks, unpacked: Unpacked) -> list[dict[str, Any]]:
     """Rows of predictions, one for each track; without numbers where a track gives no window.
 
     Raises:
@@ -31,7 +31,7 @@ def predict(weights_dir: Path, pending: PendingTracks) -> list[dict[str, Any]]:
     plan = plan_from_config(pending.config)
     network = _load(weights_dir, pending.weights_sha256, plan)
     windows = cut_windows(
-        [trajectory_of(track) for track in pending.tracks], plan.intrinsics, plan.walk.step_s
+        [unpacked.feet(track) for track in pending.tracks], plan.intrinsics, plan.walk.step_s
     )
     height_m, quaternions = predict_windows(network, windows, plan)
     owners, means = average_windows(height_m, quaternions, windows.owner_idx)

@@ -16,13 +16,13 @@ from models.drift.verdict import (
 )
 from models.estimation.numbers import ANGLES, NUMBERS
 from models.geometry.rotation import Array
+from models.recalibration import drift_of
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import is_overtaken, made_against
-from service.recalibration.second_look import drift_of
 from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references

@@ -1,15 +1,14 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift.chart import RUN, DriftChart, Reading, read_chart
+from models.drift.chart import Reading
 from models.drift.chart_packing import chart_from_bytes
-from models.drift.party_scores import Usual, score_parties
 from models.drift.verdict import DriftLimits
 from models.estimation.averaged import (
     FEWEST_TRACKS,
@@ -17,26 +16,32 @@ from models.estimation.averaged import (
     TrackPredictions,
     averaged_estimate,
 )
-from models.estimation.joint.estimate import JointEstimate, joint_estimate
-from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.packing import reference_from_bytes
-from models.estimation.joint.reference import assumed_reference
-from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
+from models.flow.fusion import FusedEstimate
 from models.flow.packing import flow_from_bytes
-from models.flow.reference import FlowReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.recalibration import (
+    AlarmRate,
+    CameraSite,
+    Observations,
+    SecondLook,
+    assume_site,
+    estimate_pose,
+    observe,
+    read_alarm_chart,
+)
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.alerts import fired_by_estimate
-from service.recalibration.changes import change_among
 from service.recalibration.lacks import Lacks
 from service.recalibration.limits import drift_limits
 from service.recalibration.references import FEWEST_WALKERS, made_against, window_of
-from service.recalibration.second_look import drift_of, look_again
+from service.recalibration.unpacked import Unpacked
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, tracks, trainings
-from service.store.packing import intrinsics_of, pose_of_prior, seen_of
+from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import (
     CameraRecord,
     ModelRecord,
@@ -109,8 +114,14 @@ class Finding:
         return max(track.pk for track in self.tracks)
 
 
-def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | None:
-    """What there is to judge a camera by; None where there is nothing, or nothing new."""
+def gather(
+    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+) -> Evidence | None:
+    """What there is to judge a camera by; None where there is nothing, or nothing new.
+
+    Tracks that were `unpacked` already are not unpacked again.
+    """
+    unpacked = unpacked or Unpacked()
     camera = cameras.find(session, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
@@ -141,7 +152,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
                 unanswered=answered_at is None or record.received_at > answered_at,
                 started_s=record.started_s,
                 ended_s=record.ended_s,
-                trajectory=seen_of(record, intrinsics),
+                trajectory=unpacked.seen(record, intrinsics),
             )
             for record in records
         ),
@@ -156,111 +167,71 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
 
 def weigh(evidence: Evidence, seed: int) -> Finding | None:
     """The pose by all estimators, from the newest change on; None where too few people walk."""
-    observations = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
-    if observations.walkers < FEWEST_WALKERS:
+    observed = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
+    if observed.walkers < FEWEST_WALKERS:
         return None
-    lens, prior = evidence.intrinsics, evidence.prior
-    seen, change, first = evidence.tracks, None, 0
-    reading = earlier = None
     lacks = Lacks(evidence.camera_id)
-    if evidence.site is None:
-        joint = joint_estimate(
-            observations, prior, assumed_reference(observations, prior, evidence.walk)
+    site = _site_of(evidence, observed, lacks)
+    judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
+    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
+    lacks.take(found.lacks)
+    reading = None
+    if found.searched_by_map and site.chart is not None:
+        reading = lacks.unless_failed(
+            "chart", partial(_read, evidence, observed, site, found.first)
         )
-        fused = by_speeds_alone(joint, prior)
-    else:
-        site = reference_from_bytes(evidence.site)
-        flow, chart = _paths_of(evidence, lacks)
-        ends_s = np.array([track.ended_s for track in seen])
-        every = observations
-        among = partial(change_among, every, ends_s, lens, prior, site)
-        changed = None if flow is None else lacks.unless_failed("flow_map", partial(among, flow))
-        if changed is None:
-            flow = None
-        found, observations, joint = changed or among(None)
-        if found is not None:
-            change = seen[found]
-            seen = tuple(track for track in seen if track.ended_s >= change.ended_s)
-            first = len(evidence.tracks) - len(seen)
-        if flow is not None and chart is not None:
-            reading = lacks.unless_failed(
-                "chart", partial(_read, evidence, every, flow, chart, first)
-            )
-        fused = by_speeds_alone(joint, prior)
-        if flow is not None:
-            by_map = partial(fused_estimate, observations, lens, prior, joint, flow)
-            found_by_map = lacks.unless_failed("flow_map", by_map)
-            fused, flow = (fused, None) if found_by_map is None else (found_by_map, flow)
-        if asked_enough(evidence):
-            earlier = look_again(
-                observations,
-                drift_of(fused, prior),
-                evidence.limits,
-                drifting=evidence.drifting,
-                intrinsics=lens,
-                prior=prior,
-                site=site,
-                flow=flow,
-            )
+    seen = evidence.tracks[found.first :]
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
     averaged = None
     if len(predictions) >= FEWEST_TRACKS:
         averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
     return Finding(
-        joint=joint,
-        fused=fused,
-        earlier=earlier,
+        joint=found.joint,
+        fused=found.fused,
+        earlier=found.earlier,
         averaged=averaged,
         reading=reading,
         tracks=seen,
-        change=change,
+        change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         lacks=tuple(lacks.said),
     )
 
 
-def _paths_of(evidence: Evidence, lacks: Lacks) -> tuple[FlowReference | None, DriftChart | None]:
-    """The flow map and its chart, of which the pose needs neither; None where there is none.
+def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> CameraSite:
+    """What is known of the site. The pose needs neither the flow map nor its chart.
 
     One of another release cannot be read: the next growth of the map brings new ones.
     """
+    if evidence.site is None:
+        return assume_site(observed, evidence.intrinsics, evidence.prior, evidence.walk)
+    speeds = reference_from_bytes(evidence.site)
     flow, chart = None, None
     if evidence.flow is not None:
         flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
     if flow is not None and evidence.chart is not None:
         chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
-    return flow, chart
+    return CameraSite(
+        intrinsics=evidence.intrinsics,
+        prior=evidence.prior,
+        speeds=speeds,
+        flow=flow,
+        chart=chart,
+    )
 
 
 def _read(
-    evidence: Evidence,
-    observations: Observations,
-    flow: FlowReference,
-    chart: DriftChart,
-    first: int,
+    evidence: Evidence, observed: Observations, site: CameraSite, first: int
 ) -> Reading | None:
-    """What the chart says of the tracks from the first after a change on, or else of all.
-
-    At the level that the allowed alarms come to. Once a person has said that the camera is where
-    it should be, it begins anew.
-    """
-    unanswered = np.flatnonzero([track.unanswered for track in evidence.tracks])
-    usual = Usual(prior=evidence.prior, paces=chart.paces, paths=flow.site(evidence.intrinsics))
-    for asked in (unanswered[unanswered >= first], unanswered):
-        if not asked.size:
-            continue
-        scores = score_parties(of_tracks(observations, asked), usual)
-        parties_a_year = evidence.tracks_a_year * max(scores.last.size, 1) / asked.size
-        reading = read_chart(
-            chart,
-            scores,
-            RUN * evidence.alarms_a_year / parties_a_year,
-            calm_ratio=evidence.limits.clear_ratio,
-            calm_parties=evidence.limits.people,
-        )
-        if reading is not None:
-            return replace(reading, track_idx=int(asked[reading.track_idx]))
-    return None
+    """What the chart says; once a person has said how the camera stands, it begins anew."""
+    rate = AlarmRate(
+        alarms_a_year=evidence.alarms_a_year,
+        tracks_a_year=evidence.tracks_a_year,
+        calm_ratio=evidence.limits.clear_ratio,
+        calm_parties=evidence.limits.people,
+    )
+    unanswered = np.array([track.unanswered for track in evidence.tracks])
+    return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)
 
 
 def asked_enough(evidence: Evidence) -> bool:

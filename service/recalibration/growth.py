@@ -7,19 +7,20 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.drift.change_point import FEWEST_BESIDE
-from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.recalibration import learn_site, observe
 from models.trajectory import Trajectory
 from service.recalibration.attendance import Attendance, attendance_of
-from service.recalibration.paths import LearnedPaths, learn_paths
+from service.recalibration.paths import LearnedPaths, paths_of
 from service.recalibration.references import is_outdated, made_against, window_of
 from service.recalibration.stillness import Doubt, doubts, still_bounds
+from service.recalibration.unpacked import Unpacked
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, tracks
-from service.store.packing import intrinsics_of, pose_of_prior, seen_of
+from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import FlowMapRecord, SiteReferenceRecord
 
 _FEWEST_NEW = 50
@@ -47,8 +48,11 @@ class GrowthPeriod:
     spoilt: bool
 
 
-def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthPeriod | None:
+def take_growth(
+    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+) -> GrowthPeriod | None:
     """The tracks to learn a camera's map anew of; None where it is to stay as it is."""
+    unpacked = unpacked or Unpacked()
     camera = cameras.find(session, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is None:
@@ -81,7 +85,7 @@ def take_growth(session: Session, settings: Settings, camera_id: str) -> GrowthP
         site=reference.data,
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
-        trajectories=tuple(seen_of(record, intrinsics) for record in records),
+        trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
         weights=weights,
         to_s=to_s,
         taken_at=datetime.now(UTC),
@@ -97,15 +101,15 @@ def grow(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     """
     if not period.trajectories:
         return None
-    observations = observe(period.trajectories, period.intrinsics)
-    return learn_paths(
-        observations,
+    grown = learn_site(
+        observe(period.trajectories, period.intrinsics),
         period.intrinsics,
         period.prior,
-        reference_from_bytes(period.site),
-        seed,
-        period.weights,
+        seed=seed,
+        speeds=reference_from_bytes(period.site),
+        weights=period.weights,
     )
+    return paths_of(grown)
 
 
 def keep_growth(

@@ -1,10 +1,11 @@
 """What may fail beside the served estimate: each failure is logged and said, and stops nobody."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from models.errors import CheckpointError
+from models.recalibration import Lack
 
 log = logging.getLogger("surefoot.recalibration")
 
@@ -30,6 +31,13 @@ class Lacks:
             log.exception(f"{what}_failed", extra={"camera_id": self._camera_id})
             self.add(what, repr(error))
         return None
+
+    def take(self, found: Sequence[Lack]) -> None:
+        """Say what failed beside a pose."""
+        for lack in found:
+            fields = {"camera_id": self._camera_id}
+            log.error(f"{lack.part}_failed", exc_info=lack.error, extra=fields)
+            self.add(lack.part, repr(lack.error))
 
     def add(self, what: str, why: str) -> None:
         """Say that something is missing, and why."""

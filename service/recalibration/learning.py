@@ -15,23 +15,23 @@ from models.estimation.averaged import (
     TrackPredictions,
     averaged_estimate,
 )
-from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_to_bytes
-from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.recalibration import learn_site, observe
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
 from service.recalibration.evidence import as_predictions, walk_of
-from service.recalibration.paths import LearnedPaths, learn_paths
+from service.recalibration.paths import LearnedPaths, paths_of
 from service.recalibration.references import wanted_tracks
+from service.recalibration.unpacked import Unpacked
 from service.settings import Settings
 from service.store import cameras, maintenance, references, tracks, trainings
-from service.store.packing import intrinsics_of, pose_of_prior, seen_of
+from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables import FlowMapRecord, PredictionRecord
 
 _DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
@@ -59,8 +59,11 @@ class LearnedReference:
     offsets: dict[str, Any]
 
 
-def take_period(session: Session, settings: Settings, camera_id: str) -> ReferencePeriod | None:
+def take_period(
+    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+) -> ReferencePeriod | None:
     """The tracks to learn a camera's reference of; None as long as there are not enough."""
+    unpacked = unpacked or Unpacked()
     camera = cameras.find(session, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is not None:
@@ -83,7 +86,7 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         walk=walk_of(camera),
-        trajectories=tuple(seen_of(record, intrinsics) for record in records),
+        trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
         to_s=records[-1].ended_s,
         predictions=as_predictions(found),
     )
@@ -91,17 +94,16 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
 
 def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
     """What is usual at the site; None where too few of the tracks walk."""
-    observations = observe(period.trajectories, period.intrinsics)
+    observed = observe(period.trajectories, period.intrinsics)
     try:
-        site = learn_reference(observations, period.prior, period.walk, seed)
+        site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    offsets = {"joint": _joint_offset(site)}
+    offsets = {"joint": _joint_offset(site.speeds)}
     if len(period.predictions) >= FEWEST_TRACKS:
         estimate = averaged_estimate(period.predictions, seed)
         offsets["averaged"] = _averaged_offset(estimate, period.prior)
-    paths = learn_paths(observations, period.intrinsics, period.prior, site, seed)
-    return LearnedReference(site=site, paths=paths, offsets=offsets)
+    return LearnedReference(site=site.speeds, paths=paths_of(site), offsets=offsets)
 
 
 def keep_reference(

@@ -28,9 +28,8 @@ def trajectory_of(record: TrackRecord) -> Trajectory:
     return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
 
 
-def seen_of(record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
-    """The foot points of a stored track, and the upper edges of its boxes where it has them."""
-    feet = trajectory_of(record)
+def seen_of(record: TrackRecord, feet: Trajectory, intrinsics: Intrinsics) -> Trajectory:
+    """The feet of a stored track with the upper edges of its boxes, where it has them."""
     if record.boxes is None:
         return feet
     return replace(feet, top_v=tops_of_boxes(intrinsics, unpack(record.boxes, 4)))

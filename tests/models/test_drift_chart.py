@@ -39,6 +39,8 @@ def read_chart(chart, scores, alarms):
 
 
 def feet(tracks):
+    """What is read of feet, in the order of the tracks' ends."""
+    tracks = sorted(tracks, key=lambda track: track.time_s[-1])
     return observe([replace(track, top_v=None) for track in tracks], LENS)
 
 

@@ -15,7 +15,7 @@ from models.evaluation.learned import learn_case
 from models.evaluation.protocol import ProtocolCase, judge_answer
 from models.simulation.site import SiteConfig
 from models.simulation.walkers import WalkConfig
-from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
+from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))
 
@@ -27,8 +27,8 @@ def case_of(known, after) -> ProtocolCase:
         intrinsics=LENS,
         prior_pose=PRIOR,
         true_pose=TURNED,
-        reference=tuple(known),
-        seen=tuple(after),
+        reference=tuple(in_time(known)),
+        seen=tuple(in_time(after)),
     )
 
 
@@ -49,8 +49,8 @@ def test_what_is_shared_is_what_each_would_learn(learned):
         alone = joint_estimate(seen(after), PRIOR, reference)
         assert_array_equal(answer.values, alone.values)
         assert_array_equal(answer.covariance, alone.covariance)
-    assert learned.site.statures is not None
-    assert learned.feet_site.statures is None
+    assert learned.site.speeds.statures is not None
+    assert learned.feet_speeds.statures is None
 
 
 def test_the_map_alone_finds_the_camera_again_without_any_speed(learned):
@@ -75,7 +75,7 @@ def test_speeds_make_the_map_surer(learned):
 
 
 def test_without_a_map_registration_says_nothing_and_fused_is_the_joint_estimate(learned):
-    blind = replace(learned, flow=None)
+    blind = replace(learned, site=replace(learned.site, flow=None))
     nothing = registration(blind)
     assert (nothing.tracks, len(nothing.weak), nothing.heading_rad) == (0, 3, None)
     assert_array_equal(fused(blind).values, joint(blind).values)

@@ -4,21 +4,17 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import observe
-from models.estimation.joint.reference import learn_reference
 from models.evaluation.protocol import RANGES, Answer, draw_case, judge_answer, pose_of_numbers
 from models.evaluation.scenes import load_scene
-from models.flow.fusion import fused_estimate
 from models.flow.packing import flow_from_bytes, flow_to_bytes
-from models.flow.reference import learn_flow
 from models.geometry.upright import tops_of_boxes
-from models.simulation.walkers import WalkConfig
+from models.recalibration import estimate_pose, learn_site, observe
 from models.trajectory import Trajectory
 from service.replay_protocol import boxes_of, tops_carried
 
@@ -43,11 +39,11 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     assert done.returncode == 0, done.stdout + done.stderr
     case = draw_case(load_scene(folder), seed, RANGES[knock])
     known, seen = observe(case.reference, case.intrinsics), observe(case.seen, case.intrinsics)
-    site = learn_reference(known, case.prior_pose, WalkConfig(), service.settings.seed)
-    joint = joint_estimate(seen, case.prior_pose, site)
-    paths = learn_flow(known, case.intrinsics, case.prior_pose, service.settings.seed)
-    stored = flow_from_bytes(flow_to_bytes(paths))
-    offline = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, stored)
+    seed = service.settings.seed
+    site = learn_site(known, case.intrinsics, case.prior_pose, seed=seed, chart=False)
+    stored = flow_from_bytes(flow_to_bytes(site.flow))
+    found = estimate_pose(seen, replace(site, flow=stored))
+    offline = found.fused
     pose = pose_of_numbers(offline.values[:3], case.prior_pose)
     body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()
     sd = np.sqrt(np.diag(offline.covariance))
@@ -71,7 +67,7 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     answer = Answer(
         values=offline.values[:3],
         covariance=offline.covariance[:3, :3],
-        tracks=joint.walkers,
+        tracks=found.joint.walkers,
         heading_rad=heading_rad,
         heading_sd_rad=float(sd[3]),
     )
@@ -80,7 +76,7 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     assert off in done.stdout
     assert body["tracks"] == len(case.seen)
     assert body["reference"]["tracks"] == len(case.reference)
-    assert body["reference"]["walking_speed_mps"] == pytest.approx(site.walking_speed_mps)
+    assert body["reference"]["walking_speed_mps"] == pytest.approx(site.speeds.walking_speed_mps)
     assert body["state"] == "drifting"
 
 

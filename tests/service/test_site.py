@@ -9,14 +9,12 @@ import pytest
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes
-from models.estimation.joint.reference import learn_reference
-from models.flow.fusion import fused_estimate
 from models.flow.packing import flow_from_bytes, flow_to_bytes
-from models.flow.reference import learn_flow
-from models.simulation.walkers import WalkConfig
+from models.recalibration import estimate_pose, learn_site
 from service.jobs.estimate import learn_if_due
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
+from service.recalibration.unpacked import Unpacked
 from service.store import references
 from tests.conftest import CAMERA, track
 from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall
@@ -84,8 +82,9 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     street.walk(KNOCKED, 50)
     body = street.look()
     known, seen = street.observed(0, WANTED), street.observed(WANTED, WANTED + 50)
-    joint = joint_estimate(seen, PRIOR, learn_reference(known, PRIOR, WalkConfig(), 0))
-    offline = fused_estimate(seen, LENS, PRIOR, joint, as_stored(learn_flow(known, LENS, PRIOR, 0)))
+    site = learn_site(known, LENS, PRIOR)
+    found = estimate_pose(seen, replace(site, flow=as_stored(site.flow)))
+    joint, offline = found.joint, found.fused
     tilt, roll, log_height, _ = offline.values
     assert served(body) == pytest.approx(
         [math.degrees(tilt), math.degrees(roll), math.exp(log_height)], abs=1e-6
@@ -279,7 +278,7 @@ def test_another_walking_speed_learns_the_same_tracks_again(known):
 
 def test_what_a_worker_had_learned_when_it_died_is_not_learned_again(street):
     street.walk(PRIOR, WANTED + 40)
-    learn_if_due(street.context, "corner")  # and no estimate came of it
+    learn_if_due(street.context, "corner", Unpacked())  # and no estimate came of it
     learned = reference_of(street)
     again = Street(street.http, street.context.settings)
     body = again.look()

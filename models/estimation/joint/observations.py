@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
 from models.trajectory import Trajectory
@@ -69,10 +70,11 @@ class Tops:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observations:
-    """All that is read of a set of tracks."""
+    """All that is read of a set of tracks, and when each of them ended (tracks,)."""
 
     steps: Steps
     tops: Tops
+    ended_s: Array
     tracks: int
 
     @property
@@ -130,8 +132,25 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             top_y=_joined(tops, (0,)),
             rows=_rows(top_owners, top_runs, top_times, count),
         ),
+        ended_s=np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64),
         tracks=count,
     )
+
+
+def check_in_time(observations: Observations) -> None:
+    """Refuse tracks that are not in the order of their ends: what came after what counts here.
+
+    Raises:
+        ShapeError: a track that ended before the one before it.
+    """
+    early = np.flatnonzero(np.diff(observations.ended_s) < 0)
+    if early.size:
+        track = int(early[0]) + 1
+        before_s = float(observations.ended_s[track - 1] - observations.ended_s[track])
+        raise ShapeError(
+            f"tracks: must be in the order of their ends, got one at {track} that ended "
+            f"{before_s:g} s before the one at {track - 1}"
+        )
 
 
 def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Observations:
@@ -149,6 +168,7 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
             top_y=tops.top_y[kept_tops],
             rows=_kept(tops.rows, kept_tops, renumber, chosen.size),
         ),
+        ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
     )
 

@@ -1,0 +1,139 @@
+"""The pose that tracks tell of a camera whose site is known: by speeds, places and since when."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from models.drift.verdict import Drift, DriftLimits, asks_again, drift_between, pose_after
+from models.estimation.joint.estimate import JointEstimate, joint_estimate
+from models.estimation.joint.observations import Observations, check_in_time, of_tracks
+from models.estimation.joint.reference import FEWEST_WALKERS
+from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
+from models.geometry.pose import CameraPose
+from models.recalibration.changes import search_change
+from models.recalibration.lacks import Lack, unless_failed
+from models.recalibration.site import CameraSite
+
+FLOW_MAP = "flow_map"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondLook:
+    """What a verdict goes by: its limits, and whether the camera is taken for moved by now."""
+
+    limits: DriftLimits
+    drifting: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseFinding:
+    """The pose of a window, from the newest change on.
+
+    `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
+    same without the newest people; None unless a verdict asks for it. `change_idx` is the first
+    track after the change, None where there was none, and `first` the first that counts.
+    `searched_by_map` says whether the flow map was asked for a change, `lacks` what failed beside.
+    """
+
+    prior: CameraPose
+    joint: JointEstimate
+    fused: FusedEstimate
+    earlier: FusedEstimate | None = None
+    change_idx: int | None = None
+    first: int = 0
+    searched_by_map: bool = False
+    lacks: tuple[Lack, ...] = ()
+
+    @property
+    def drift(self) -> Drift:
+        """How far the camera is from its prior pose, with standard deviations."""
+        return drift_of(self.fused, self.prior)
+
+    @property
+    def pose(self) -> CameraPose:
+        """The prior pose moved by what the tracks tell."""
+        return pose_after(self.drift, self.prior)
+
+
+def estimate_pose(
+    tracks: Observations, site: CameraSite, second_look: SecondLook | None = None
+) -> PoseFinding:
+    """The pose that explains tracks best, from the newest change of the camera on.
+
+    What the flow map says may fail: the pose is by speeds alone then, and the failure is told. Of
+    a site that was not learned, all tracks count and the walking speed is assumed.
+
+    Args:
+        tracks: of the window, in the order of their ends.
+        site: of the camera.
+        second_look: what a verdict goes by, if there is to be one: where it is about to change, the
+            pose is asked for without the newest people, too. That takes as long again.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    check_in_time(tracks)
+    prior = site.prior
+    if not site.learned:
+        joint = joint_estimate(tracks, prior, site.speeds)
+        return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
+    lacks: list[Lack] = []
+    searched = None
+    if site.flow is not None:
+        searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site))
+    searched_by_map = searched is not None
+    if searched is None:
+        site = replace(site, flow=None)
+        searched = search_change(tracks, site)
+    fused = by_speeds_alone(searched.joint, prior)
+    if site.flow is not None:
+        by_map = unless_failed(
+            lacks, FLOW_MAP, partial(_fused, searched.tracks, searched.joint, site)
+        )
+        if by_map is None:
+            site = replace(site, flow=None)
+        else:
+            fused = by_map
+    earlier = None
+    if second_look is not None:
+        earlier = _look_again(searched.tracks, drift_of(fused, prior), second_look, site)
+    return PoseFinding(
+        prior=prior,
+        joint=searched.joint,
+        fused=fused,
+        earlier=earlier,
+        change_idx=searched.change_idx,
+        first=searched.first,
+        searched_by_map=searched_by_map,
+        lacks=tuple(lacks),
+    )
+
+
+def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
+    """How far an estimate is from the prior pose."""
+    return drift_between(fused.values, fused.covariance, fused.told, prior)
+
+
+def _fused(tracks: Observations, joint: JointEstimate, site: CameraSite) -> FusedEstimate:
+    """By speeds, and by places where these are known."""
+    if site.flow is None:
+        return by_speeds_alone(joint, site.prior)
+    return fused_estimate(tracks, site.intrinsics, site.prior, joint, site.flow)
+
+
+def _look_again(
+    tracks: Observations, drift: Drift, second_look: SecondLook, site: CameraSite
+) -> FusedEstimate | None:
+    """The pose without the newest people who walk; None where it is not asked for, or too few are.
+
+    A pose takes a second: only a verdict that is about to change needs it.
+    """
+    limits = second_look.limits
+    if not asks_again(drift, limits, drifting=second_look.drifting):
+        return None
+    walkers = np.unique(tracks.steps.rows.owner_idx)
+    if walkers.size < limits.people + FEWEST_WALKERS:
+        return None
+    older = of_tracks(tracks, np.arange(walkers[-limits.people]))
+    return _fused(older, joint_estimate(older, site.prior, site.speeds), site)

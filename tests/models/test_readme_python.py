@@ -1,0 +1,52 @@
+"""The Python of the README of `models/` runs as it stands there, on a MOT text of walkers."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.simulation.site import SiteConfig
+from tests.models.sites import KNOCKED, PRIOR, near, tracks_of
+
+README = (Path(__file__).parents[2] / "models" / "README.md").read_text()
+
+
+def code() -> str:
+    (found,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    return found
+
+
+def mot_lines(tracks) -> list[str]:
+    """Boxes half a metre wide of 1.7 m, whose feet are those of the tracks; 25 frames a second."""
+    lines = []
+    for number, track in enumerate(tracks, start=1):
+        for time_s, (u, v) in zip(track.time_s, track.uv, strict=True):
+            box = f"{u + 1 - 20:.3f},{v + 1 - 100:.3f},40,100"
+            lines.append(f"{round(time_s * 25)},{number},{box},1,-1,-1,-1")
+    return lines
+
+
+def test_ten_lines_learn_a_site_and_find_a_knock(tmp_path, monkeypatch, capsys):
+    config = SiteConfig(aside_m=0.8, standing_share=0.0)
+    known, after = tracks_of(3, (PRIOR, 200), (KNOCKED, 80), config=config)
+    lines = mot_lines([*known, *after])
+    shuffled = np.random.default_rng(0).permutation(lines)  # trackers write frame by frame
+    (tmp_path / "tracks.txt").write_text("\n".join(shuffled))
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(code(), "models/README.md", "exec"), names)  # noqa: S102
+    found = names["found"]
+    assert (np.abs(near(found.pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), found.pose
+    assert found.pose.heading_rad == pytest.approx(PRIOR.heading_rad, abs=np.radians(1.5))
+    printed = capsys.readouterr().out
+    told = dict(re.findall(r"^(\w+): ([+-][\d.]+) off the prior pose", printed, re.MULTILINE))
+    assert set(told) == {"tilt", "roll", "height", "heading"}
+    assert float(told["tilt"]) == pytest.approx(found.pose.tilt_rad - PRIOR.tilt_rad, abs=6e-4)
+    within = float(re.search(r"tilt: .* give or take ([\d.]+)", printed)[1])
+    assert 0 < within < np.radians(2)
+
+
+def test_it_is_about_ten_lines():
+    statements = [line for line in code().splitlines() if line.strip()]
+    assert len(statements) <= 16

@@ -1,0 +1,234 @@
+"""The calls that the service and the studies share: learn a site, estimate, read the chart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.drift.change_point import find_change
+from models.drift.chart_learning import learn_chart
+from models.drift.party_scores import score_parties
+from models.drift.verdict import DriftLimits
+from models.errors import ShapeError, TooFewTrajectoriesError
+from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.observations import of_tracks
+from models.evaluation.flow_runs import fused
+from models.evaluation.learned import Learned
+from models.evaluation.protocol import ProtocolCase
+from models.evaluation.served import served_pose
+from models.flow.folds import fold_maps
+from models.flow.fusion import by_speeds_alone
+from models.flow.reference import candidate_of
+from models.recalibration import (
+    AlarmRate,
+    SecondLook,
+    assume_site,
+    estimate_pose,
+    learn_site,
+    observe,
+    read_alarm_chart,
+)
+from models.simulation.site import SiteConfig
+from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, near, seen, tracks_of
+
+CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
+ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
+LIMITS = DriftLimits(
+    sigmas=5.0, floor_rad=np.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def tracks():
+    """Reference tracks, then some of the still camera and of the knocked one."""
+    known, still, after = tracks_of(3, (PRIOR, 150), (PRIOR, 60), (KNOCKED, 60), config=CONFIG)
+    return [in_time(part) for part in (known, still, after)]
+
+
+@pytest.fixture(scope="module")
+def site(tracks):
+    return learn_site(seen(tracks[0]), LENS, PRIOR)
+
+
+@pytest.fixture(scope="module")
+def window(tracks):
+    return seen(in_time([*tracks[1], *tracks[2]]))
+
+
+def swapped(tracks):
+    """The same in another order than that of time."""
+    return seen([*tracks[30:], *tracks[:30]])
+
+
+def test_the_pose_is_from_the_change_on(site, window, tracks):
+    found = estimate_pose(window, site)
+    assert abs(found.change_idx - 60) <= 3
+    assert found.first == found.change_idx
+    assert (np.abs(near(found.pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), found.pose
+    # It is what is said of the tracks from there on alone.
+    alone = estimate_pose(of_tracks(window, np.arange(found.first, window.tracks)), site)
+    assert alone.change_idx is None
+    np.testing.assert_array_equal(found.fused.values, alone.fused.values)
+    np.testing.assert_array_equal(found.fused.covariance, alone.fused.covariance)
+    assert (found.searched_by_map, found.lacks) == (True, ())
+
+
+def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
+    still = seen(tracks[1])
+    found = estimate_pose(still, site)
+    assert (found.change_idx, found.first) == (None, 0)
+    assert abs(found.drift.tilt_rad) < np.radians(1)
+    assert not read_alarm_chart(still, site, ONE_A_YEAR).moved
+
+
+def test_the_chart_alarms_at_the_rate_that_is_allowed(site, window):
+    reading = read_alarm_chart(window, site, ONE_A_YEAR)
+    assert reading.moved
+    assert reading.track_idx == pytest.approx(60, abs=12)
+    often = read_alarm_chart(window, site, replace(ONE_A_YEAR, alarms_a_year=100.0))
+    assert often.level < reading.level
+
+
+def test_the_chart_asks_those_after_the_change_who_count_or_else_all_who_do(site, window):
+    counted = np.ones(window.tracks, dtype=bool)
+    counted[:40] = False
+    late = read_alarm_chart(window, site, ONE_A_YEAR, counted=counted, first=70)
+    alone = read_alarm_chart(of_tracks(window, np.arange(70, 120)), site, ONE_A_YEAR)
+    assert late == replace(alone, track_idx=alone.track_idx + 70)
+    # Ten tracks after the change are too few: all that count are asked.
+    few = read_alarm_chart(window, site, ONE_A_YEAR, counted=counted, first=110)
+    assert few == read_alarm_chart(window, site, ONE_A_YEAR, counted=counted)
+    assert few.track_idx >= 40
+    nobody = np.zeros(window.tracks, dtype=bool)
+    assert read_alarm_chart(window, site, ONE_A_YEAR, counted=nobody) is None
+
+
+def test_the_second_look_leaves_the_newest_people_out_where_a_verdict_may_change(site, tracks):
+    after = seen(tracks[2])
+    asked = SecondLook(limits=LIMITS, drifting=False)
+    found = estimate_pose(after, site, asked)
+    older = estimate_pose(of_tracks(after, np.arange(60 - LIMITS.people)), site)
+    np.testing.assert_array_equal(found.earlier.values, older.fused.values)
+    assert estimate_pose(after, site).earlier is None
+    assert estimate_pose(after, site, replace(asked, drifting=True)).earlier is None
+    assert estimate_pose(seen(tracks[2][:15]), site, asked).earlier is None  # 3 would be left
+
+
+def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, tracks):
+    every = seen([*tracks[0], *tracks[1]])
+    evenly = learn_site(every, LENS, PRIOR, speeds=site.speeds)
+    weights = np.linspace(0.05, 1, every.tracks)
+    faded = learn_site(every, LENS, PRIOR, speeds=site.speeds, weights=weights)
+    assert evenly.speeds is faded.speeds is site.speeds
+    assert evenly.chart.parties > site.chart.parties
+    assert site.flow.people < evenly.flow.people
+    assert faded.flow.people < evenly.flow.people
+
+
+def test_speeds_of_the_first_tracks_and_a_map_of_all(site, tracks):
+    every = seen([*tracks[0], *tracks[1]])
+    found = learn_site(every, LENS, PRIOR, speed_tracks=150, chart=False)
+    np.testing.assert_array_equal(found.speeds.offset, site.speeds.offset)
+    assert found.chart is None
+    assert found.flow.people > site.flow.people
+
+
+def test_few_people_make_no_map_and_fewer_no_site(tracks):
+    few = learn_site(seen(tracks[0][:8]), LENS, PRIOR)
+    assert few.learned
+    assert (few.flow, few.chart) == (None, None)
+    found = estimate_pose(seen(tracks[2]), few)
+    assert (found.searched_by_map, found.fused.raw) == (False, None)
+    assert read_alarm_chart(seen(tracks[2]), few, ONE_A_YEAR) is None
+    with pytest.raises(TooFewTrajectoriesError, match="at least 5"):
+        learn_site(seen(tracks[0][:3]), LENS, PRIOR)
+
+
+def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
+    site = assume_site(window, LENS, PRIOR)
+    assert not site.learned
+    found = estimate_pose(window, site, SecondLook(limits=LIMITS, drifting=False))
+    joint = joint_estimate(window, PRIOR, site.speeds)
+    np.testing.assert_array_equal(found.joint.values, joint.values)
+    np.testing.assert_array_equal(found.fused.values, by_speeds_alone(joint, PRIOR).values)
+    assert (found.change_idx, found.earlier) == (None, None)
+
+
+@pytest.mark.parametrize("fails_at", ["search", "pose"])
+def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, window, fails_at):
+    flow = site.flow
+    if fails_at == "search":
+        flow = replace(flow, still=replace(flow.still, covariance=np.eye(3)))
+    else:
+        flow = replace(flow, bias=np.zeros(3))
+    spoilt = replace(site, flow=flow)
+    found = estimate_pose(window, spoilt)
+    (lack,) = found.lacks
+    assert lack.part == "flow_map"
+    assert isinstance(lack.error, ValueError)
+    assert found.searched_by_map == (fails_at == "pose")
+    assert abs(found.change_idx - 60) <= 3
+    blind = estimate_pose(window, replace(site, flow=None))
+    np.testing.assert_array_equal(found.fused.values, blind.fused.values)
+    with pytest.raises(ValueError, match="dimension|shape|broadcast|signature"):
+        served_pose(window, spoilt)  # a study does not do without
+
+
+def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, tracks):
+    case = ProtocolCase(
+        scene_id="simulated",
+        seed=0,
+        intrinsics=LENS,
+        prior_pose=PRIOR,
+        true_pose=KNOCKED,
+        reference=tuple(tracks[0]),
+        seen=tuple(in_time([*tracks[1], *tracks[2]])),
+    )
+    learned = Learned(case=case, seen=window, site=site, feet=window, feet_speeds=site.speeds)
+    answer, found = fused(learned), estimate_pose(window, site)
+    np.testing.assert_array_equal(answer.values, found.fused.values[:3])
+    assert answer.tracks == found.joint.walkers < window.walkers - 50
+
+
+def refusals(site, tracks):
+    """All that goes by the order of time, each given tracks out of order."""
+    mixed = swapped(tracks)
+    folds = fold_maps(mixed, LENS, candidate_of(PRIOR), 0)
+    return {
+        "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
+        "estimate_pose": lambda: estimate_pose(mixed, site),
+        "read_alarm_chart": lambda: read_alarm_chart(mixed, site, ONE_A_YEAR),
+        "score_parties": lambda: score_parties(mixed, site.usual(site.flow, site.chart)),
+        "find_change": lambda: find_change(mixed, PRIOR, site.speeds),
+        "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speeds, folds, 0),
+    }
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "learn_site",
+        "estimate_pose",
+        "read_alarm_chart",
+        "score_parties",
+        "find_change",
+        "learn_chart",
+    ],
+)
+def test_tracks_out_of_order_are_refused(site, tracks, call):
+    gone_s = float(tracks[1][-1].time_s[-1] - tracks[1][0].time_s[-1])
+    with pytest.raises(ShapeError, match="order of their ends, got one at 30 that ended") as told:
+        refusals(site, tracks[1])[call]()
+    assert f"{gone_s:g} s before the one at 29" in str(told.value)
+
+
+def test_tracks_that_ended_together_are_in_order(site, tracks):
+    """Of a crowd, many end with the film; a cut never goes through them."""
+    last_s = tracks[2][0].time_s[-1]
+    together = [
+        replace(track, time_s=track.time_s - track.time_s[-1] + last_s) for track in tracks[2]
+    ]
+    crowd = observe([*tracks[1], *together], LENS)
+    found = estimate_pose(crowd, site)
+    assert found.change_idx is not None
+    assert found.first == 60 <= found.change_idx

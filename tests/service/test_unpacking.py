@@ -1,0 +1,48 @@
+"""A refresh unpacks each track once: what it counts are the real calls, on a real database."""
+
+import sys
+
+import pytest
+
+from service.jobs.estimate import run_estimate
+from service.store import flow_maps, references
+from service.store.packing import unpack
+from tests.conftest import CAMERA
+from tests.service.street import PRIOR, Street
+
+WANTED = 60
+
+
+@pytest.fixture
+def unpackings():
+    """The bytes of each call of `unpack`, as the interpreter tells of them."""
+    found: list[bytes] = []
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code is unpack.__code__:
+            found.append(frame.f_locals["data"])
+
+    sys.setprofile(note)
+    yield found
+    sys.setprofile(None)
+
+
+@pytest.mark.parametrize("form", ["points", "boxes"])
+def test_each_track_of_a_refresh_is_unpacked_once(http, settings, unpackings, form):
+    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+    street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
+    street.walk(PRIOR, WANTED, form=form)
+    street.walk(PRIOR, 70, form=form)  # the map grows with the same look, by all of them
+    unpackings.clear()
+    run_estimate(street.context, "corner")
+    each = 1 if form == "points" else 2
+    assert len(unpackings) == each * (WANTED + 70)
+    assert len(set(unpackings)) == len(unpackings)
+    assert street.pose()["tracks"] == 70
+    with street.context.store.read() as session:
+        grown = flow_maps.find(session, references.newest(session, "corner").id)
+    assert grown.tracks == WANTED + 70  # as late as the growth they were at hand
+    street.walk(PRIOR, 5, form=form)
+    unpackings.clear()
+    run_estimate(street.context, "corner")
+    assert len(unpackings) == each * 75  # the window; the map has nothing to grow by
