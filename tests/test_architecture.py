@@ -86,6 +86,17 @@ def test_arrows_go_down_only(top, rooms):
                 assert level[room(name)] < level[here], f"{path} imports {name}"
 
 
+def test_the_pipeline_is_composed_in_one_place():
+    """The service and the studies call it; a study may ask for the joint estimate alone."""
+    parts = {"fused_estimate", "learn_flow", "learn_chart", "fold_maps", "find_change"}
+    parts |= {"moved_within", "moved_beyond_doubt", "read_chart", "by_speeds_alone"}
+    alone = {"joint_estimate", "learn_reference", "assumed_reference", "score_parties"}
+    for path in sources("service") + sources("models/evaluation"):
+        kept = parts if "evaluation" in path.parts else parts | alone
+        names = {name.rpartition(".")[2] for name in imports(path) if name.startswith("models.")}
+        assert not names & kept, path
+
+
 def test_only_routes_and_the_application_see_schemas():
     for path in sources("service"):
         if any(name.startswith("service.schemas") for name in imports(path)):
