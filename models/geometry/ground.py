@@ -44,20 +44,29 @@ def ground_from_pixel(
     Shapes as in `pixel_from_ground`, whose inverse this is.
     """
     rays, known = intrinsics.rays(uv)
-    ground, below = ground_of_rays(rays, rotation)
+    world, down, below = _falling(rays, rotation)
     hits = known & below
-    ground = centre_m[..., None, :2] + centre_m[..., None, 2:] * ground
+    scale = centre_m[..., None, 2] / down
+    ground = centre_m[..., None, :2] + scale[..., None] * world[..., :2]
     return np.where(hits[..., None], ground, np.nan), hits
 
 
 def ground_of_rays(rays: Array, rotation: Array, beyond: float = np.nan) -> tuple[Array, Mask]:
     """Ground points (..., N, 2) of rays (..., N, 3) of the camera frame, and which are valid.
 
-    In camera heights from the camera's foot, axes as the world's. A ray that is less than 0.3 deg
-    below the horizon has no place that is worth anything: it is not valid, and `beyond`, which
-    is 0 for those whose sums over all rays have to stay finite.
+    In camera heights from the camera's foot, axes as the world's. What is not valid is `beyond`,
+    which is 0 for those whose sums over all rays have to stay finite.
+    """
+    world, down, valid = _falling(rays, rotation)
+    return np.where(valid[..., None], world[..., :2] / down[..., None], beyond), valid
+
+
+def _falling(rays: Array, rotation: Array) -> tuple[Array, Array, Mask]:
+    """World directions (..., N, 3) of rays, how far they fall (..., N), and which hit the ground.
+
+    A ray less than 0.3 deg below the horizon hits none that is worth anything; 1 stands for how
+    far it falls.
     """
     world = rays @ rotation  # rows are points: (R.T @ ray).T
     valid = -world[..., 2] > LOWEST_SINE * np.linalg.norm(world, axis=-1)
-    down = np.where(valid, -world[..., 2], 1.0)[..., None]
-    return np.where(valid[..., None], world[..., :2] / down, beyond), valid
+    return world, np.where(valid, -world[..., 2], 1.0), valid
