@@ -37,6 +37,7 @@ SERVICE_ROOMS = [
 ]
 MODEL_ROOMS = [
     {"errors"},
+    {"packing", "quantiles"},
     {"geometry"},
     {"trajectory"},
     {"simulation"},

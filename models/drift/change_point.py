@@ -10,11 +10,12 @@ from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.quantiles import chi_squared_above
 
 FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own
-# Two poses from one differ by this much (chi-squared, 3 degrees of freedom) once in a million
-# windows; a window has a few hundred places to cut, which are far from independent.
-_LIMIT = 30.7
+# The share of windows in which two poses from one differ by as much as is called a move; a window
+# has a few hundred places to cut, which are far from independent.
+_BY_CHANCE = 1e-6
 _ROUNDS = 2
 
 
@@ -59,7 +60,8 @@ def find_change(
     assert after is not None
     apart = after.candidate - before.candidate
     covariance = (before.covariance + after.covariance) * reference.inflation
-    excess = float(apart @ np.linalg.solve(covariance, apart)) / _LIMIT
+    limit = chi_squared_above(_BY_CHANCE, 3)
+    excess = float(apart @ np.linalg.solve(covariance, apart)) / limit
     return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None
 
 

@@ -21,6 +21,7 @@ from models.flow.folds import Fold, Folds
 from models.flow.move import parties_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.quantiles import SD_OF_MEDIAN_DEVIATION
 
 _ENOUGH = 400  # parties that the answers to knocks are learned of
 _RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
@@ -73,7 +74,7 @@ def learn_chart(
     order = np.argsort(np.concatenate([part.times for part in asked]), kind="stable")
     scores = np.concatenate([part.still for part in asked])[order]
     middle = np.median(scores, axis=0)
-    width = 1.4826 * np.median(np.abs(scores - middle), axis=0) + 1e-9
+    width = SD_OF_MEDIAN_DEVIATION * np.median(np.abs(scores - middle), axis=0) + 1e-9
     chart = DriftChart(
         paces=relearned(observations, prior, site),
         middle=middle,

@@ -3,11 +3,12 @@
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
+from models.quantiles import chi_squared_above
 
-# Twice what a chi-squared of 3 degrees of freedom passes once in a million: the same people are
-# in many of a crowd's last tracks, and crowds change. On recorded scenes of still cameras, cuts
-# that were none reached 41.
-_LIMIT = 2 * 30.7
+# Twice what a chi-squared passes once in a million: the same people are in many of a crowd's last
+# tracks, and crowds change. On recorded scenes of still cameras, cuts that were none reached 41.
+_BY_CHANCE = 1e-6
+_DOUBT = 2.0
 
 
 def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
@@ -21,4 +22,4 @@ def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
         return False
     apart = after.values - before.values
     squared = float(apart @ np.linalg.solve(before.covariance + after.covariance, apart))
-    return squared > _LIMIT
+    return squared > _DOUBT * chi_squared_above(_BY_CHANCE, 3)

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import Observations, of_tracks
-from models.evaluation.protocol import Z90, angle_deg, pose_of_numbers
+from models.evaluation.protocol import angle_deg, pose_of_numbers
 from models.evaluation.scenes import Knock
 from models.evaluation.study_site import (
     LearnedPlace,
@@ -26,6 +26,7 @@ from models.evaluation.study_site import (
 from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.quantiles import Z90
 from models.simulation.site import draw_new_lane, walk_changed
 
 REFERENCE_TRACKS = 2000

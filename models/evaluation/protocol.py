@@ -11,11 +11,11 @@ from models.evaluation.scenes import Knock, Scene, knock_trajectory
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
+from models.quantiles import Z90
 from models.trajectory import Trajectory
 
 NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
-Z90 = 1.6448536269514722  # half the width of a 90 % interval, in standard deviations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -44,7 +44,10 @@ def show(request: Request) -> HTMLResponse:
 def preview(body: PreviewBody) -> PreviewOut:
     """What the picture and the ground look like by a form so far, and what is to say of it."""
     read = body.fields.read()
-    errors = {error.pointer[1:]: error.reason for error in read.errors}
+    typed = body.fields.model_dump()
+    wrong = {error.pointer[1:]: error.reason for error in read.errors}
+    # What is needed and not there yet is no error while the form is filled in.
+    errors = {name: reason for name, reason in wrong.items() if typed[name].strip()}
     lens, pose = values_of(read)
     if lens is None or pose is None:
         return PreviewOut(picture="", ground="", says=[], errors=errors)
@@ -52,8 +55,8 @@ def preview(body: PreviewBody) -> PreviewOut:
     feet = [track[:, 1:] for track in tracks]
     says = judge_pose(lens, pose, typed_angles=body.fields.form == "angles")
     if tracks:
-        rate_hz = read.rest["frame_rate_hz"] or _USUAL_RATE_HZ
-        says += judge_tracks(lens, pose, tracks, max(rate_hz, 1e-3))
+        rate_hz = None if read.rest is None else read.rest.frame_rate_hz
+        says += judge_tracks(lens, pose, tracks, max(rate_hz or _USUAL_RATE_HZ, 1e-3))
     view = ground_of(lens, pose)
     squares = "no ground in it" if view is None else f"a square is {view.spacing_m:g} m"
     drawn = picture_svg(

@@ -11,6 +11,9 @@ from service.schemas.base import Body, Finite
 from service.schemas.geometry import IntrinsicsBody, PoseOut, PriorPoseBody
 
 CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
+CameraName = Annotated[str, StringConstraints(max_length=200)]
+FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
+ReferenceTracks = Annotated[int, Field(ge=5, le=100_000)]
 
 
 class WalkingSpeedBody(Body):
@@ -24,12 +27,12 @@ class CameraBody(Body):
     """A camera to register."""
 
     id: CameraId | None = None
-    name: str | None = Field(None, max_length=200)
+    name: CameraName | None = None
     intrinsics: IntrinsicsBody
     prior_pose: PriorPoseBody
-    frame_rate_hz: Annotated[Finite, Field(gt=0, le=1000)] | None = None
+    frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
-    reference_tracks: int = Field(200, ge=5, le=100_000)
+    reference_tracks: ReferenceTracks = 200
 
     def to_spec(self) -> CameraSpec:
         """What the use case takes; an id is made of the name where none is given."""
@@ -48,12 +51,12 @@ class CameraBody(Body):
 class CameraPatch(Body):
     """What to change of a camera; fields left out stay."""
 
-    name: str | None = Field(None, max_length=200)
+    name: CameraName | None = None
     intrinsics: IntrinsicsBody | None = None
     prior_pose: PriorPoseBody | None = None
-    frame_rate_hz: Annotated[Finite, Field(gt=0, le=1000)] | None = None
+    frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
-    reference_tracks: int | None = Field(None, ge=5, le=100_000)
+    reference_tracks: ReferenceTracks | None = None
 
 
 class CameraOut(BaseModel):

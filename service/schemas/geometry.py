@@ -15,16 +15,20 @@ from service.schemas.base import Body, Finite, Triple
 # Of numbers beyond these nothing can be computed, let alone drawn.
 _HIGHEST_M, _FARTHEST_M = 10_000.0, 1e8
 
+FocalLength = Annotated[Finite, Field(ge=1, le=1e6)]
+Centre = Annotated[Finite, Field(ge=-1e6, le=1e6)]
+Tilt = Annotated[Finite, Field(ge=-90, le=90)]
+
 
 class IntrinsicsBody(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3."""
 
     width: int = Field(gt=0, le=100_000)
     height: int = Field(gt=0, le=100_000)
-    fx: Finite = Field(ge=1, le=1e6)
-    fy: Finite = Field(ge=1, le=1e6)
-    cx: Finite = Field(ge=-1e6, le=1e6)
-    cy: Finite = Field(ge=-1e6, le=1e6)
+    fx: FocalLength
+    fy: FocalLength
+    cx: Centre
+    cy: Centre
     distortion: list[Annotated[Finite, Field(ge=-1e4, le=1e4)]] = Field(
         default=[0.0] * 5, min_length=5, max_length=5
     )
@@ -53,7 +57,7 @@ class PriorPoseBody(Body):
     """A pose in one of four forms: angles, R and t, rvec and tvec, quaternion and position."""
 
     height_m: Finite | None = None
-    tilt_deg: Annotated[Finite, Field(ge=-90, le=90)] | None = None
+    tilt_deg: Tilt | None = None
     roll_deg: Annotated[Finite, Field(ge=-180, le=180)] = 0.0
     heading_deg: Annotated[Finite, Field(ge=-360, le=360)] = 0.0
     x_m: Finite = 0.0

@@ -7,11 +7,12 @@ from datetime import datetime, tzinfo
 
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
+from models.quantiles import Z90
 from service.recalibration.camera_page import CameraPage
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
 from service.web.moments import when
-from service.web.sentences import NAMES, Z90, signed
+from service.web.sentences import NAMES, signed
 from service.web.words import ago
 
 KINDS = {

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 
 from models.estimation.numbers import ANGLES
+from models.quantiles import Z90
 from service.recalibration.camera_page import CameraPage
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord
@@ -13,7 +14,6 @@ from service.web.words import duration
 
 # Operators say pan. Height is told apart.
 NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
-Z90 = 1.645  # standard deviations to each side of an interval that holds in 90 of 100 cases
 _SAYS_DEG = 0.1  # less is not worth a word
 
 

@@ -1,7 +1,9 @@
 """What is known of a camera in plain words, for who watches hundreds of them."""
 
 import math
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime, timedelta, tzinfo
+
+from babel.dates import format_timedelta
 
 from service.recalibration.camera_state import PoseState
 from service.recalibration.fleet import FleetCamera, FleetDrift
@@ -13,7 +15,8 @@ STATES: dict[PoseState, str] = {
     "learning": "Learning",
     "ok": "Steady",
 }
-_MINUTE_S, _HOUR_S, _DAY_S = 60.0, 3600.0, 86_400.0
+_AT_LEAST = 1.5  # of a unit, to say a length of time in it: "90 minutes", then "2 hours"
+_JUST_NOW = timedelta(seconds=10), timedelta(minutes=1)  # before and after now
 
 
 def situation(camera: FleetCamera, now: datetime) -> str:
@@ -68,22 +71,16 @@ def degrees(radians: float, *, signed: bool = False) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A length of time, roughly: "40 s", "12 min", "3 h", "4 days"."""
-    if seconds < 1.5 * _MINUTE_S:
-        return f"{max(seconds, 0):.0f} s"
-    if seconds < 1.5 * _HOUR_S:
-        return f"{seconds / _MINUTE_S:.0f} min"
-    if seconds < 1.5 * _DAY_S:
-        return f"{seconds / _HOUR_S:.0f} h"
-    return f"{seconds / _DAY_S:.0f} days"
+    """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
+    delta = timedelta(seconds=max(seconds, 0.0))
+    return format_timedelta(delta, threshold=_AT_LEAST, locale="en")
 
 
 def ago(at: datetime, now: datetime) -> str:
-    """How long ago a time was; `live.js` says it the same way as time goes on."""
-    seconds = (now - at).total_seconds()
-    if seconds < -_MINUTE_S:
-        return f"in {duration(-seconds)}"
-    return "just now" if seconds < 10 else f"{duration(seconds)} ago"
+    """How long ago a time was, or in how long it is; `times.js` says the same as time goes on."""
+    if now - _JUST_NOW[0] < at <= now + _JUST_NOW[1]:
+        return "just now"
+    return format_timedelta(at - now, threshold=_AT_LEAST, add_direction=True, locale="en")
 
 
 def clock_time(at: datetime, zone: tzinfo) -> str:

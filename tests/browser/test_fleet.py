@@ -1,9 +1,11 @@
 """The fleet page in a browser: live, sifted by keyboard, on a phone."""
 
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from service.web.words import ago
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.service.fleet_bench import Fleet, afternoon
 
@@ -120,3 +122,18 @@ def test_everybody_can_read_it(page, fleet, scheme):
     for width in (360, 768, 2560):
         page.set_viewport_size({"width": width, "height": 800})
         assert too_wide(page) <= 0, width
+
+
+def test_the_browser_says_ages_as_the_service_does(page, fleet):
+    page.goto("/")
+    now = datetime.now(UTC)
+    said = """async ages => {
+        const {ago} = await import(
+            document.querySelector('script[src*="fleet.js"]').src.replace("fleet.js", "times.js"));
+        return ages.map(age => ago(new Date(Date.now() - 1000 * age).toISOString()));
+    }"""
+    # Not at the edge of a rounding: the browser's clock goes on.
+    ages = [-7e6, -7200, -70.5, -30, 5, 40.2, 100, 5000, 9000, 1e5, 3e5, 11e5, 5e6, 4e7, 9e7]
+    words = [ago(now - timedelta(seconds=age), now) for age in ages]
+    assert page.evaluate(said, ages) == words
+    assert "2 hours ago" in words

@@ -12,7 +12,7 @@ from service.recalibration.estimates import drift_limits
 from service.store import fleet as statements
 from service.store.tables import EstimateRecord
 from service.web.rows import rows_of
-from service.web.words import duration, height_change
+from service.web.words import ago, duration, height_change
 from tests.service.bench import moved
 from tests.service.fleet_bench import Fleet, afternoon
 
@@ -74,8 +74,8 @@ def test_flags_say_what_is_under_way(http, fleet):
     http.post(f"/alerts/{alert}/silence", json={"until": until}).raise_for_status()
     html = http.get("/").text
     assert "training 37 %" in words(html, "trained")
-    assert "maintenance for 2 h more" in words(html, "attended")
-    assert "silenced for 3 h more" in words(html, "hushed")
+    assert "maintenance for 2 hours more" in words(html, "attended")
+    assert "silenced for 3 hours more" in words(html, "hushed")
 
 
 def test_a_tracker_that_is_to_blame_has_one_banner(http, fleet, settings):
@@ -199,7 +199,14 @@ def test_who_looks_for_a_page_that_is_not_there_gets_one(http):
 
 def test_lines_are_made_without_a_store():
     assert rows_of([], datetime.now(UTC), UTC) == []
-    assert [duration(s) for s in (3, 100, 7000, 2e5)] == ["3 s", "2 min", "2 h", "2 days"]
+    assert [duration(s) for s in (-1, 89, 100, 5390, 5400, 2e5)] == [
+        "0 seconds", "89 seconds", "2 minutes", "90 minutes", "2 hours", "2 days"
+    ]  # fmt: skip
+    now = datetime.now(UTC)
+    said = {-61: "in 61 seconds", -60: "just now", 9.9: "just now", 10: "10 seconds ago",
+            3000: "50 minutes ago", -7200: "in 2 hours", 11 * 86_400: "2 weeks ago"}  # fmt: skip
+    for seconds, words in said.items():
+        assert ago(now - timedelta(seconds=seconds), now) == words
     assert [height_change(m) for m in (-0.12, 1.34)] == ["12 cm lower", "1.3 m higher"]
 
 

@@ -229,8 +229,8 @@ def test_what_is_wrong_is_said_beside_its_field(http):
     document = problem(http.post("/ui/register", json=fields), 422, "malformed")
     reasons = {item["pointer"]: item["reason"] for item in document["errors"]}
     assert reasons == {
-        "/fx": "must be greater than or equal to 1",
-        "/tilt_deg": "must be less than or equal to 90",
+        "/fx": "at least 1 is needed, got 0",
+        "/tilt_deg": "at most 90 is taken, got 95",
     }
     fields = {**LENS, **ANGLES, "id": "Not An Id"}
     document = problem(http.post("/ui/register", json=fields), 422, "malformed")
@@ -240,3 +240,55 @@ def test_what_is_wrong_is_said_beside_its_field(http):
 
 def test_the_api_takes_what_it_took(http):
     assert http.post("/cameras", json=CAMERA).status_code == 201
+
+
+@pytest.mark.parametrize(
+    ("changes", "reasons"),
+    [
+        ({"fx": ""}, {"/fx": "is needed"}),
+        ({"fx": "0"}, {"/fx": "at least 1 is needed, got 0"}),  # and nothing of fy, which is fx
+        ({"fx": "1e7", "fy": "9e6"}, {
+            "/fx": "at most 1e+06 is taken, got 10000000",
+            "/fy": "at most 1e+06 is taken, got 9000000"}),
+        ({"width": "1920,5"}, {"/width": "a whole number is needed, got 1920.5"}),
+        ({"height": "0"}, {"/height": "more than 0 is needed, got 0"}),
+        ({"cx": "nan"}, {"/cx": "a number is needed, got 'nan'"}),
+        ({"roll_deg": "x" * 99}, {"/roll_deg": f"a number is needed, got '{'x' * 30}'"}),
+        ({"distortion": "1 2 3 4 5 6"}, {
+            "/distortion": "1 or 2 or 3 or 4 or 5 numbers are needed, got 6"}),
+        ({"height_m": "-2"}, {"/height_m": "must be above 0, got -2.0"}),
+        ({"height_m": "20000"}, {"/height_m": "at most 10000 m are taken, got 20000"}),
+        ({"x_m": "1e9"}, {"/x_m": "at most 1e+08 m are taken, got 1e+09"}),
+        ({"name": "n" * 201}, {"/name": "at most 200 letters are taken"}),
+        ({"id": "Not An Id"}, {"/id": "small letters, digits and hyphens are needed"}),
+        ({"frame_rate_hz": "0"}, {"/frame_rate_hz": "more than 0 is needed, got 0"}),
+        ({"reference_tracks": "4"}, {"/reference_tracks": "at least 5 is needed, got 4"}),
+        ({"form": "matrix", "rotation": "1 2"}, {
+            "/rotation": "9 or 3 numbers are needed, got 2", "/translation_m": "is needed"}),
+        ({"form": "matrix", "rotation": "0 0 0", "translation_m": "0, 0, 3"}, {
+            "/translation_m": "R and t put the camera under the ground (height -3.0 m): R has to "
+            "turn world into camera axes, and t is not the position but \N{MINUS SIGN}R times it"}),
+        ({"form": "matrix", "rotation": "[1.5707963, 0, 0]", "translation_m": "(2e9; 9; 0)"},
+         {"/translation_m": "at most 1e+08 m are taken, got -2e+09"}),
+    ],
+)  # fmt: skip
+def test_each_reason_names_its_field_its_limit_and_what_was_typed(http, changes, reasons):
+    fields = {**LENS, **ANGLES, **changes}
+    document = problem(http.post("/ui/register", json=fields), 422, "malformed")
+    assert {item["pointer"]: item["reason"] for item in document["errors"]} == reasons
+    shown = preview(http, **fields)["errors"]
+    typed = {pointer[1:]: reason for pointer, reason in reasons.items() if reason != "is needed"}
+    assert shown == typed
+    assert http.get("/cameras").json()["items"] == []
+
+
+def test_numbers_are_read_as_they_are_typed(http):
+    fields = {**LENS, **ANGLES, "width": " 1.92e3 ", "tilt_deg": "\N{MINUS SIGN}3,5°",
+              "cx": "", "cy": "", "distortion": "[0.5; 1]", "id": "typed"}  # fmt: skip
+    answer = http.post("/ui/register", json=fields)
+    assert answer.status_code == 201, answer.text
+    body = answer.json()
+    assert body["prior_pose"]["tilt_deg"] == pytest.approx(-3.5)
+    lens = body["intrinsics"]
+    assert (lens["width"], lens["fy"], lens["cx"], lens["cy"]) == (1920, 2696.36, 959.5, 539.5)
+    assert lens["distortion"] == [0.5, 1, 0, 0, 0]

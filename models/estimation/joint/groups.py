@@ -55,19 +55,23 @@ def parties_of(
             near = np.hypot(*(positions[i] - positions[j])) < _NEAR_M
             if near and ways[i] @ ways[j] > _SAME_WAY:
                 together[(owner_idx[i], owner_idx[j])] += 1
-    parties = {owner: {owner} for owner in lengths}
-    for (one, other), count in together.items():
-        if (
-            count >= _SHARE * min(lengths[one], lengths[other])
-            and parties[one] is not parties[other]
-        ):
-            joined = parties[one] | parties[other]
-            for owner in joined:
-                parties[owner] = joined
-    labels = np.arange(owners)
-    for party in parties.values():
-        labels[list(party)] = min(party)
-    return labels
+    beside = [
+        pair
+        for pair, count in together.items()
+        if count >= _SHARE * min(lengths[pair[0]], lengths[pair[1]])
+    ]
+    return _joined(np.array(beside, dtype=np.int64).reshape(-1, 2), owners)
+
+
+def _joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
+    """The first track (owners,) of all that pairs (K, 2) join each to."""
+    from scipy.sparse import coo_array  # late: the HTTP process has no use for it
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(owners, owners))
+    _, party_idx = connected_components(links, directed=False)
+    _, firsts = np.unique(party_idx, return_index=True)
+    return np.asarray(firsts[party_idx])
 
 
 def _sampled(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
+from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.trajectory import Trajectory
 
 STEP_S = 1.5  # longer than a stride, shorter than a change of mind
@@ -256,7 +257,7 @@ def _noise(rays: Array, aside: Array) -> float:
     if len(rays) < 3:
         return 0.0  # two nodes make one step, and one step has no track to differ from
     bend = ((rays[2:] - 2 * rays[1:-1] + rays[:-2]) * aside[1:]).sum(axis=1)
-    return float(1.4826 * np.median(np.abs(bend)) / np.sqrt(6))
+    return float(SD_OF_MEDIAN_DEVIATION * np.median(np.abs(bend)) / np.sqrt(6))
 
 
 def _local_lines(ahead: Array, weight: Array, values: Array) -> tuple[Mask, Array]:

@@ -21,6 +21,7 @@ from models.estimation.joint.site import (
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.simulation.walkers import WalkConfig
 
 FEWEST_WALKERS = 5
@@ -265,7 +266,7 @@ def _judge_boxes(tops: Measured) -> tuple[bool, str]:
     usual = np.array(
         [np.median(tops.value[tops.valid & (tops.rows.owner_idx == owner)]) for owner in owners]
     )
-    spread = 1.4826 * float(np.median(np.abs(usual - np.median(usual))))
+    spread = SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(usual - np.median(usual))))
     tall = f"{float(np.exp(np.median(usual))):.2f} m give or take {100 * spread:.1f} %"
     if spread < _ONE_SIZE:
         return False, f"boxes are all of one size ({tall}): drawn, not measured"

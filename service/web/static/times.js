@@ -1,18 +1,23 @@
-// "3 min ago", said anew as time goes on; the same words as service/web/words.py.
+// "3 minutes ago", said anew as time goes on; the same words as service/web/words.py.
 
 const EVERY_MS = 10_000;
-
-function duration(seconds) {
-  if (seconds < 90) return `${Math.round(Math.max(seconds, 0))} s`;
-  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
-  if (seconds < 129_600) return `${Math.round(seconds / 3600)} h`;
-  return `${Math.round(seconds / 86_400)} days`;
-}
+const UNITS = [
+  ["year", 31_536_000],
+  ["month", 2_592_000],
+  ["week", 604_800],
+  ["day", 86_400],
+  ["hour", 3600],
+  ["minute", 60],
+  ["second", 1],
+];
+const AT_LEAST = 1.5; // of a unit, to say a length of time in it: "90 minutes", then "2 hours"
+const WORDS = new Intl.RelativeTimeFormat("en");
 
 export function ago(iso) {
-  const seconds = (Date.now() - Date.parse(iso)) / 1000;
-  if (seconds < -60) return `in ${duration(-seconds)}`;
-  return seconds < 10 ? "just now" : `${duration(seconds)} ago`;
+  const seconds = (Date.parse(iso) - Date.now()) / 1000;
+  if (seconds > -10 && seconds <= 60) return "just now";
+  const [unit, size] = UNITS.find(([, size]) => Math.abs(seconds) >= AT_LEAST * size) ?? UNITS.at(-1);
+  return WORDS.format(Math.round(seconds / size), unit);
 }
 
 /** Keep every <time> within some elements true. */

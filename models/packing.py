@@ -1,0 +1,115 @@
+"""Stored models as bytes: one codec for all that is learned of a site.
+
+A stored model is a safetensors file under gzip: arrays by name, and a header whose one entry is
+JSON with the format's name and version and with all that is no array. Nothing in it is code, and
+gzip's checksum tells of damage. What a format has in it, its own room says.
+
+Source: the safetensors format, https://github.com/huggingface/safetensors#format.
+"""
+
+import gzip
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, TypeVar, cast, get_args, get_type_hints
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from models.errors import CheckpointError
+
+_ENTRY = "surefoot"  # alone in the header: several entries have no order
+_DAMAGED = (OSError, EOFError, zlib.error, SafetensorError, ValueError, KeyError, TypeError)
+
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """What bytes hold, and in which version; a version is read by its own release and later."""
+
+    name: str
+    version: int
+
+
+def pack(form: Format, values: Mapping[str, Any]) -> bytes:
+    """Arrays, numbers and texts by name as bytes: the same values, the same bytes."""
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    rest = {name: _plain(value) for name, value in values.items() if name not in arrays}
+    header = {"format": form.name, "version": form.version, "values": rest}
+    # safetensors writes memory as it lies, so it has to lie row by row.
+    tensors = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    data = save(tensors, metadata={_ENTRY: json.dumps(header, sort_keys=True)})
+    return gzip.compress(data, mtime=0)
+
+
+def unpack(form: Format, data: bytes) -> dict[str, Any]:
+    """The values of `pack`; arrays of one's own.
+
+    Raises:
+        CheckpointError: the bytes are damaged, or of another format or version.
+    """
+    try:
+        raw = gzip.decompress(data)
+        # On a place of their own in memory: those of safetensors lie as they come.
+        arrays = {name: array.copy() for name, array in load(raw).items()}
+        length = int.from_bytes(raw[:8], "little")
+        header = json.loads(json.loads(raw[8 : 8 + length])["__metadata__"][_ENTRY])
+        found, values = (header["format"], header["version"]), header["values"]
+    except _DAMAGED as error:
+        raise CheckpointError(f"{form.name}: not readable: {error!r}") from error
+    if found != (form.name, form.version):
+        raise CheckpointError(
+            f"format: {form.name} {form.version} is needed, got {found[0]} {found[1]}"
+        )
+    return {**values, **arrays}
+
+
+def flattened(value: Any, prefix: str = "") -> dict[str, Any]:
+    """The fields of a dataclass, and of those in it by dotted names; None is left out."""
+    found: dict[str, Any] = {}
+    for field in fields(value):
+        part, name = getattr(value, field.name), prefix + field.name
+        if is_dataclass(part):
+            found |= flattened(part, f"{name}.")
+        elif part is not None:
+            found[name] = part
+    return found
+
+
+def under(values: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The values of one of the dataclasses in another."""
+    start = f"{name}."
+    return {key.removeprefix(start): part for key, part in values.items() if key.startswith(start)}
+
+
+def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
+    """The dataclass of `flattened`; fields that are given are not looked for.
+
+    Raises:
+        CheckpointError: fields are missing, or there are others.
+    """
+    made, known = dict(given), set()
+    for name, hint in get_type_hints(kind).items():
+        if name in given:
+            continue
+        inner = [part for part in (hint, *get_args(hint)) if is_dataclass(part)]
+        parts = under(values, name)
+        known |= {name, *(f"{name}.{key}" for key in parts)}
+        if inner and (parts or inner[0] is hint):
+            made[name] = restored(cast(type[Any], inner[0]), parts)
+        elif inner:
+            made[name] = None
+        elif name in values:
+            made[name] = values[name]
+        else:
+            raise CheckpointError(f"{kind.__name__}: {name} is missing")
+    if strange := sorted(values.keys() - known):
+        raise CheckpointError(f"{kind.__name__}: has no {', '.join(strange)}")
+    return kind(**made)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

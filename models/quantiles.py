@@ -1,0 +1,17 @@
+"""Quantiles that limits and intervals are read from."""
+
+from functools import cache
+from statistics import NormalDist
+
+Z90 = NormalDist().inv_cdf(0.95)  # half the width of a 90 % interval, in standard deviations
+# Of a normal, over the median of the absolute deviations; to the digits that sites and charts
+# were learned with.
+SD_OF_MEDIAN_DEVIATION = round(1 / NormalDist().inv_cdf(0.75), 4)
+
+
+@cache
+def chi_squared_above(chance: float, freedom: int) -> float:
+    """What a chi-squared of some degrees of freedom is above with a chance."""
+    from scipy.special import chdtri  # late: the HTTP process has no use for it
+
+    return float(chdtri(freedom, chance))

@@ -1,0 +1,121 @@
+"""The codec of stored models: what is packed comes back to the bit, and nothing else is read."""
+
+import gzip
+import json
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from safetensors.numpy import load
+
+from models.errors import CheckpointError
+from models.packing import Format, flattened, pack, restored, under, unpack
+
+FORM = Format(name="site", version=3)
+VALUES = {
+    "turned": np.arange(6.0).reshape(2, 3).T,  # lies column by column
+    "empty": np.empty((0, 2)),
+    "levels": np.array([[-3, 500]], dtype=np.int16),
+    "big_endian": np.array([1.5, 2.5], dtype=">f8"),
+    "tenth": 0.1,
+    "most": math.inf,
+    "scalar": np.float64(1 / 3),
+    "count": 7,
+    "directional": True,
+    "doubt": "the scale: 8 m/s \N{RIGHTWARDS ARROW} no people",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inner:
+    mean: np.ndarray
+    usual: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outer:
+    first: Inner
+    second: Inner | None
+    tracks: int
+
+
+def test_what_is_packed_comes_back_to_the_bit():
+    found = unpack(FORM, pack(FORM, VALUES))
+    assert set(found) == set(VALUES)
+    for name, value in VALUES.items():
+        assert_array_equal(found[name], value)
+        assert isinstance(found[name], np.ndarray) == isinstance(value, np.ndarray)
+    assert found["levels"].dtype == np.int16
+    assert type(found["count"]) is int
+    assert type(found["scalar"]) is float
+    found["levels"][:] = 0  # one's own
+
+
+def test_the_same_values_make_the_same_bytes_in_any_order():
+    assert pack(FORM, dict(reversed(VALUES.items()))) == pack(FORM, VALUES)
+
+
+def test_bytes_are_a_safetensors_file_under_gzip():
+    raw = gzip.decompress(pack(FORM, VALUES))
+    assert_array_equal(load(raw)["turned"], VALUES["turned"])
+    header = json.loads(raw[8 : 8 + int.from_bytes(raw[:8], "little")])
+    said = json.loads(header["__metadata__"]["surefoot"])
+    assert (said["format"], said["version"], said["values"]["count"]) == ("site", 3, 7)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        b"",
+        b"nothing",
+        b"PK\x03\x04 of an earlier release",
+        pack(FORM, VALUES)[:-9],
+        gzip.compress(b""),
+        gzip.compress(b"\xff" * 99),
+        gzip.compress(b"\x02" + b"\x00" * 7 + b"{}"),  # a safetensors file with nothing in it
+        bytes(byte ^ (n == 200) for n, byte in enumerate(pack(FORM, VALUES))),
+    ],
+)
+def test_what_is_damaged_is_named_so(wrong):
+    with pytest.raises(CheckpointError, match="^site: not readable"):
+        unpack(FORM, wrong)
+
+
+@pytest.mark.parametrize("other", [Format(name="site", version=2), Format(name="flow", version=3)])
+def test_another_format_or_version_is_named_so(other):
+    needed = f"^format: {other.name} {other.version} is needed, got site 3$"
+    with pytest.raises(CheckpointError, match=needed):
+        unpack(other, pack(FORM, VALUES))
+
+
+def test_dataclasses_in_dataclasses_have_dotted_names():
+    whole = Outer(first=Inner(mean=np.ones(2), usual=1.0), second=None, tracks=3)
+    values = flattened(whole)
+    assert set(values) == {"first.mean", "first.usual", "tracks"}
+    again = restored(Outer, values)
+    assert (again.second, again.tracks, again.first.usual) == (None, 3, 1.0)
+    assert again.first.mean is whole.first.mean
+    both = restored(Outer, {**values, "second.mean": np.zeros(1), "second.usual": 2.0})
+    assert both.second is not None
+    assert both.second.usual == 2.0
+    assert under(values, "first") == {"mean": whole.first.mean, "usual": 1.0}
+    assert restored(Outer, {"tracks": 3}, first=both.first, second=None).first is both.first
+
+
+@pytest.mark.parametrize(
+    ("lost", "more", "reason"),
+    [
+        ("tracks", {}, "Outer: tracks is missing"),
+        ("first.usual", {}, "Inner: usual is missing"),
+        ("", {"first.sd": 1.0}, "Inner: has no sd"),
+        ("", {"second.usual": 1.0}, "Inner: mean is missing"),
+        ("", {"people": 1, "age": 2}, "Outer: has no age, people"),
+    ],
+)
+def test_other_fields_are_named(lost, more, reason):
+    values = {"first.mean": np.ones(2), "first.usual": 1.0, "tracks": 3, **more}
+    values.pop(lost, None)
+    with pytest.raises(CheckpointError, match=f"^{reason}$"):
+        restored(Outer, values)
