@@ -19,7 +19,7 @@ from service.recalibration.presence import is_no_data
 from service.recalibration.references import made_against
 from service.recalibration.rhythms import unpacked
 from service.settings import Settings
-from service.store import estimates, figures, fleet
+from service.store import figures, fleet
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord, SiteReferenceRecord
 
@@ -86,12 +86,15 @@ def standings(
     firing: dict[str, list[AlertRecord]] = defaultdict(list)
     for alert in fleet.firing(session, ids):
         firing[str(alert.camera_id)].append(alert)
+    held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
+    untold = [i for i in held if i in newest and not newest[i].told]
+    told_before = figures.newest_told_estimates(session, untold) if untold else {}
     found = {}
     for camera_id, last_s in ended_s.items():
         known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
         last_told = newest.get(camera_id)
-        if _holds(firing[camera_id]) and last_told is not None and not last_told.told:
-            last_told = estimates.newest_told(session, camera_id)
+        if camera_id in untold:
+            last_told = told_before.get(camera_id)
         facts = CameraFacts(
             reference=references[camera_id],
             estimate=newest.get(camera_id),

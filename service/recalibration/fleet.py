@@ -10,7 +10,7 @@ from service.recalibration.attendance import Attendance
 from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
-from service.recalibration.references import tracks_so_far, wanted_tracks
+from service.recalibration.references import wanted_tracks
 from service.settings import Settings
 from service.store import fleet
 from service.store.tables import AlertRecord, EstimateRecord, TrainingRecord
@@ -120,7 +120,8 @@ def list_fleet(
     standing = standings(session, settings, ids)
     names = dict(fleet.names(session, ids))
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
-    counts = fleet.learning_counts(session, ids)
+    attended = {i: each.attended.spans for i, each in standing.items() if _learns(each)}
+    counts = fleet.learning_counts(session, ids, attended)
     trainings = fleet.unfinished_trainings(session, ids)
     found = [
         FleetCamera(
@@ -132,7 +133,7 @@ def list_fleet(
             last_track_s=each.last_track_s,
             drift=_drift(each.estimate) if each.state != "learning" else None,
             history=tuple(history[camera_id]),
-            learned=_learned(session, settings, each, counts),
+            learned=_learned(settings, each, counts),
             wanted=wanted_tracks(each.reference, settings),
             doubt=each.reference.doubt,
             alerts=tuple(_alert(record, now) for record in each.alerts),
@@ -199,15 +200,14 @@ def _drift(estimate: EstimateRecord | None) -> FleetDrift | None:
     )
 
 
-def _learned(
-    session: Session, settings: Settings, standing: Standing, counts: dict[str, int]
-) -> int | None:
-    reference = standing.reference
-    if reference.ready_at is not None:
+def _learns(standing: Standing) -> bool:
+    return standing.reference.ready_at is None
+
+
+def _learned(settings: Settings, standing: Standing, counts: dict[str, int]) -> int | None:
+    if not _learns(standing):
         return None
-    if standing.attended.spans:
-        return tracks_so_far(session, settings, reference)  # few, which need a statement each
-    return min(counts.get(reference.camera_id, 0), wanted_tracks(reference, settings))
+    return min(counts.get(standing.camera_id, 0), wanted_tracks(standing.reference, settings))
 
 
 def _training(record: TrainingRecord | None) -> FleetTraining | None:

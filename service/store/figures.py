@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select, true
+from sqlalchemy import ColumnElement, String, func, select, true, type_coerce
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.store.delivery_tables import DeliveryRecord
@@ -58,6 +58,22 @@ def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRec
     newest = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
     query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
     query = query.where(among(CameraRecord.id, ids)).options(defer(EstimateRecord.raw))
+    return {record.camera_id: record for record in session.scalars(query)}
+
+
+def newest_told_estimates(session: Session, ids: Collection[str]) -> dict[str, EstimateRecord]:
+    """The newest estimate of each of some cameras that told anything, without what is behind it."""
+    told = (
+        select(EstimateRecord.id)
+        .where(EstimateRecord.camera_id == CameraRecord.id)
+        .where(type_coerce(EstimateRecord.told, String) != "[]")
+        .order_by(EstimateRecord.id.desc())
+        .limit(1)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == told)
+    query = query.where(CameraRecord.id.in_(ids)).options(defer(EstimateRecord.raw))
     return {record.camera_id: record for record in session.scalars(query)}
 
 

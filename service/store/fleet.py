@@ -2,10 +2,20 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, String, case, func, select, type_coerce
+from sqlalchemy import (
+    ColumnElement,
+    Float,
+    String,
+    case,
+    column,
+    func,
+    select,
+    type_coerce,
+    values,
+)
 from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
@@ -19,6 +29,7 @@ from service.store.tables import (
     TrackRecord,
     TrainingRecord,
 )
+from service.store.tracks import Spans
 from service.store.trainings import UNFINISHED
 
 
@@ -67,16 +78,22 @@ def drift_history(
     return found
 
 
-def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
-    """How many tracks have come that the reference being learned of each camera may be made of."""
+def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) -> dict[str, int]:
+    """How many tracks have come that the reference being learned of each camera may be made of.
+
+    Of those of a camera that were seen at any time `without`, none.
+    """
     begun = func.coalesce(SiteReferenceRecord.from_s, -math.inf)
+    wanted = [
+        TrackRecord.camera_id == CameraRecord.id,
+        TrackRecord.started_s >= begun,
+        TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
+    ]
+    if any(without.values()):
+        wanted.append(~_seen_within(without))
     count = (
         select(func.count())
-        .where(
-            TrackRecord.camera_id == CameraRecord.id,
-            TrackRecord.started_s >= begun,
-            TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
-        )
+        .where(*wanted)
         .correlate(CameraRecord, SiteReferenceRecord)
         .scalar_subquery()
     )
@@ -136,6 +153,19 @@ def rhythm_profiles(session: Session, ids: Ids) -> dict[str, dict[str, Any]]:
         among(RhythmRecord.camera_id, ids)
     )
     return {camera_id: profile for camera_id, profile in session.execute(query) if profile}
+
+
+def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
+    """Whether a track was seen at any of some times of its camera: what `outside` denies."""
+    rows = [(camera_id, *span) for camera_id, each in spans.items() for span in each]
+    columns = column("camera_id", String), column("from_s", Float), column("to_s", Float)
+    times = values(*columns, name="times").data(rows).cte("times")
+    within = select(times.c.camera_id).where(
+        times.c.camera_id == TrackRecord.camera_id,
+        TrackRecord.ended_s >= times.c.from_s,
+        TrackRecord.started_s <= times.c.to_s,
+    )
+    return within.correlate(TrackRecord).exists()
 
 
 def _ratio(

@@ -7,18 +7,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families as families
-from sqlalchemy import event
 
 from service.app import create_app
 from service.recalibration import upkeep
 from service.recalibration.alerts import open_alert
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather
-from service.recalibration.figures import take_figures
 from service.store import alerts, maintenance, references
 from tests.service.bench import PRIOR, made_up, moved
 from tests.service.conftest import problem
-from tests.service.fleet_bench import Fleet, afternoon
 
 KNOCKED = moved(tilt_deg=6.6)
 
@@ -321,25 +318,3 @@ def test_a_member_of_a_group_is_in_the_metrics(bench):
     text = bench.http.get("/metrics").text
     assert 'surefoot_alert_firing{camera_id="corner",kind="drift"} 1.0' in text
     assert 'surefoot_alert_grouped{camera_id="corner",kind="drift"} 1.0' in text
-
-
-def test_the_figures_cost_as_many_statements_for_many_cameras_as_for_one(http, settings):
-    fleet = Fleet(settings)
-
-    def count():
-        seen = []
-
-        def note(_conn, _cursor, statement, *_):
-            seen.append(statement)
-
-        event.listen(fleet.store.engine, "before_cursor_execute", note)
-        with fleet.store.read() as session:
-            take_figures(session, settings)
-        event.remove(fleet.store.engine, "before_cursor_execute", note)
-        return len([text for text in seen if text.startswith("SELECT")])
-
-    fleet.add("one")
-    one = count()
-    afternoon(fleet, 12)
-    assert count() == one <= 14
-    fleet.close()
