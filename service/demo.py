@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from service.demo_folder import (
     remove_left_over,
     require_free,
 )
+from service.formats.degrees import degrees, in_degrees
 from service.process import end_like_ctrl_c
 from service.replay import post_tracks
 from service.settings import Settings
@@ -205,8 +206,10 @@ def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
         console.print("[red]no alert came[/]")
         return False
     served = np.array(screen.pose["pose"]["quaternion_wxyz"])
-    to_knocked = math.degrees(angle_between(served, KNOCK.apply(PRIOR).quaternion_wxyz))
-    to_prior = math.degrees(angle_between(served, PRIOR.quaternion_wxyz))
+    to_knocked, to_prior = (
+        degrees(float(angle_between(served, pose.quaternion_wxyz)))
+        for pose in (KNOCK.apply(PRIOR), PRIOR)
+    )
     console.print(
         f"\nKnocked at {screen.knocked_at:%H:%M:%S}; the alert says "
         f"{_clock(screen.alert['changed_at'])}.\n"
@@ -238,11 +241,7 @@ def _camera() -> dict[str, Any]:
         "name": "Demo street",
         "intrinsics": {name: getattr(LENS, name) for name in
                        ("width", "height", "fx", "fy", "cx", "cy")},
-        "prior_pose": {
-            "height_m": PRIOR.height_m,
-            "tilt_deg": math.degrees(PRIOR.tilt_rad),
-            "roll_deg": math.degrees(PRIOR.roll_rad),
-        },
+        "prior_pose": in_degrees(asdict(PRIOR)),
         "reference_tracks": _REFERENCE_TRACKS,
     }  # fmt: skip
 
@@ -298,8 +297,8 @@ def _wait_for_interrupt() -> None:
 def _row(pose: CameraPose) -> Sequence[str]:
     return [
         f"{pose.height_m:.2f}",
-        f"{math.degrees(pose.tilt_rad):.2f}",
-        f"{math.degrees(pose.roll_rad):.2f}",
+        f"{degrees(pose.tilt_rad):.2f}",
+        f"{degrees(pose.roll_rad):.2f}",
     ]
 
 

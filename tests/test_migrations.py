@@ -1,11 +1,14 @@
+import json
 import sqlite3
 from datetime import UTC, datetime
 
 import alembic.command
 import pytest
+from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
+from service.app import create_app
 from service.migrate import migrate
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
@@ -111,6 +114,49 @@ def test_the_newest_reference_is_bound_to_the_source_of_its_tracks(tmp_path):
         assert all(each.told_at is not None for each in found)
     alembic.command.downgrade(config, "2026_11_24_parent_indexes")
     migrate(settings)
+
+
+def test_what_was_kept_in_degrees_is_told_as_it_was(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_25_track_sources")
+    raw = {"joint": {"height_m": 6.4, "tilt_deg": 22.123456789, "roll_deg": -1.7, "tracks": 40},
+           "registered": {"height_m": 6.3, "tilt_deg": 21.9, "roll_deg": 1e-17,
+                          "heading_deg": -170.3, "tracks": 40}}  # fmt: skip
+    drift = {"height_m": None, "tilt_deg": 5.3, "roll_deg": None, "heading_deg": -0.1,
+             "angle_deg": 5.4}  # fmt: skip
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        put(connection, "site_references", id=1, camera_id="old", prior_pose_id=1, doubt="",
+            origin="registered", ready_at="2026-11-20 07:00:00", offsets="{}")  # fmt: skip
+        for number in range(1, 2103):  # more than two bites of them
+            put(connection, "estimates", id=number, camera_id="old", prior_pose_id=1, state="ok",
+                reference_id=1, told='["tilt"]', raw=json.dumps(raw))  # fmt: skip
+        for kind, told in (("drift", drift), ("no_data", {})):
+            put(connection, "alerts", id=kind, camera_id="old", kind=kind, state="resolved",
+                source="estimate", severity="warning", drift=json.dumps(told))  # fmt: skip
+
+    def kept():
+        with sqlite3.connect(settings.database_path) as connection:
+            for query in ("SELECT DISTINCT raw FROM estimates", "SELECT drift FROM alerts"):
+                yield from (json.loads(row[0]) for row in connection.execute(f"{query} ORDER BY 1"))
+
+    migrate(settings)
+    stored = list(kept())
+    assert stored[0]["registered"]["heading_rad"] == pytest.approx(-2.97229572)
+    assert "_deg" not in json.dumps(stored)
+    with TestClient(create_app(settings)) as http:
+        told = http.get("/cameras/old/pose").json()["estimates"]
+        found = {each["id"]: each["drift"] for each in http.get("/alerts").json()["items"]}
+    for name, body in raw.items():
+        assert told[name] == pytest.approx(body, rel=1e-15)
+    assert found == {"drift": pytest.approx(drift, rel=1e-15), "no_data": {}}
+    alembic.command.downgrade(config, "2026_11_25_track_sources")
+    again, *alerts = kept()
+    assert list(again["registered"]) == list(raw["registered"])
+    assert again["joint"] == pytest.approx(raw["joint"], rel=1e-15)
+    assert pytest.approx(drift, rel=1e-15) in alerts
 
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):

@@ -112,7 +112,7 @@ def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
         return 0.0
     joint = joint_estimate(seen, case.prior_pose, learned.site)
     fused = fused_estimate(seen, case.intrinsics, case.prior_pose, joint, flow)
-    drift = drift_between(fused.values, fused.covariance, fused.told, case.prior_pose)
+    drift = drift_between(fused.parameters, fused.sd, fused.told, case.prior_pose)
     return judge(drift, limits, ()).excess
 
 

@@ -15,6 +15,7 @@ from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
@@ -46,6 +47,21 @@ class FusedEstimate:
     def registered(self) -> bool:
         """Whether the flow map had a part."""
         return self.raw is not None
+
+    @property
+    def parameters(self) -> PoseParameters:
+        """What is estimated, named."""
+        return PoseParameters.of_array(self.values)
+
+    @property
+    def sd(self) -> PoseParameters:
+        """The standard deviations, named."""
+        return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
+
+    @property
+    def raw_parameters(self) -> PoseParameters | None:
+        """What `raw` is, named."""
+        return None if self.raw is None else PoseParameters.of_array(self.raw)
 
 
 def fused_estimate(

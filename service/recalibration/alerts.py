@@ -8,6 +8,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
+from service.formats.degrees import in_degrees
 from service.recalibration.activity import note as note_activity
 from service.recalibration.groups import group_with
 from service.recalibration.outbox import json_time, queue_alert
@@ -238,7 +239,7 @@ def _tell(session: Session, record: AlertRecord, change: str) -> None:
         "state": record.state,
         "severity": record.severity,
         "reason": record.reason,
-        "drift": record.drift,
+        "drift": in_degrees(record.drift),
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,
         "silenced_until": record.silenced_until and json_time(record.silenced_until),

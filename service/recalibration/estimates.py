@@ -1,6 +1,5 @@
 """From what the tracks of a window come to, to a stored estimate, its alerts and its training."""
 
-import math
 from datetime import UTC, datetime
 from typing import Any
 
@@ -14,8 +13,9 @@ from models.drift.verdict import (
     judge,
     pose_after,
 )
-from models.estimation.numbers import ANGLES, NUMBERS
-from models.geometry.rotation import Array
+from models.estimation.numbers import NUMBERS
+from models.geometry.pose_parameters import PoseParameters
+from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
@@ -23,9 +23,10 @@ from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import is_overtaken, made_against
 from service.recalibration.second_look import drift_of
-from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
+from service.recalibration.words import describe_drift, describe_reading
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
+from service.store.packing import told_drift
 from service.store.tables import EstimateRecord, SiteReferenceRecord
 
 
@@ -58,7 +59,7 @@ def store_estimate(
         "camera_id": record.camera_id,
         "state": record.state,
         "tracks": record.tracks,
-        "drift": drift_body(drift) if record.told else None,
+        "drift": in_degrees(told_drift(drift)) if record.told else None,
     }
     events.add(session, "pose", payload, record.created_at)
     return record
@@ -94,7 +95,7 @@ def _judge(
     limits = drift_limits(settings)
     camera = cameras.find(session, camera_id)
     assert camera is not None
-    clock = clock_fault(drift, camera.frame_rate_hz)
+    clock = clock_fault(drift, evidence.prior, camera.frame_rate_hz)
     reading = finding.reading
     if reading is not None and clock is None and not drifted and may_be_clock(reading):
         reading = None
@@ -142,7 +143,7 @@ def _alert(
     """Open, update or end the alerts that an estimate stands behind."""
     camera_id = record.camera_id
     firing = fired_by_estimate(session, camera_id)
-    body = drift_body(drift)
+    body = told_drift(drift)
     severity = "critical" if verdict.excess >= 2 else "warning"
     since = record.drift_since
     if edge is not None:
@@ -200,18 +201,9 @@ def _record(
         prior_pose_id=reference.prior_pose_id,
         reference_id=reference.id,
         told=[] if learning else list(drift.told),
-        height_m=pose.height_m,
-        tilt_rad=pose.tilt_rad,
-        roll_rad=pose.roll_rad,
-        heading_rad=pose.heading_rad,
-        height_sd_m=drift.height_sd_m,
-        tilt_sd_rad=drift.tilt_sd_rad,
-        roll_sd_rad=drift.roll_sd_rad,
-        heading_sd_rad=drift.heading_sd_rad,
-        drift_height_m=drift.height_m,
-        drift_tilt_rad=drift.tilt_rad,
-        drift_roll_rad=drift.roll_rad,
-        drift_heading_rad=drift.heading_rad,
+        pose=PoseParameters.of_pose(pose),
+        pose_sd=drift.sd,
+        drift_by=drift.by,
         drift_angle_rad=drift.angle_rad,
         suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=0,
@@ -228,38 +220,18 @@ def _record(
 
 
 def _raw(finding: Finding) -> dict[str, Any]:
-    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw
-    raw = {"joint": {**_raw_numbers(joint.raw), "tracks": joint.walkers}}
+    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw_parameters
+    raw = {"joint": {**_without_heading(joint.raw_parameters), "tracks": joint.walkers}}
     if registered is not None:
         raw["registered"] = {
-            **_raw_numbers(registered),
-            "heading_deg": math.degrees(registered[3]),
+            **_without_heading(registered),
+            "heading_rad": registered.heading_rad,
             "tracks": joint.walkers,
         }
     if averaged is not None:
-        raw["averaged"] = {
-            "height_m": averaged.height_m,
-            "tilt_deg": math.degrees(averaged.tilt_rad),
-            "roll_deg": math.degrees(averaged.roll_rad),
-            "tracks": averaged.tracks,
-        }
+        raw["averaged"] = {**_without_heading(averaged.value), "tracks": averaged.tracks}
     return raw
 
 
-def _raw_numbers(numbers: Array) -> dict[str, float]:
-    tilt, roll, log_height = (float(number) for number in numbers[:3])
-    return {
-        "height_m": math.exp(log_height),
-        "tilt_deg": math.degrees(tilt),
-        "roll_deg": math.degrees(roll),
-    }
-
-
-def drift_body(drift: Drift) -> dict[str, float | None]:
-    """The told drift as JSON, as in the pose and its alerts."""
-    body: dict[str, float | None] = {
-        field: shown(name, drift.of(name)[0]) if name in drift.told else None
-        for name, field in FIELDS.items()
-    }
-    turned = set(ANGLES) & set(drift.told)
-    return {**body, "angle_deg": math.degrees(drift.angle_rad) if turned else None}
+def _without_heading(found: PoseParameters) -> dict[str, float]:
+    return {"height_m": found.height_m, "tilt_rad": found.tilt_rad, "roll_rad": found.roll_rad}

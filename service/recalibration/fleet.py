@@ -1,11 +1,12 @@
 """All cameras at a glance: what each does, and which of them need a person first."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.drift.verdict import Drift
 from service.recalibration.attendance import Attendance
 from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
@@ -16,17 +17,6 @@ from service.store import fleet
 from service.store.tables import AlertRecord, EstimateRecord, TrainingRecord
 
 _HISTORY = 24  # estimates of a sparkline
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FleetDrift:
-    """What is told of a camera's drift; a number that is not told, or not sure, is None."""
-
-    angle_rad: float | None
-    tilt_rad: float | None
-    roll_rad: float | None
-    heading_rad: float | None
-    height_m: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,8 +51,9 @@ class FleetCamera:
     """A camera in one line.
 
     `history` has the drift of its newest estimates in units of the limits, oldest first, None
-    where nothing was told. `learned` and `wanted` are people of the reference being learned.
-    `judged` says whether the drift is of how it stands now, and not only the last that is known.
+    where nothing was told. `drift` tells only what is sure. `learned` and `wanted` are people of
+    the reference being learned. `judged` says whether the drift is of how it stands now, and not
+    only the last that is known.
     """
 
     camera_id: str
@@ -71,7 +62,7 @@ class FleetCamera:
     judged: bool
     since: datetime
     last_track_s: float | None
-    drift: FleetDrift | None
+    drift: Drift | None
     history: tuple[float | None, ...]
     learned: int | None
     wanted: int
@@ -175,29 +166,14 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
     )
 
 
-def _drift(estimate: EstimateRecord | None) -> FleetDrift | None:
-    """What is told and sure enough to be said: beyond 2 sd, or what has been found to drift."""
+def _drift(estimate: EstimateRecord | None) -> Drift | None:
+    """What is sure enough to be said: beyond 2 sd, or what has been found to drift."""
     if estimate is None or not estimate.told:
         return None
-    e = estimate
-    numbers = {
-        "tilt": (e.drift_tilt_rad, e.tilt_sd_rad),
-        "roll": (e.drift_roll_rad, e.roll_sd_rad),
-        "heading": (e.drift_heading_rad, e.heading_sd_rad or 0.0),
-        "height": (e.drift_height_m, e.height_sd_m),
-    }
-    sure = {
-        name: value
-        for name, (value, sd) in numbers.items()
-        if name in e.told and (name in e.drifted or abs(value) > 2 * sd)
-    }
-    return FleetDrift(
-        angle_rad=e.drift_angle_rad if set(sure) - {"height"} else None,
-        tilt_rad=sure.get("tilt"),
-        roll_rad=sure.get("roll"),
-        heading_rad=sure.get("heading"),
-        height_m=sure.get("height"),
-    )
+    drift, drifted = estimate.drift, estimate.drifted
+    said = {name: drift.of(name) for name in drift.told}
+    sure = [name for name, (by, sd) in said.items() if name in drifted or abs(by) > 2 * sd]
+    return replace(drift, told=tuple(sure))
 
 
 def _learns(standing: Standing) -> bool:

@@ -1,20 +1,11 @@
 """Learn a camera's reference once its tracks are there: a job's work, seconds of a core."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
 
 from sqlalchemy.orm import Session
 
 from models.errors import TooFewTrajectoriesError
-from models.estimation.averaged import (
-    FEWEST_TRACKS,
-    PoseEstimate,
-    TrackPredictions,
-    averaged_estimate,
-)
 from models.estimation.joint.observations import observe
 from models.estimation.joint.packing import reference_to_bytes
 from models.estimation.joint.reference import learn_reference
@@ -26,13 +17,13 @@ from models.trajectory import Trajectory
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
-from service.recalibration.evidence import as_predictions, walk_of
+from service.recalibration.evidence import walk_of
 from service.recalibration.paths import LearnedPaths, learn_paths
 from service.recalibration.references import wanted_tracks
 from service.settings import Settings
-from service.store import cameras, maintenance, references, tracks, trainings
+from service.store import cameras, maintenance, references, tracks
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
-from service.store.tables import FlowMapRecord, PredictionRecord
+from service.store.tables import FlowMapRecord
 
 _DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
 
@@ -47,7 +38,6 @@ class ReferencePeriod:
     walk: WalkConfig
     trajectories: tuple[Trajectory, ...]
     to_s: float
-    predictions: TrackPredictions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +46,6 @@ class LearnedReference:
 
     site: SiteReference
     paths: LearnedPaths | None
-    offsets: dict[str, Any]
 
 
 def take_period(session: Session, settings: Settings, camera_id: str) -> ReferencePeriod | None:
@@ -74,10 +63,6 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
     if len(records) < wanted:
         return None
     intrinsics = intrinsics_of(camera)
-    model = trainings.newest_model(session, camera_id)
-    found: Sequence[PredictionRecord] = []
-    if model is not None:
-        found = tracks.predictions(session, model.id, [record.id for record in records])
     return ReferencePeriod(
         reference_id=reference.id,
         intrinsics=intrinsics,
@@ -85,7 +70,6 @@ def take_period(session: Session, settings: Settings, camera_id: str) -> Referen
         walk=walk_of(camera),
         trajectories=tuple(seen_of(record, intrinsics) for record in records),
         to_s=records[-1].ended_s,
-        predictions=as_predictions(found),
     )
 
 
@@ -96,12 +80,8 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
         site = learn_reference(observations, period.prior, period.walk, seed)
     except TooFewTrajectoriesError:
         return None
-    offsets = {"joint": _joint_offset(site)}
-    if len(period.predictions) >= FEWEST_TRACKS:
-        estimate = averaged_estimate(period.predictions, seed)
-        offsets["averaged"] = _averaged_offset(estimate, period.prior)
     paths = learn_paths(observations, period.intrinsics, period.prior, site, seed)
-    return LearnedReference(site=site, paths=paths, offsets=offsets)
+    return LearnedReference(site=site, paths=paths)
 
 
 def keep_reference(
@@ -126,7 +106,6 @@ def keep_reference(
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
-    record.offsets = learned.offsets
     record.doubt = site.doubt
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
@@ -154,31 +133,3 @@ def keep_reference(
             reason=site.doubt,
             source="reference",
         )
-
-
-def _joint_offset(site: SiteReference) -> dict[str, Any]:
-    tilt, roll, log_height = (float(number) for number in site.offset)
-    variances = [float(site.offset_covariance[k, k]) for k in range(3)]
-    return {
-        "tilt_deg": math.degrees(tilt),
-        "roll_deg": math.degrees(roll),
-        "log_height": log_height,
-        "sd": {
-            "tilt_deg": math.degrees(math.sqrt(variances[0])),
-            "roll_deg": math.degrees(math.sqrt(variances[1])),
-            "log_height": math.sqrt(variances[2]),
-        },
-    }
-
-
-def _averaged_offset(estimate: PoseEstimate, prior: CameraPose) -> dict[str, Any]:
-    return {
-        "tilt_deg": math.degrees(estimate.tilt_rad - prior.tilt_rad),
-        "roll_deg": math.degrees(math.remainder(estimate.roll_rad - prior.roll_rad, 2 * math.pi)),
-        "log_height": math.log(max(estimate.height_m, 1e-3) / prior.height_m),
-        "sd": {
-            "tilt_deg": math.degrees(estimate.tilt_sd_rad),
-            "roll_deg": math.degrees(estimate.roll_sd_rad),
-            "log_height": estimate.height_sd_m / max(estimate.height_m, 1e-3),
-        },
-    }

@@ -11,6 +11,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
 from service.store.delivery_tables import DeliveryRecord, WebhookRecord
@@ -104,6 +105,7 @@ def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetim
 def alert_body(record: AlertRecord) -> dict[str, Any]:
     """An alert as clients see it."""
     values = {name: getattr(record, name) for name in ALERT_FIELDS}
+    values["drift"] = in_degrees(record.drift)
     told = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()

@@ -72,10 +72,10 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     if estimate is not None:
         pose = replace(
             pose,
-            height_m=estimate.height_m,
-            tilt_rad=estimate.tilt_rad,
-            roll_rad=estimate.roll_rad,
-            heading_rad=estimate.heading_rad,
+            height_m=estimate.pose.height_m,
+            tilt_rad=estimate.pose.tilt_rad,
+            roll_rad=estimate.pose.roll_rad,
+            heading_rad=estimate.pose.heading_rad,
         )
     record = standing.reference
     reference = ReferenceView(

@@ -15,7 +15,7 @@ from service.recalibration.references import FEWEST_WALKERS
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
     """How far an estimate is from the prior pose."""
-    return drift_between(fused.values, fused.covariance, fused.told, prior)
+    return drift_between(fused.parameters, fused.sd, fused.told, prior)
 
 
 def estimate_of(

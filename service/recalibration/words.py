@@ -1,10 +1,9 @@
 """The drift in words: what is told, how sure it is, and what it is held against."""
 
-import math
-
 from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
 from models.estimation.numbers import WITH_HEADING
+from service.formats.degrees import degrees
 
 # The numbers of a pose as fields of JSON.
 FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
@@ -12,9 +11,7 @@ FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading
 
 def describe_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> str:
     """The told numbers against the prior pose and the limits; empty where none is told."""
-    limit = (
-        f"{limits.sigmas:g} sd and {math.degrees(limits.floor_rad):g} deg or {limits.floor_m:g} m"
-    )
+    limit = f"{limits.sigmas:g} sd and {degrees(limits.floor_rad):g} deg or {limits.floor_m:g} m"
     if not drift.told:
         return f"beyond {limit} when it was last told" if verdict.drifting else ""
     text = ", ".join(_said(drift, name) for name in drift.told) + " against the prior pose"
@@ -46,7 +43,7 @@ def describe_reading(reading: Reading) -> str:
 
 def shown(name: str, value: float) -> float:
     """A number of a pose in the unit of its field."""
-    return value if name == "height" else math.degrees(value)
+    return value if name == "height" else degrees(value)
 
 
 def _said(drift: Drift, name: str) -> str:

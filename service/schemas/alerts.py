@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from service.formats.degrees import in_degrees
 from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Moment, Who
 from service.store.activity_tables import ActivityRecord
@@ -66,6 +67,11 @@ class AlertOut(BaseModel):
     track_source: str | None
     camera_ids: list[str] | None
     group_id: str | None
+
+    @field_validator("drift", mode="before")
+    @classmethod
+    def _degrees(cls, stored: dict[str, Any]) -> dict[str, Any]:
+        return in_degrees(stored)
 
     @classmethod
     def from_record(cls, record: AlertRecord) -> Self:

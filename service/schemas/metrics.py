@@ -14,6 +14,7 @@ from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
 from prometheus_client.registry import Collector
 
+from models.estimation.numbers import ANGLES
 from service.recalibration.camera_state import PoseState
 from service.recalibration.figures import Figures
 from service.schemas.webhooks import AlertKind
@@ -44,6 +45,7 @@ class FiguresCollector(Collector):
 def _of_cameras(figures: Figures) -> Iterator[Metric]:
     states = get_args(PoseState)
     count = Counter(camera.state for camera in figures.cameras)
+    drifts = [(c.camera_id, c.drift) for c in figures.cameras if c.drift is not None]
     yield _gauge(
         "surefoot_cameras", "Cameras by state.", ["state"], {(s,): count[s] for s in states}
     )
@@ -63,13 +65,13 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
         "surefoot_camera_drift_radians",
         "Drift of tilt, roll or heading against the prior pose, where it is told.",
         ["camera_id", "number"],
-        {(c.camera_id, n): value for c in figures.cameras for n, value in c.drift_rad.items()},
+        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.told},
     )
     yield _gauge(
         "surefoot_camera_drift_height_meters",
         "Drift of the height against the prior pose, where it is told.",
         ["camera_id"],
-        {(c.camera_id,): c.drift_height_m for c in figures.cameras if c.drift_height_m is not None},
+        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.told},
     )
 
 

@@ -16,7 +16,10 @@ from sqlalchemy import (
     UniqueConstraint,
     text,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, composite, mapped_column
+
+from models.drift.verdict import Drift
+from models.geometry.pose_parameters import PoseParameters
 
 NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -64,6 +67,19 @@ def _camera_key() -> Any:
 
 def _key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
     return mapped_column(ForeignKey(target, ondelete=gone), **options)
+
+
+def _parameters(*columns: str) -> Any:
+    """Four columns as one value; a heading that was never known is 0 and not told."""
+    return composite(_as_parameters, *columns)
+
+
+def _as_parameters(
+    height_m: float, tilt_rad: float, roll_rad: float, heading_rad: float | None
+) -> PoseParameters:
+    return PoseParameters(
+        height_m=height_m, tilt_rad=tilt_rad, roll_rad=roll_rad, heading_rad=heading_rad or 0.0
+    )
 
 
 class CameraRecord(Record):
@@ -147,7 +163,6 @@ class SiteReferenceRecord(Record):
     tracks: Mapped[int]
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     walking_speed_mps: Mapped[float | None]
-    offsets: Mapped[dict[str, Any] | None]
     doubt: Mapped[str]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
@@ -272,8 +287,8 @@ class PredictionRecord(Record):
 class EstimateRecord(Record):
     """The served pose at one time, and what is behind it.
 
-    Height, tilt, roll and heading are the served ones: the prior's where the tracks cannot tell.
-    Drifts and standard deviations are the estimator's for all four; `told` names those that count.
+    `pose` is the served one: the prior's where the tracks cannot tell. `drift_by` and `pose_sd` are
+    the estimator's for all four parameters; `told` names those that count.
     `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
     one. Estimates of before there were flow maps have no `heading_sd_rad`.
     """
@@ -311,8 +326,25 @@ class EstimateRecord(Record):
     to_s: Mapped[float]
     newest_track_pk: Mapped[int]
     created_at: Mapped[datetime]
+    pose: Mapped[PoseParameters] = _parameters("height_m", "tilt_rad", "roll_rad", "heading_rad")
+    pose_sd: Mapped[PoseParameters] = _parameters(
+        "height_sd_m", "tilt_sd_rad", "roll_sd_rad", "heading_sd_rad"
+    )
+    drift_by: Mapped[PoseParameters] = _parameters(
+        "drift_height_m", "drift_tilt_rad", "drift_roll_rad", "drift_heading_rad"
+    )
 
     __table_args__ = (Index(None, "camera_id", "id"),)
+
+    @property
+    def drift(self) -> Drift:
+        """The drift against the prior pose, and which of it is told."""
+        return Drift(
+            by=self.drift_by,
+            sd=self.pose_sd,
+            angle_rad=self.drift_angle_rad,
+            told=tuple(self.told),
+        )
 
 
 class AlertRecord(Record):

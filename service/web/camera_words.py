@@ -7,12 +7,13 @@ from datetime import datetime, tzinfo
 
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from service.recalibration.camera_page import CameraPage
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
 from service.web.moments import when
-from service.web.sentences import NAMES, Z90, signed
-from service.web.words import ago
+from service.web.sentences import Z90, signed
+from service.web.words import NAMES, ago
 
 KINDS = {
     "drift": "The camera moved",
@@ -70,15 +71,12 @@ def number_rows(
     told = () if estimate is None else tuple(estimate.told)
     rows = []
     for name, words in NAMES.items():
-        before, after = (_number(pose, name) for pose in (prior, served))
+        poses = PoseParameters.of_pose(prior), PoseParameters.of_pose(served)
+        before, after = (_shown(pose.of(name), name) for pose in poses)
         unit, digits = (" m", 2) if name == "height" else ("°", 1)
         row = {"name": words.capitalize(), "prior": _text(before, digits) + unit}
         if estimate is not None and name in told:
-            suffix = "_m" if name == "height" else "_rad"
-            drift = float(getattr(estimate, f"drift_{name}{suffix}"))
-            sd = float(getattr(estimate, f"{name}_sd{suffix}") or 0.0)
-            if name != "height":
-                drift, sd = math.degrees(drift), math.degrees(sd)
+            drift, sd = (_shown(value, name) for value in estimate.drift.of(name))
             row |= {
                 "served": _text(after, digits) + unit,
                 "drift": f"{signed(drift, digits)}{unit}",
@@ -132,7 +130,5 @@ def _text(value: float, digits: int) -> str:
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
-def _number(pose: CameraPose, name: str) -> float:
-    if name == "height":
-        return pose.height_m
-    return math.degrees(float(getattr(pose, f"{name}_rad")))
+def _shown(value: float, name: str) -> float:
+    return value if name == "height" else math.degrees(value)

@@ -9,10 +9,8 @@ from service.recalibration.camera_page import CameraPage
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord
 from service.web.moments import when
-from service.web.words import duration
+from service.web.words import NAMES, duration
 
-# Operators say pan. Height is told apart.
-NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
 Z90 = 1.645  # standard deviations to each side of an interval that holds in 90 of 100 cases
 _SAYS_DEG = 0.1  # less is not worth a word
 
@@ -78,10 +76,10 @@ def turn_words(estimate: EstimateRecord) -> str:
 
 def height_words(estimate: EstimateRecord) -> str:
     """How far a camera was raised or lowered: "0.24 m higher"; empty where that is not told."""
-    if "height" not in estimate.told or abs(estimate.drift_height_m) < _height_says_m(estimate):
+    if "height" not in estimate.told or abs(estimate.drift_by.height_m) < _height_says_m(estimate):
         return ""
-    way = "higher" if estimate.drift_height_m > 0 else "lower"
-    return f"{abs(estimate.drift_height_m):.2f} m {way}"
+    way = "higher" if estimate.drift_by.height_m > 0 else "lower"
+    return f"{abs(estimate.drift_by.height_m):.2f} m {way}"
 
 
 def moved_words(estimate: EstimateRecord, since: str = "") -> str:
@@ -105,7 +103,7 @@ def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
     if not told:
         return None
     drifts = [_degrees(estimate, name) for name in told]
-    sds = [math.degrees(_sd(estimate, name)) for name in told]
+    sds = [math.degrees(estimate.pose_sd.of(name)) for name in told]
     length = math.hypot(*drifts)
     if length < max(sds):  # without a direction, the widest
         return Z90 * max(sds)
@@ -135,9 +133,9 @@ def _sure(estimate: EstimateRecord) -> str:
     if half is not None:
         parts.append(f"±{max(half, 0.1):.1f}°")
     if "height" in estimate.told and (
-        half is None or abs(estimate.drift_height_m) >= _height_says_m(estimate)
+        half is None or abs(estimate.drift_by.height_m) >= _height_says_m(estimate)
     ):
-        parts.append(f"±{max(Z90 * estimate.height_sd_m, 0.01):.2f} m")
+        parts.append(f"±{max(Z90 * estimate.pose_sd.height_m, 0.01):.2f} m")
     return f"; sure to {' and '.join(parts)}" if parts else ""
 
 
@@ -152,16 +150,12 @@ def _waiting(page: CameraPage) -> str:
 
 
 def _degrees(estimate: EstimateRecord, name: str) -> float:
-    return math.degrees(float(getattr(estimate, f"drift_{name}_rad")))
-
-
-def _sd(estimate: EstimateRecord, name: str) -> float:
-    return float(getattr(estimate, f"{name}_sd_rad") or 0.0)
+    return math.degrees(estimate.drift_by.of(name))
 
 
 def _says_deg(estimate: EstimateRecord, name: str) -> float:
-    return max(Z90 * math.degrees(_sd(estimate, name)), _SAYS_DEG)
+    return max(Z90 * math.degrees(estimate.pose_sd.of(name)), _SAYS_DEG)
 
 
 def _height_says_m(estimate: EstimateRecord) -> float:
-    return max(Z90 * estimate.height_sd_m, 0.05)
+    return max(Z90 * estimate.pose_sd.height_m, 0.05)

@@ -3,8 +3,10 @@
 import math
 from datetime import UTC, datetime, tzinfo
 
+from models.drift.verdict import Drift
+from models.estimation.numbers import ANGLES
 from service.recalibration.camera_state import PoseState
-from service.recalibration.fleet import FleetCamera, FleetDrift
+from service.recalibration.fleet import FleetCamera
 
 STATES: dict[PoseState, str] = {
     "drifting": "Moved",
@@ -13,6 +15,8 @@ STATES: dict[PoseState, str] = {
     "learning": "Learning",
     "ok": "Steady",
 }
+# Operators say pan. Height is told apart.
+NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
 _MINUTE_S, _HOUR_S, _DAY_S = 60.0, 3600.0, 86_400.0
 
 
@@ -39,17 +43,20 @@ def situation(camera: FleetCamera, now: datetime) -> str:
     return "standing still"
 
 
-def drift_words(drift: FleetDrift | None) -> str:
+def drift_words(drift: Drift | None) -> str:
     """How far a camera has moved: "turned 2.1° (tilt +1.9°, pan −0.8°), 12 cm lower"."""
     if drift is None:
         return ""
     parts = []
-    turns = [("tilt", drift.tilt_rad), ("roll", drift.roll_rad), ("pan", drift.heading_rad)]
-    named = ", ".join(f"{name} {degrees(value, signed=True)}" for name, value in turns if value)
-    if drift.angle_rad is not None and named:
+    named = ", ".join(
+        f"{NAMES[name]} {degrees(drift.by.of(name), signed=True)}"
+        for name in ANGLES
+        if name in drift.told and drift.by.of(name)
+    )
+    if named:
         parts.append(f"turned {degrees(drift.angle_rad)} ({named})")
-    if drift.height_m is not None and abs(drift.height_m) >= 0.005:
-        parts.append(height_change(drift.height_m))
+    if "height" in drift.told and abs(drift.by.height_m) >= 0.005:
+        parts.append(height_change(drift.by.height_m))
     return ", ".join(parts)
 
 

@@ -134,10 +134,10 @@ class Life:
             newest_pk = begin_look(session, camera_id)
             period = take_period(session, self.settings, camera_id)
             if period is not None:
-                learned = LearnedReference(site=some_site(), paths=None, offsets={})
+                learned = LearnedReference(site=some_site(), paths=None)
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
                     doubted = replace(some_site(), doubt="the pose does not fit")
-                    learned = LearnedReference(site=doubted, paths=None, offsets={})
+                    learned = LearnedReference(site=doubted, paths=None)
                 keep_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:
             evidence = gather(session, self.settings, camera_id)

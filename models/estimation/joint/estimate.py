@@ -12,6 +12,7 @@ from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
 from models.estimation.numbers import NUMBERS, TELLING_SD, numbers_of
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 
 _STARTS = 2
@@ -38,6 +39,11 @@ class JointEstimate:
     parties: int
     weak: tuple[str, ...]
     reason: str
+
+    @property
+    def raw_parameters(self) -> PoseParameters:
+        """What `raw` is, named; it knows no heading."""
+        return PoseParameters.of_array(self.raw)
 
 
 def joint_estimate(
