@@ -88,13 +88,12 @@ class Fleet:
                 acknowledge_alert(session, alert.id, by)
             return alert.id
 
-    def tell_nothing(self, camera_id, hours_ago=0.0):
-        """A newest estimate whose tracks, which end so long ago, cannot tell the pose."""
+    def tell_nothing(self, camera_id):
+        """A newest estimate whose tracks cannot tell the pose."""
         with self.store.write() as session:
             reference = references.newest(session, camera_id)
             (last,) = self._estimates(camera_id, reference, "learning", 1, {}, still=0.0)
             last.told, last.created_at = [], self.now
-            last.to_s -= 3600 * hours_ago
             session.add(last)
 
     def attend(self, camera_id, hours=1.0, began_h=0.0):
@@ -181,21 +180,18 @@ def every_state(fleet: Fleet, numbers: Iterable[int]) -> None:
         camera_id = f"cam-{n:03}"
         turned = {"tilt_deg": 1.5 + 0.01 * n, "pan_deg": -0.5, "height_m": 0.2}
         match n % 10:
-            case 0:  # moved, and nothing was told before somebody came, who has gone
+            case 0:  # moved, and the newest people cannot tell how far
                 fleet.add(camera_id, state="drifting", **turned)
                 fleet.knock(camera_id, tilt_deg=2.0)
-                fleet.tell_nothing(camera_id, hours_ago=2.0)
-                fleet.attend(camera_id, hours=-0.1, began_h=0.3)
+                fleet.tell_nothing(camera_id)
             case 1:  # learning, with somebody there since a while
                 fleet.add(camera_id, state="learning", tracks=30)
                 fleet.attend(camera_id, hours=2.0, began_h=0.1)
             case 2:
                 fleet.add(camera_id, state="out_of_range", **turned)
                 fleet.knock(camera_id, kind="out_of_range", severity="warning", by="Ines")
-            case 3:  # moved, and the newest people cannot tell how far
-                fleet.add(camera_id, state="drifting", **turned)
-                fleet.knock(camera_id, tilt_deg=2.0)
-                fleet.tell_nothing(camera_id)
+            case 3:
+                fleet.add(camera_id)
             case 4:
                 fleet.add(camera_id, state="no_data")
             case 5:  # learning, and somebody was there
