@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
-    {"data_dir", "memory", "process"},
+    {"data_dir", "kinds", "memory", "process"},
     {"settings", "errors", "logs"},
     {"formats", "store", "delivery", "reach"},
     {"job_queue"},

@@ -13,8 +13,8 @@ from service.settings import Settings
 from service.store import references, sources
 from service.store.alerts import AlertFilter
 from service.store.database import Store
+from service.store.record import Record
 from service.store.revisions import alembic_config
-from service.store.tables import Record
 
 
 def test_migrating_twice_changes_nothing(settings):

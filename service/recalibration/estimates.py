@@ -17,6 +17,7 @@ from models.drift.verdict import (
 from models.estimation.numbers import ANGLES, NUMBERS
 from models.geometry.rotation import Array
 from service.job_queue import JobQueue
+from service.kinds import AlertKind, EventType, Outcome, PoseState, Severity
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.limits import drift_limits
@@ -49,7 +50,7 @@ def store_estimate(
     drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
-        record.state, record.reason = "learning", "the reference is being learned"
+        record.state, record.reason = PoseState.LEARNING, "the reference is being learned"
     else:
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)
@@ -60,7 +61,7 @@ def store_estimate(
         "tracks": record.tracks,
         "drift": drift_body(drift) if record.told else None,
     }
-    events.add(session, "pose", payload, record.created_at)
+    events.add(session, EventType.POSE, payload, record.created_at)
     return record
 
 
@@ -85,7 +86,7 @@ def _judge(
     if last is not None and not made_against(reference, last):
         last = None
     drifted: tuple[str, ...] = ()
-    if firing & {"drift", "clock"}:
+    if firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
         # An alert of before this reference stands until what is seen after it ends it.
         before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
         drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
@@ -103,14 +104,14 @@ def _judge(
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
     edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
-    record.state = "ok" if drift.told else "learning"
+    record.state = PoseState.OK if drift.told else PoseState.LEARNING
     if verdict.drifting:
-        record.state = "drifting"
+        record.state = PoseState.DRIFTING
     words = [describe_drift(drift, verdict, limits)]
     if clock is not None:
         words.append(clock)
     if edge is not None:
-        record.state = "out_of_range"
+        record.state = PoseState.OUT_OF_RANGE
         training = train_around(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
@@ -143,21 +144,24 @@ def _alert(
     camera_id = record.camera_id
     firing = fired_by_estimate(session, camera_id)
     body = drift_body(drift)
-    severity = "critical" if verdict.excess >= 2 else "warning"
+    severity = Severity.CRITICAL if verdict.excess >= 2 else Severity.WARNING
     since = record.drift_since
     if edge is not None:
-        open_alert(session, settings, camera_id, "out_of_range", severity, body, since, reason=edge)
-    elif "out_of_range" in firing:
-        end_alert(session, camera_id, "out_of_range", "cleared")
+        kind = AlertKind.OUT_OF_RANGE
+        open_alert(session, settings, camera_id, kind, severity, body, since, reason=edge)
+    elif AlertKind.OUT_OF_RANGE in firing:
+        end_alert(session, camera_id, AlertKind.OUT_OF_RANGE, Outcome.CLEARED)
     if not verdict.drifting:
-        for kind in firing & {"drift", "clock"}:
-            end_alert(session, camera_id, kind, "cleared")
+        for kind in firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
+            end_alert(session, camera_id, kind, Outcome.CLEARED)
         return
     # What was named a clock fault stays one until an angle has drifted too.
-    is_clock = clock is not None or ("clock" in firing and verdict.drifted == ("height",))
-    kind, other = ("clock", "drift") if is_clock else ("drift", "clock")
+    is_clock = clock is not None or (AlertKind.CLOCK in firing and verdict.drifted == ("height",))
+    kind, other = AlertKind.DRIFT, AlertKind.CLOCK
+    if is_clock:
+        kind, other = other, kind
     if other in firing:
-        end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
+        end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
     if drift.told or charted:
         reason = clock or record.reason
         open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)

@@ -7,12 +7,16 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from service.kinds import AlertKind, AlertSource, AlertState, Severity
 from service.settings import Settings
 from service.store import alerts, tracks
 from service.store.tables import AlertRecord
 
 # What a group is called, and which alerts of cameras can have its cause.
-_CAUSES = {"clock": ("drift", "clock"), "no_data": ("no_data",)}
+_CAUSES = {
+    AlertKind.CLOCK: (AlertKind.DRIFT, AlertKind.CLOCK),
+    AlertKind.NO_DATA: (AlertKind.NO_DATA,),
+}
 _FED_WITHIN = timedelta(days=1)  # a camera without tracks for longer is no longer fed by its source
 
 
@@ -43,9 +47,9 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
             camera_ids=[],
             track_source=source,
             kind=kind,
-            state="firing",
-            source="group",
-            severity="critical",
+            state=AlertState.FIRING,
+            source=AlertSource.GROUP,
+            severity=Severity.CRITICAL,
             reason="",
             drift={},
             told=False,
@@ -98,7 +102,7 @@ def _began_at(record: AlertRecord) -> datetime:
 
 def _reason(group: AlertRecord) -> str:
     count, source = len(group.camera_ids or []), group.track_source
-    if group.kind == "no_data":
+    if group.kind == AlertKind.NO_DATA:
         return (
             f"{count} cameras of the tracker {source!r} fell silent together: the tracker, its "
             "network or its clock is the likely cause, rather than each camera by itself"

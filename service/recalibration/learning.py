@@ -23,6 +23,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.kinds import Act, AlertKind, AlertSource, Severity
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
@@ -34,7 +35,7 @@ from service.store import cameras, maintenance, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import FlowMapRecord, PredictionRecord
 
-_DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
+_DOUBT_KINDS = {"scale": AlertKind.CLOCK, "pose": AlertKind.DRIFT}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +131,7 @@ def keep_reference(
     record.doubt = site.doubt
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
-    note(session, "reference.learned", by=None, camera_id=camera_id, details=details)
+    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,
@@ -148,11 +149,11 @@ def keep_reference(
             settings,
             camera_id,
             _DOUBT_KINDS[site.doubt_about],
-            "warning",
+            Severity.WARNING,
             drift={},
             changed_at=None,
             reason=site.doubt,
-            source="reference",
+            source=AlertSource.REFERENCE,
         )
 
 

@@ -8,7 +8,8 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
-from service.recalibration.camera_state import PoseState, Standing, standings
+from service.kinds import PoseState
+from service.recalibration.camera_state import Standing, standings
 from service.recalibration.cameras import require_camera
 from service.recalibration.references import tracks_so_far
 from service.recalibration.state_words import reason_of
@@ -88,7 +89,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of, the lens of `pose.yaml` too.
     lens = intrinsics_of(camera)
-    served = (standing.state, reason, pose, estimate_id, reference, model_id, lens)
+    served = (standing.state.value, reason, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
         standing=standing,

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import angle_between
 from service.job_queue import JobQueue
+from service.kinds import TrainingState
 from service.recalibration.trainings import centre_of, queue_training
 from service.settings import Settings
 from service.store import trainings
@@ -15,7 +16,11 @@ from service.store import trainings
 _EDGE = 0.9  # of the training range: beyond, a regressor only knows "at least so much"
 _SAME_RAD = math.radians(5.0)
 _SAME_M = 1.0
-_ENDED = {"succeeded": "has ended", "failed": "has failed", "cancelled": "was cancelled"}
+_ENDED = {
+    TrainingState.SUCCEEDED: "has ended",
+    TrainingState.FAILED: "has failed",
+    TrainingState.CANCELLED: "was cancelled",
+}
 
 
 def beyond_range(

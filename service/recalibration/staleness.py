@@ -6,12 +6,12 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from service.kinds import AlertAct, AlertKind, AlertSource, Outcome, Severity
 from service.recalibration.alerts import end_alert, open_alert
 from service.settings import Settings
 from service.store import alerts, cameras, unseen
 from service.store.tables import CameraRecord
 
-KIND = "stale"
 # Who closed the alert knows; if nothing is better by then, it is told again.
 _ANSWERED = timedelta(hours=1)
 
@@ -41,15 +41,21 @@ class StaleWatch:
         self._waiting = {
             camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
         }
-        firing = alerts.firing_cameras(session, KIND)
-        found = {}
+        firing = alerts.firing_cameras(session, AlertKind.STALE)
+        found: dict[str, str] = {}
         for camera in cameras.every(session):
             waiting = self._waiting.get(camera.id)
             waits_s = 0.0 if waiting is None else now_s - waiting.since_s
             reason = _why_stale(camera, settings, waits_s)
             if reason is None and camera.id in firing:
                 if camera.estimate_failing_since is None:
-                    end_alert(session, camera.id, KIND, "cleared", note="it is looked at again")
+                    end_alert(
+                        session,
+                        camera.id,
+                        AlertKind.STALE,
+                        Outcome.CLEARED,
+                        note="it is looked at again",
+                    )
                     found[camera.id] = "ended"
             elif reason is not None and camera.id not in firing and not _answered(session, camera):
                 since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(
@@ -59,14 +65,14 @@ class StaleWatch:
                     session,
                     settings,
                     camera.id,
-                    KIND,
-                    "critical",
+                    AlertKind.STALE,
+                    Severity.CRITICAL,
                     {},
                     since,
                     reason=reason,
-                    source="upkeep",
+                    source=AlertSource.UPKEEP,
                 )
-                found[camera.id] = "opened"
+                found[camera.id] = AlertAct.OPENED
         return found
 
     def _watched(self, camera_id: str, track_pk: int, now_s: float) -> _Waiting:
@@ -94,7 +100,7 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> str 
 
 
 def _answered(session: Session, camera: CameraRecord) -> bool:
-    last = alerts.newest(session, camera.id, KIND)
-    if last is None or last.resolved_at is None or last.outcome == "cleared":
+    last = alerts.newest(session, camera.id, AlertKind.STALE)
+    if last is None or last.resolved_at is None or last.outcome == Outcome.CLEARED:
         return False
     return abs(datetime.now(UTC) - last.resolved_at) < _ANSWERED

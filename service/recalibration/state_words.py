@@ -4,7 +4,8 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.recalibration.camera_state import Cause, Standing
+from service.kinds import Cause, PoseState
+from service.recalibration.camera_state import MOVED, Standing
 from service.recalibration.presence import silence_of
 from service.recalibration.references import (
     FEWEST_WALKERS,
@@ -16,11 +17,11 @@ from service.settings import Settings
 from service.store import maintenance, tracks
 from service.store.alert_tables import MaintenanceRecord
 
-_SINCE: dict[Cause, str] = {
-    "reference": "since the reference",
-    "maintenance": "since the maintenance",
-    "put_back": "since the camera was put back",
-    "false_alarm": "since the alert was called a false alarm",
+_SINCE = {
+    Cause.REFERENCE: "since the reference",
+    Cause.MAINTENANCE: "since the maintenance",
+    Cause.PUT_BACK: "since the camera was put back",
+    Cause.FALSE_ALARM: "since the alert was called a false alarm",
 }
 
 
@@ -32,9 +33,9 @@ def reason_of(session: Session, settings: Settings, standing: Standing) -> str:
     if window is not None:
         parts.append(_describe_window(window))
     estimate = standing.estimate
-    if standing.judged and estimate is not None and standing.state != "no_data":
+    if standing.judged and estimate is not None and standing.state is not PoseState.NO_DATA:
         parts.append(estimate.reason)
-    elif standing.state in ("drifting", "out_of_range"):
+    elif standing.state in MOVED:
         if estimate is not None and estimate.told:
             parts.append(f"when it was last told: {estimate.reason}")
         else:
@@ -42,7 +43,7 @@ def reason_of(session: Session, settings: Settings, standing: Standing) -> str:
     if not standing.judged:
         parts.append(_missing(session, settings, standing))
     silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
-    if silence is not None and standing.state in ("no_data", "drifting", "out_of_range"):
+    if silence is not None and standing.state in (PoseState.NO_DATA, *MOVED):
         parts.append(silence.reason)
     return "; ".join(part for part in parts if part)
 

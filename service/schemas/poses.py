@@ -2,11 +2,12 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from models.estimation.numbers import ANGLES
+from service.kinds import PoseState, ReferenceState
 from service.recalibration.poses import PoseView
 from service.recalibration.words import FIELDS
 from service.schemas.base import Body, Who
@@ -60,7 +61,7 @@ class DriftOut(BaseModel):
 class ReferenceOut(BaseModel):
     """How much of the reference period has been seen."""
 
-    state: Literal["learning", "ready"]
+    state: ReferenceState
     tracks: int
     wanted: int
     walking_speed_mps: float | None
@@ -72,7 +73,7 @@ class ServedPoseOut(BaseModel):
     model_config = ConfigDict(serialize_by_alias=True)
 
     camera_id: str
-    state: Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
+    state: PoseState
     pose: PoseOut
     estimated: list[str]
     sd: SdOut | None
@@ -99,7 +100,7 @@ class ServedPoseOut(BaseModel):
             drift=None if estimate is None else drift_out(estimate),
             estimates={} if estimate is None else estimate.raw,
             reference=ReferenceOut(
-                state="ready" if view.reference.ready else "learning",
+                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
                 tracks=view.reference.tracks,
                 wanted=view.reference.wanted,
                 walking_speed_mps=view.reference.walking_speed_mps,
@@ -117,7 +118,7 @@ class HistoryPoint(BaseModel):
     """One estimate of the history."""
 
     at: datetime
-    state: str
+    state: PoseState
     height_m: float
     tilt_deg: float
     roll_deg: float

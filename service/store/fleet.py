@@ -9,6 +9,7 @@ from sqlalchemy import ColumnElement, String, case, func, select, type_coerce
 from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
+from service.kinds import AlertState
 from service.store.alert_tables import MaintenanceRecord, RhythmRecord
 from service.store.figures import Ids, among, newest_of
 from service.store.tables import (
@@ -93,7 +94,7 @@ def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
     """The alerts of cameras that fire, those about one camera."""
     query = select(AlertRecord).where(
-        AlertRecord.state == "firing", AlertRecord.camera_id.is_not(None)
+        AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_not(None)
     )
     return session.scalars(query.where(among(AlertRecord.camera_id, ids))).all()
 
@@ -102,7 +103,7 @@ def firing_groups(session: Session) -> Sequence[AlertRecord]:
     """The alerts of groups that fire, the newest first."""
     return session.scalars(
         select(AlertRecord)
-        .where(AlertRecord.state == "firing", AlertRecord.camera_id.is_(None))
+        .where(AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_(None))
         .order_by(AlertRecord.opened_at.desc())
     ).all()
 
