@@ -19,6 +19,7 @@ from service.kinds import (
     Outcome,
     Severity,
 )
+from service.reasons import Reasons
 from service.recalibration.activity import note as note_activity
 from service.recalibration.groups import group_with
 from service.recalibration.outbox import json_time, queue_alert
@@ -55,7 +56,7 @@ def open_alert(
     drift: dict[str, Any],
     changed_at: datetime | None,
     *,
-    reason: str,
+    reasons: Reasons,
     source: AlertSource = AlertSource.ESTIMATE,
 ) -> AlertRecord | None:
     """Open an alert, or bring the open one up to date; None where somebody is at the camera.
@@ -76,7 +77,7 @@ def open_alert(
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
             _keep_act(session, record, AlertAct.ESCALATED, None)
         record.drift, record.severity, record.updated_at = drift, severity, now
-        record.reason, record.source = reason, source
+        record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
     else:
         change = MessageType.ALERT_OPENED
@@ -88,7 +89,7 @@ def open_alert(
             state=AlertState.FIRING,
             source=source,
             severity=severity,
-            reason=reason,
+            reasons=reasons,
             drift=drift,
             told=False,
             opened_at=now,
@@ -247,7 +248,11 @@ def _keep_act(
         until=until,
         outcome=outcome,
         text=note,
-        details={"severity": record.severity, "reason": record.reason},
+        details={
+            "severity": record.severity,
+            "reason": record.reason,
+            "reason_code": record.reason_code,
+        },
     )
 
 
@@ -264,6 +269,8 @@ def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
         "state": record.state,
         "severity": record.severity,
         "reason": record.reason,
+        "reason_code": record.reason_code,
+        "reason_values": record.reason_values,
         "drift": record.drift,
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.drift.chart import CLOCK
 from models.drift.clock import clock_fault, may_be_clock
+from models.drift.said import reason_of_drift, reason_of_reading
 from models.drift.verdict import (
     Drift,
     DriftVerdict,
@@ -16,15 +17,17 @@ from models.drift.verdict import (
 )
 from models.estimation.numbers import ANGLES, NUMBERS
 from models.geometry.rotation import Array
+from models.reasons import Reason
 from service.job_queue import JobQueue
 from service.kinds import AlertKind, EventType, Outcome, PoseState, Severity
+from service.reasons import ServiceCode, some
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import is_overtaken, made_against
 from service.recalibration.second_look import drift_of
-from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
+from service.recalibration.words import FIELDS, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
 from service.store.tables import EstimateRecord, SiteReferenceRecord
@@ -50,7 +53,10 @@ def store_estimate(
     drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
-        record.state, record.reason = PoseState.LEARNING, "the reference is being learned"
+        record.state, record.reasons = (
+            PoseState.LEARNING,
+            (Reason(code=ServiceCode.LEARNING_REFERENCE),),
+        )
     else:
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)
@@ -75,7 +81,7 @@ def _judge(
     drift: Drift,
     record: EstimateRecord,
 ) -> None:
-    """Set state, reason, drift and alerts of an estimate after the reference."""
+    """Set state, reasons, drift and alerts of an estimate after the reference."""
     if finding.change is not None:
         reference.window_from_s = finding.change.ended_s
         reference.changed_s = finding.change.started_s
@@ -107,25 +113,26 @@ def _judge(
     record.state = PoseState.OK if drift.told else PoseState.LEARNING
     if verdict.drifting:
         record.state = PoseState.DRIFTING
-    words = [describe_drift(drift, verdict, limits)]
-    if clock is not None:
-        words.append(clock)
+    training = None
     if edge is not None:
         record.state = PoseState.OUT_OF_RANGE
         training = train_around(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
-        words.append(f"{edge}; a training around the new estimate {training}")
-    if finding.reading is not None:
-        words.append(describe_reading(finding.reading))
-    words.append(finding.fused.reason)
-    if not set(NUMBERS) <= set(drift.told):
-        words.append(finding.joint.reason)
-    words.append(reference.doubt)
-    record.reason = "; ".join(word for word in (*words, *finding.lacks) if word)
+    record.reasons = some(
+        reason_of_drift(drift, verdict, limits),
+        clock,
+        edge,
+        training,
+        None if finding.reading is None else reason_of_reading(finding.reading),
+        finding.fused.reason,
+        None if set(NUMBERS) <= set(drift.told) else finding.joint.reason,
+        *reference.doubts,
+        *finding.lacks,
+    )
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.number == CLOCK:
-        clock = describe_reading(reading)
+        clock = reason_of_reading(reading)
     _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 
 
@@ -137,8 +144,8 @@ def _alert(
     verdict: DriftVerdict,
     *,
     charted: bool,
-    clock: str | None,
-    edge: str | None,
+    clock: Reason | None,
+    edge: Reason | None,
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     camera_id = record.camera_id
@@ -148,7 +155,7 @@ def _alert(
     since = record.drift_since
     if edge is not None:
         kind = AlertKind.OUT_OF_RANGE
-        open_alert(session, settings, camera_id, kind, severity, body, since, reason=edge)
+        open_alert(session, settings, camera_id, kind, severity, body, since, reasons=(edge,))
     elif AlertKind.OUT_OF_RANGE in firing:
         end_alert(session, camera_id, AlertKind.OUT_OF_RANGE, Outcome.CLEARED)
     if not verdict.drifting:
@@ -163,8 +170,8 @@ def _alert(
     if other in firing:
         end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
     if drift.told or charted:
-        reason = clock or record.reason
-        open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)
+        reasons = record.reasons if clock is None else (clock,)
+        open_alert(session, settings, camera_id, kind, severity, body, since, reasons=reasons)
 
 
 def _since(

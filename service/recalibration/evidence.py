@@ -29,6 +29,7 @@ from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.kinds import AlertKind
+from service.reasons import Reasons
 from service.recalibration.alerts import fired_by_estimate
 from service.recalibration.changes import change_among
 from service.recalibration.lacks import Lacks
@@ -102,7 +103,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
-    lacks: tuple[str, ...] = ()
+    lacks: Reasons = ()
 
     @property
     def newest_pk(self) -> int:

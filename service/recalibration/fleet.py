@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from service.kinds import AlertKind, PoseState, Severity, TrainingState
+from service.reasons import Reasons
 from service.recalibration.attendance import Attendance
 from service.recalibration.camera_state import Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
@@ -45,7 +46,7 @@ class FleetAlert:
     alert_id: str
     kind: AlertKind
     severity: Severity
-    reason: str
+    reasons: Reasons
     since: datetime
     acknowledged_by: str | None
     silenced_until: datetime | None
@@ -84,7 +85,6 @@ class FleetCamera:
     history: tuple[float | None, ...]
     learned: int | None
     wanted: int
-    doubt: str
     alerts: tuple[FleetAlert, ...]
     training: FleetTraining | None
     attended_until: datetime | None
@@ -143,7 +143,6 @@ def list_fleet(
             history=tuple(history[camera_id]),
             learned=_learned(session, settings, each, counts),
             wanted=wanted_tracks(each.reference, settings),
-            doubt=each.reference.doubt,
             alerts=tuple(_alert(record, now) for record in each.alerts),
             training=_training(trainings.get(camera_id)),
             attended_until=_attended_until(each.attended, now),
@@ -175,7 +174,7 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
         alert_id=record.id,
         kind=record.kind,
         severity=record.severity,
-        reason=record.reason,
+        reasons=record.reasons,
         since=alert_since(record),
         acknowledged_by=record.acknowledged_by,
         silenced_until=record.silenced_until if is_silenced(record, now) else None,

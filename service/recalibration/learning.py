@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -21,9 +22,11 @@ from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.reasons import TracksCode
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.reasons import some
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
@@ -35,7 +38,12 @@ from service.store import cameras, maintenance, references, tracks, trainings
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import FlowMapRecord, PredictionRecord
 
-_DOUBT_KINDS = {"scale": AlertKind.CLOCK, "pose": AlertKind.DRIFT}
+# What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
+_DOUBT_KINDS: dict[StrEnum, AlertKind] = {
+    TracksCode.SPEED_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.STATURE_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.PRIOR_POSE_DOUBTED: AlertKind.DRIFT,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +136,7 @@ def keep_reference(
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
     record.offsets = learned.offsets
-    record.doubt = site.doubt
+    record.doubts = some(site.doubt)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
     note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
@@ -143,16 +151,16 @@ def keep_reference(
             learned_at=record.ready_at,
         )
     )
-    if site.doubt:
+    if site.doubt is not None:
         open_alert(
             session,
             settings,
             camera_id,
-            _DOUBT_KINDS[site.doubt_about],
+            _DOUBT_KINDS[site.doubt.code],
             Severity.WARNING,
             drift={},
             changed_at=None,
-            reason=site.doubt,
+            reasons=(site.doubt,),
             source=AlertSource.REFERENCE,
         )
 

@@ -25,6 +25,8 @@ ALERT_FIELDS = (
     "state",
     "severity",
     "reason",
+    "reason_code",
+    "reason_values",
     "drift",
     "opened_at",
     "changed_at",

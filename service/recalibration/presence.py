@@ -13,7 +13,9 @@ from models.drift.rhythm import (
     is_missed,
     judge_silence,
 )
+from models.reasons import Reason
 from service.kinds import AlertKind, AlertSource, Outcome, Severity
+from service.reasons import Reasons, ServiceCode
 from service.recalibration.alerts import end_alert, open_alert
 from service.recalibration.attendance import attendance_of
 from service.recalibration.rhythms import CameraRhythm, cells_of, rhythm_of
@@ -34,14 +36,14 @@ _SEVERITIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Silence:
-    """How long a camera has been silent, whether that is `no_data`, and why, in words.
+    """How long a camera has been silent, whether that is `no_data`, and why.
 
     `severity` is that of the alert that it deserves; None where silence is usual by now.
     """
 
     last_s: float
     no_data: bool
-    reason: str
+    reasons: Reasons
     severity: Severity | None
 
 
@@ -96,7 +98,7 @@ def watch_presence(
         silence.severity,
         {},
         datetime.fromtimestamp(silence.last_s, UTC),
-        reason=silence.reason,
+        reasons=silence.reasons,
         source=AlertSource.RHYTHM,
     )
     return None if opened is None else "no tracks come"
@@ -113,8 +115,12 @@ def _by_the_limit(
     return Silence(
         last_s=last_s,
         no_data=is_no_data(settings, None, last_s, now),
-        reason=f"the newest track ended {_hours(silent_s)} ago; "
-        f"up to {settings.no_data_after_h:g} h are waited for",
+        reasons=(
+            Reason(
+                code=ServiceCode.SILENT_UNKNOWN,
+                values={"silent_s": silent_s, "limit_s": limit_s},
+            ),
+        ),
         severity=Severity.WARNING if now.timestamp() - begun_s > limit_s else None,
     )
 
@@ -148,17 +154,15 @@ def _by_rhythm(
             seen=tracks.count_ended(session, camera_id, last_s - _LOOK_BACK_S, last_s),
             expected=_expected(settings, known, last_s - _LOOK_BACK_S, last_s),
         )
-    words = f"no track for {_hours(now_s - last_s)}"
+    code, values = ServiceCode.SILENT_USUAL, {"silent_s": now_s - last_s}
     if is_missed(rhythm, missed):
-        words += f", where about {missed:.0f} are usual by now"
-    else:
-        words += ", as is usual at this hour"
+        code, values["missed_tracks"] = ServiceCode.SILENT_UNUSUAL, missed
     if known.delay_s > settings.no_data_min_s:
-        words += f"; its tracks come up to {_hours(known.delay_s)} late"
+        values["late_s"] = known.delay_s
     return Silence(
         last_s=last_s,
         no_data=is_no_data(settings, known, last_s, now),
-        reason=words,
+        reasons=(Reason(code=code, values=values),),
         severity=_SEVERITIES[verdict],
     )
 
@@ -182,7 +186,3 @@ def _answered_s(session: Session, camera_id: str, now: datetime) -> float:
 def _received_s(session: Session, camera_id: str) -> float:
     received_at = tracks.newest_received_at(session, camera_id)
     return 0.0 if received_at is None else received_at.timestamp()
-
-
-def _hours(seconds: float) -> str:
-    return f"{seconds / _HOUR_S:.1f} h"

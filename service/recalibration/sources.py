@@ -10,9 +10,11 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.job_queue import JobQueue
 from service.kinds import Act, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
+from service.reasons import ServiceCode
 from service.recalibration.activity import note
 from service.recalibration.alerts import end_alert, open_alert
 from service.recalibration.attendance import attendance_of
@@ -164,7 +166,7 @@ def watch_sources(
         Severity.WARNING,
         {},
         None,
-        reason=_reason(settings, reference, posting),
+        reasons=(_reason(settings, reference, posting),),
         source=AlertSource.TRACKS,
     )
     if opened is None:
@@ -279,12 +281,12 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
 
 def _reason(
     settings: Settings, reference: SiteReferenceRecord, posting: Sequence[SourceRecord]
-) -> str:
-    names = " and ".join(repr(record.name) for record in posting)
-    return (
-        f"tracks of {names} come beside those of {reference.source!r}, which count: they are kept "
-        f"and move nothing. Should {reference.source!r} fall silent for "
-        f"{settings.source_silent_h:g} h, they take over once "
-        f"{wanted_tracks(reference, settings)} of them were seen while the camera was where it "
-        "should be; a person can say so at once"
-    )
+) -> Reason:
+    values: dict[str, Value] = {
+        "sources": [record.name for record in posting],
+        "silent_s": settings.source_silent_h * _HOUR_S,
+        "wanted": wanted_tracks(reference, settings),
+    }
+    if reference.source is not None:
+        values["counting"] = reference.source
+    return Reason(code=ServiceCode.OTHER_SOURCES, values=values)

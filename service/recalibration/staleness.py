@@ -6,7 +6,9 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
 from service.kinds import AlertAct, AlertKind, AlertSource, Outcome, Severity
+from service.reasons import ServiceCode
 from service.recalibration.alerts import end_alert, open_alert
 from service.settings import Settings
 from service.store import alerts, cameras, unseen
@@ -69,7 +71,7 @@ class StaleWatch:
                     Severity.CRITICAL,
                     {},
                     since,
-                    reason=reason,
+                    reasons=(reason,),
                     source=AlertSource.UPKEEP,
                 )
                 found[camera.id] = AlertAct.OPENED
@@ -82,20 +84,19 @@ class StaleWatch:
         return _Waiting(track_pk=track_pk, since_s=now_s)
 
 
-def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> str | None:
+def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:
     """Why a camera's estimate is not what it should be; None where it is."""
     failed = camera.estimate_tries >= settings.stale_failures
     # While it is being looked at, it is not due: the last try may be the one that succeeds.
     if failed and camera.estimate_error is not None and camera.estimate_due_at is not None:
-        return (
-            f"its tracks cannot be looked at: {camera.estimate_tries} tries failed in a row, the "
-            f"last with {camera.estimate_error}"
-        )
+        values: dict[str, Value] = {
+            "tries": camera.estimate_tries,
+            "error": camera.estimate_error,
+        }
+        return Reason(code=ServiceCode.LOOKS_FAIL, values=values)
     if waits_s > settings.stale_after_s:
-        return (
-            f"its tracks have waited for {waits_s / 60:.0f} min; up to "
-            f"{settings.stale_after_s / 60:g} min are waited for"
-        )
+        waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
+        return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
     return None
 
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.kinds import AlertAct, AlertKind, AlertState, Answer, Outcome, Severity
 from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Moment, Who
+from service.schemas.reasons import ReasonCode, ReasonValues
 from service.store.activity_tables import ActivityRecord
 from service.store.tables import AlertRecord
 
@@ -49,6 +50,8 @@ class AlertOut(BaseModel):
     state: AlertState
     severity: Severity
     reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
     drift: dict[str, Any]
     opened_at: datetime
     changed_at: datetime | None

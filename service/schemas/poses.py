@@ -8,10 +8,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from models.estimation.numbers import ANGLES
 from service.kinds import PoseState, ReferenceState
+from service.reasons import code_of, values_of
 from service.recalibration.poses import PoseView
 from service.recalibration.words import FIELDS
 from service.schemas.base import Body, Who
 from service.schemas.geometry import PoseOut
+from service.schemas.reasons import ReasonCode, ReasonValues
 from service.store.tables import EstimateRecord
 
 
@@ -86,6 +88,8 @@ class ServedPoseOut(BaseModel):
     model_id: str | None
     updated_at: datetime | None
     reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
 
     @classmethod
     def from_value(cls, view: PoseView) -> Self:
@@ -111,6 +115,8 @@ class ServedPoseOut(BaseModel):
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
             reason=view.reason,
+            reason_code=code_of(view.reasons),
+            reason_values=values_of(view.reasons),
         )
 
 

@@ -9,6 +9,7 @@ from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, MetaData, Strin
 from sqlalchemy.orm import DeclarativeBase
 
 from service import kinds
+from service.reasons import Reasons, from_json, to_json
 
 NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -73,6 +74,21 @@ class Word(TypeDecorator[StrEnum]):
         return None if value is None else self.words(value)
 
 
+class ReasonsJson(TypeDecorator[Reasons]):
+    """Reasons, as JSON."""
+
+    impl = JSON
+    cache_ok = True
+
+    def process_bind_param(self, value: Reasons | None, dialect: Dialect) -> Any:
+        """A list of codes with their values."""
+        return None if value is None else to_json(value)
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Reasons | None:
+        """The reasons."""
+        return None if value is None else from_json(value)
+
+
 def one_of(column: str, words: Iterable[StrEnum]) -> CheckConstraint:
     """The constraint that a column has one of some words, or nothing."""
     said = ", ".join(f"'{word}'" for word in words)
@@ -88,5 +104,6 @@ class Record(DeclarativeBase):
         dict[str, Any]: JSON,
         list[float]: JSON,
         list[str]: JSON,
+        Reasons: ReasonsJson(),
     }
     type_annotation_map |= {words: Word(words) for words in _STORED}

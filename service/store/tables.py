@@ -18,6 +18,8 @@ from service.kinds import (
     Severity,
     TrainingState,
 )
+from service.reason_words import in_words
+from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, one_of
 
 
@@ -114,7 +116,7 @@ class SiteReferenceRecord(Record):
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     walking_speed_mps: Mapped[float | None]
     offsets: Mapped[dict[str, Any] | None]
-    doubt: Mapped[str]
+    doubts: Mapped[Reasons]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
     answer: Mapped[Answer | None]
@@ -260,7 +262,7 @@ class EstimateRecord(Record):
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     reference_id: Mapped[int | None] = _key("site_references.id", index=True)
     state: Mapped[PoseState]
-    reason: Mapped[str]
+    reasons: Mapped[Reasons]
     told: Mapped[list[str]]  # of tilt, roll, height, heading
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
@@ -317,7 +319,7 @@ class AlertRecord(Record):
     source: Mapped[AlertSource]
     told: Mapped[bool] = mapped_column(default=False)
     severity: Mapped[Severity]
-    reason: Mapped[str]
+    reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]
     opened_at: Mapped[datetime]
     changed_at: Mapped[datetime | None]
@@ -357,6 +359,21 @@ class AlertRecord(Record):
         Index(None, "opened_at"),
         Index(None, "camera_id", "opened_at"),
     )
+
+    @property
+    def reason(self) -> str:
+        """Why it was opened, in words."""
+        return in_words(self.reasons)
+
+    @property
+    def reason_code(self) -> str | None:
+        """The code of the first reason; None of a group that is about to be told."""
+        return code_of(self.reasons)
+
+    @property
+    def reason_values(self) -> dict[str, Any]:
+        """The numbers and names of the first reason, angles in degrees."""
+        return values_of(self.reasons)
 
 
 class EventRecord(Record):

@@ -8,6 +8,7 @@ from datetime import datetime, tzinfo
 from markupsafe import Markup
 
 from service.kinds import AlertKind, PoseState, Severity
+from service.reason_words import group_in_words
 from service.recalibration.camera_state import MOVED
 from service.recalibration.fleet import FleetAlert, FleetCamera, FleetGroup
 from service.store.alerts import POSE_KINDS
@@ -74,7 +75,7 @@ def banners_of(groups: Sequence[FleetGroup], now: datetime, zone: tzinfo) -> lis
     return [
         Banner(
             title=f"Tracker {group.track_source}:",
-            words=group.alert.reason.replace(f" of the tracker {group.track_source!r}", ""),
+            words=group_in_words(group.alert.reasons),
             severity=group.alert.severity,
             since=group.alert.since.isoformat(),
             since_clock=clock_time(group.alert.since, zone),

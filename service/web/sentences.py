@@ -6,6 +6,7 @@ from datetime import UTC, datetime, tzinfo
 
 from models.estimation.numbers import ANGLES
 from service.kinds import AlertKind, PoseState
+from service.reason_words import in_words
 from service.recalibration.camera_page import CameraPage
 from service.recalibration.camera_state import MOVED
 from service.store.alerts import POSE_KINDS
@@ -25,7 +26,7 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
     quiet = ""
     if page.silence is not None and standing.silent and standing.state is not PoseState.LEARNING:
         since = when(datetime.fromtimestamp(page.silence.last_s, UTC), page.now, zone)
-        quiet = f"No people since {since}: {page.silence.reason}."
+        quiet = f"No people since {since}: {in_words(page.silence.reasons)}."
     return " ".join(part for part in (_how_it_stands(page, estimate, zone), quiet) if part)
 
 
@@ -58,7 +59,7 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
 
 
 def _alarmed(doubts: Sequence[AlertRecord]) -> str:
-    return f"It may not stand where it should: {doubts[0].reason.rstrip('.')}."
+    return f"It may not stand where it should: {doubts[0].reason}."
 
 
 def turn_words(estimate: EstimateRecord) -> str:
