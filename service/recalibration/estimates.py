@@ -53,10 +53,8 @@ def store_estimate(
     drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
-        record.state, record.reasons = (
-            PoseState.LEARNING,
-            (Reason(code=ServiceCode.LEARNING_REFERENCE),),
-        )
+        record.state = PoseState.LEARNING
+        record.reasons = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
     else:
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)

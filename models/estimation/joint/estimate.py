@@ -66,7 +66,7 @@ def joint_estimate(
             code=TracksCode.TOO_FEW_PARTIES,
             values={
                 "tracks": observations.walkers,
-                "parties": parties,
+                "parties": int(parties),
                 "least_parties": _FEWEST_PARTIES,
             },
         )
