@@ -190,6 +190,8 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     port = service.settings.port
     for n in range(wanted.cameras):
         service.http.post("/cameras", json={**CAMERA, "id": f"load-{n}"}).raise_for_status()
+    # A worker holds the networks once the first training has ended: not a thing of the load.
+    trained_s = _seconds_until(lambda: not _training(service, wanted.cameras), most_s=900)
     load = Load(port, wanted.cameras, wanted.seed)
     watch = Watch(service.process.pid, service.settings)
     context = multiprocessing.get_context("spawn")
@@ -224,6 +226,7 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
             if found["growth"] > wanted.growth
         ]
     return {
+        "trained_before_s": round(trained_s),
         "counts": {kind: dict(found) for kind, found in load.counts.items()},
         "latency": {kind: quantiles(found) for kind, found in load.seconds.items()},
         "health": quantiles(health),
@@ -235,9 +238,16 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     }
 
 
-def _seconds_until(what: Callable[[], bool]) -> float:
+def _training(service: RunningService, cameras: int) -> bool:
+    listed = (service.http.get(f"/cameras/load-{n}/trainings").json() for n in range(cameras))
+    return any(
+        item["state"] in ("queued", "running") for answer in listed for item in answer["items"]
+    )
+
+
+def _seconds_until(what: Callable[[], bool], most_s: float = 60.0) -> float:
     begun = time.monotonic()
-    while not what():
+    while not what() and time.monotonic() - begun < most_s:
         time.sleep(0.05)
     return time.monotonic() - begun
 
