@@ -34,6 +34,7 @@ from service.demo_folder import (
     require_free,
 )
 from service.formats.degrees import degrees, in_degrees
+from service.kinds import AlertState, ReferenceState
 from service.process import end_like_ctrl_c
 from service.replay import post_tracks
 from service.settings import Settings
@@ -77,7 +78,7 @@ class _Screen:
 
     def _words(self, pose: dict[str, Any]) -> str:
         reference = pose["reference"]
-        if reference["state"] == "learning":
+        if reference["state"] == ReferenceState.LEARNING:
             return f"learning what is usual here: {pose['reason']}"
         usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
         if self.alert is None:
@@ -178,9 +179,11 @@ def _show(
 def _looked_at(http: httpx.Client, screen: _Screen, newest_s: float) -> bool:
     """Whether the newest track is in the reference or the estimate that is shown."""
     pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
-    alerts = http.get("/alerts", params={"camera_id": CAMERA_ID, "state": "firing"}).json()["items"]
+    alerts = http.get(
+        "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}
+    ).json()["items"]
     screen.pose, screen.alert = pose, alerts[0] if alerts else None
-    if pose["reference"]["state"] == "learning":
+    if pose["reference"]["state"] == ReferenceState.LEARNING:
         return bool(pose["reference"]["tracks"] < _REFERENCE_TRACKS)
     newest = pose["to"] and datetime.fromisoformat(pose["to"]).timestamp() >= newest_s - 1e-3
     return bool(newest) or screen.tracks == _REFERENCE_TRACKS

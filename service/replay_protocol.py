@@ -21,6 +21,7 @@ from models.geometry.rotation import Array, angle_between
 from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
 from service.formats.degrees import degrees
+from service.kinds import ReferenceState
 from service.replay import camera_body, client_of
 
 _SOURCE = "surefoot-protocol"
@@ -85,7 +86,7 @@ def replay_protocol(
         http.post("/cameras", json={**body, "reference_tracks": wanted}).raise_for_status()
         lost = _post(http, camera_id, case.reference, "r", shifts[0], case.intrinsics)
         _wait(
-            http, camera_id, lambda pose: pose["reference"]["state"] == "ready",
+            http, camera_id, lambda pose: pose["reference"]["state"] == ReferenceState.READY,
             lambda pose: on_progress("reference", pose["reference"]["tracks"], wanted),
         )  # fmt: skip
         lost += _post(http, camera_id, case.seen, "s", shifts[1], case.intrinsics)

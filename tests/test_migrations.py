@@ -5,19 +5,21 @@ from datetime import UTC, datetime
 import alembic.command
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import text
+from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
 
 from service.app import create_app
 from service.migrate import migrate
+from service.reason_words import in_words
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
 from service.store import references, sources
 from service.store.alerts import AlertFilter
 from service.store.database import Store
+from service.store.record import Record
 from service.store.revisions import alembic_config
-from service.store.tables import Record
+from service.store.tables import EstimateRecord
 
 
 def test_migrating_twice_changes_nothing(settings):
@@ -157,6 +159,68 @@ def test_what_was_kept_in_degrees_is_told_as_it_was(tmp_path):
     assert list(again["registered"]) == list(raw["registered"])
     assert again["joint"] == pytest.approx(raw["joint"], rel=1e-15)
     assert pytest.approx(drift, rel=1e-15) in alerts
+
+
+def test_what_was_said_in_sentences_stays_readable(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_26_closed_words")
+    source = 'byte\'s "own"'
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        for number, doubt in ((1, "people walk at 3 m/s"), (2, "")):
+            put(connection, "site_references", id=number, camera_id="old", prior_pose_id=1,
+                origin="registered", doubt=doubt)  # fmt: skip
+        put(connection, "estimates", camera_id="old", prior_pose_id=1, state="ok",
+            reason="it's 5 \"deg\"; so")  # fmt: skip
+        known = {"state": "firing", "severity": "critical", "drift": "{}"}
+        put(connection, "alerts", id="one", camera_id="old", kind="drift", source="estimate",
+            reason="far", **known)  # fmt: skip
+        put(connection, "alerts", id="all", kind="no_data", source="group", reason="3 cameras of",
+            camera_ids='["a", "b", "old"]', track_source=source, **known)  # fmt: skip
+    alembic.command.upgrade(config, "head")
+    with Store(settings).read() as session:
+        first, second = references.of_camera(session, "old", 2)[::-1]
+        assert (in_words(first.doubts), second.doubts) == ("people walk at 3 m/s", ())
+        (estimate,) = session.scalars(select(EstimateRecord))
+        assert in_words(estimate.reasons) == 'it\'s 5 "deg"; so'
+        alerts = {alert.id: alert for alert in list_alerts(session, AlertFilter(), 10)}
+        assert (alerts["one"].reason, alerts["one"].reason_code) == ("far", "as_said")
+        assert alerts["all"].reason_code == "fell_silent_together"
+        assert alerts["all"].reason_values == {"cameras": 3, "track_source": source}
+        assert alerts["all"].reason.startswith(f"3 cameras of the tracker {source!r} fell silent")
+    alembic.command.downgrade(config, "2026_11_26_closed_words")
+    with sqlite3.connect(settings.database_path) as connection:
+        said = connection.execute("SELECT reason FROM alerts ORDER BY id").fetchall()
+        assert said == [("fell_silent_together",), ("far",)]
+        said = connection.execute("SELECT doubt FROM site_references ORDER BY id").fetchall()
+        assert said == [("people walk at 3 m/s",), ("",)]
+
+
+def test_making_tables_anew_keeps_numbers_and_triggers(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_25_track_sources")
+    with sqlite3.connect(settings.database_path) as connection:
+        for number in (7, 8):
+            put(connection, "events", id=number, type="alert", payload="{}")
+        connection.execute("DELETE FROM events WHERE id = 8")
+        put(connection, "activity", what="pose.accepted", details="{}")
+        connection.execute("UPDATE sqlite_sequence SET seq = 41 WHERE name = 'activity'")
+    for revision in ("head", "2026_11_25_track_sources"):
+        way = alembic.command.upgrade if revision == "head" else alembic.command.downgrade
+        way(config, revision)
+        with sqlite3.connect(settings.database_path) as connection:
+            insert = "INSERT INTO events (type, payload, created_at) VALUES ('pose', '{}', '2026')"
+            numbers = [connection.execute(insert).lastrowid]
+            connection.rollback()
+            with pytest.raises(sqlite3.IntegrityError, match="never changed"):
+                connection.execute("UPDATE activity SET by = 'Eve'")
+            (last,) = connection.execute(
+                "SELECT seq FROM sqlite_sequence WHERE name = 'activity'"
+            ).fetchone()
+            assert (numbers, last) == ([9], 41)
 
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):

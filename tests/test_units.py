@@ -5,15 +5,20 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 # Who may turn radians into degrees by themselves.
-EDGES = ("service/schemas/", "service/web/", "service/formats/degrees.py")
-# Who tells people otherwise than by schemas and pages: by events and webhooks, in reasons, on a
+EDGES = (
+    "service/schemas/",
+    "service/web/",
+    "service/formats/degrees.py",
+    "service/reason_words.py",
+    "service/reasons.py",  # as they are told to clients
+)
+# Who tells people otherwise than by schemas and pages: by events and webhooks, and on a
 # terminal. They take the words of `service/formats/degrees.py`.
 TELLING = {
     "service/demo.py",
     "service/recalibration/alerts.py",
     "service/recalibration/estimates.py",
     "service/recalibration/outbox.py",
-    "service/recalibration/words.py",
     "service/replay.py",
     "service/replay_protocol.py",
 }

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "2026_11_26_no_offsets"
-down_revision = "2026_11_25_track_sources"
+down_revision = "2026_11_26_reasons"
 branch_labels = None
 depends_on = None
 

@@ -28,6 +28,8 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.kinds import AlertKind
+from service.reasons import Reasons
 from service.recalibration.alerts import fired_by_estimate
 from service.recalibration.changes import change_among
 from service.recalibration.lacks import Lacks
@@ -101,7 +103,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
-    lacks: tuple[str, ...] = ()
+    lacks: Reasons = ()
 
     @property
     def newest_pk(self) -> int:
@@ -148,7 +150,7 @@ def gather(session: Session, settings: Settings, camera_id: str) -> Evidence | N
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
         limits=drift_limits(settings),
-        drifting=bool(fired_by_estimate(session, camera_id) & {"drift", "clock"}),
+        drifting=bool(fired_by_estimate(session, camera_id) & {AlertKind.DRIFT, AlertKind.CLOCK}),
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
     )

@@ -6,7 +6,8 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.drift.verdict import Drift
-from service.recalibration.camera_state import PoseState, Standing, standings
+from service.kinds import AlertKind, PoseState, Severity, TrainingState
+from service.recalibration.camera_state import Standing, standings
 from service.recalibration.outbox import is_silenced
 from service.settings import Settings
 from service.store import cameras, events, figures, unseen, webhooks
@@ -30,8 +31,8 @@ class AlertFigures:
     """
 
     camera_id: str
-    kind: str
-    severity: str
+    kind: AlertKind
+    severity: Severity
     silenced: bool
     grouped: bool
 
@@ -59,7 +60,7 @@ class Figures:
     cameras: tuple[CameraFigures, ...]
     alerts: tuple[AlertFigures, ...]
     webhooks: tuple[WebhookFigures, ...]
-    trainings: dict[str, int]
+    trainings: dict[TrainingState, int]
     heartbeats_s: dict[str, float]
     worker_starts: dict[str, int]
     unseen_s: dict[str, float]

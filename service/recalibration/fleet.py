@@ -7,8 +7,10 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.drift.verdict import Drift
+from service.kinds import AlertKind, PoseState, Severity, TrainingState
+from service.reasons import Reasons
 from service.recalibration.attendance import Attendance
-from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
+from service.recalibration.camera_state import Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
 from service.recalibration.references import wanted_tracks
@@ -17,6 +19,14 @@ from service.store import fleet
 from service.store.tables import AlertRecord, EstimateRecord, TrainingRecord
 
 _HISTORY = 24  # estimates of a sparkline
+# How soon a camera without an alert needs a person.
+_RANKS = {
+    PoseState.DRIFTING: 2,
+    PoseState.OUT_OF_RANGE: 2,
+    PoseState.NO_DATA: 4,
+    PoseState.LEARNING: 6,
+    PoseState.OK: 7,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,9 +34,9 @@ class FleetAlert:
     """An alert that fires, as far as a row has room for it."""
 
     alert_id: str
-    kind: str
-    severity: str
-    reason: str
+    kind: AlertKind
+    severity: Severity
+    reasons: Reasons
     since: datetime
     acknowledged_by: str | None
     silenced_until: datetime | None
@@ -42,7 +52,7 @@ class FleetAlert:
 class FleetTraining:
     """A training that waits or is under way; `share` is how much of it is done."""
 
-    state: str
+    state: TrainingState
     share: float
 
 
@@ -66,7 +76,6 @@ class FleetCamera:
     history: tuple[float | None, ...]
     learned: int | None
     wanted: int
-    doubt: str
     alerts: tuple[FleetAlert, ...]
     training: FleetTraining | None
     attended_until: datetime | None
@@ -84,8 +93,8 @@ class FleetCamera:
         if self.alert is not None:
             if not self.alert.waits:
                 return 5 if self.alert.silenced_until else 3
-            return 0 if self.alert.severity == "critical" else 1
-        return {"drifting": 2, "out_of_range": 2, "no_data": 4, "learning": 6, "ok": 7}[self.state]
+            return 0 if self.alert.severity is Severity.CRITICAL else 1
+        return _RANKS[self.state]
 
     @property
     def order(self) -> tuple[int, float, str]:
@@ -122,11 +131,10 @@ def list_fleet(
             judged=each.judged,
             since=each.since,
             last_track_s=each.last_track_s,
-            drift=_drift(each.estimate) if each.state != "learning" else None,
+            drift=_drift(each.estimate) if each.state is not PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
             learned=_learned(settings, each, counts),
             wanted=wanted_tracks(each.reference, settings),
-            doubt=each.reference.doubt,
             alerts=tuple(_alert(record, now) for record in each.alerts),
             training=_training(trainings.get(camera_id)),
             attended_until=_attended_until(each.attended, now),
@@ -158,7 +166,7 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
         alert_id=record.id,
         kind=record.kind,
         severity=record.severity,
-        reason=record.reason,
+        reasons=record.reasons,
         since=alert_since(record),
         acknowledged_by=record.acknowledged_by,
         silenced_until=record.silenced_until if is_silenced(record, now) else None,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
@@ -12,8 +13,11 @@ from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.reasons import TracksCode
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.reasons import some
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
@@ -25,7 +29,12 @@ from service.store import cameras, maintenance, references, tracks
 from service.store.packing import intrinsics_of, pose_of_prior, seen_of
 from service.store.tables import FlowMapRecord
 
-_DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
+# What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
+_DOUBT_KINDS: dict[StrEnum, AlertKind] = {
+    TracksCode.SPEED_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.STATURE_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.PRIOR_POSE_DOUBTED: AlertKind.DRIFT,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,10 +115,10 @@ def keep_reference(
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
-    record.doubt = site.doubt
+    record.doubts = some(site.doubt)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
-    note(session, "reference.learned", by=None, camera_id=camera_id, details=details)
+    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,
@@ -121,15 +130,15 @@ def keep_reference(
             learned_at=record.ready_at,
         )
     )
-    if site.doubt:
+    if site.doubt is not None:
         open_alert(
             session,
             settings,
             camera_id,
-            _DOUBT_KINDS[site.doubt_about],
-            "warning",
+            _DOUBT_KINDS[site.doubt.code],
+            Severity.WARNING,
             drift={},
             changed_at=None,
-            reason=site.doubt,
-            source="reference",
+            reasons=(site.doubt,),
+            source=AlertSource.REFERENCE,
         )

@@ -2,16 +2,19 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from models.drift.verdict import Drift
 from service.formats.degrees import in_degrees
+from service.kinds import PoseState, ReferenceState
+from service.reasons import code_of, values_of
 from service.recalibration.poses import PoseView
 from service.recalibration.words import FIELDS
 from service.schemas.base import Body, Who
 from service.schemas.geometry import PoseOut
+from service.schemas.reasons import ReasonCode, ReasonValues
 from service.store.packing import told_drift, told_sd
 from service.store.tables import EstimateRecord
 
@@ -72,7 +75,7 @@ class DriftOut(BaseModel):
 class ReferenceOut(BaseModel):
     """How much of the reference period has been seen."""
 
-    state: Literal["learning", "ready"]
+    state: ReferenceState
     tracks: int
     wanted: int
     walking_speed_mps: float | None
@@ -84,7 +87,7 @@ class ServedPoseOut(BaseModel):
     model_config = ConfigDict(serialize_by_alias=True)
 
     camera_id: str
-    state: Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
+    state: PoseState
     pose: PoseOut
     estimated: list[str]
     sd: SdOut | None
@@ -97,6 +100,8 @@ class ServedPoseOut(BaseModel):
     model_id: str | None
     updated_at: datetime | None
     reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
 
     @classmethod
     def from_value(cls, view: PoseView) -> Self:
@@ -111,7 +116,7 @@ class ServedPoseOut(BaseModel):
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             estimates={} if estimate is None else in_degrees(estimate.raw),
             reference=ReferenceOut(
-                state="ready" if view.reference.ready else "learning",
+                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
                 tracks=view.reference.tracks,
                 wanted=view.reference.wanted,
                 walking_speed_mps=view.reference.walking_speed_mps,
@@ -122,6 +127,8 @@ class ServedPoseOut(BaseModel):
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
             reason=view.reason,
+            reason_code=code_of(view.reasons),
+            reason_values=values_of(view.reasons),
         )
 
 
@@ -129,7 +136,7 @@ class HistoryPoint(BaseModel):
     """One estimate of the history."""
 
     at: datetime
-    state: str
+    state: PoseState
     height_m: float
     tilt_deg: float
     roll_deg: float

@@ -19,6 +19,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
+from service.kinds import AlertState
 from service.store.alert_tables import MaintenanceRecord, RhythmRecord
 from service.store.figures import Ids, among, newest_of
 from service.store.tables import (
@@ -110,7 +111,7 @@ def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) ->
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
     """The alerts of cameras that fire, those about one camera."""
     query = select(AlertRecord).where(
-        AlertRecord.state == "firing", AlertRecord.camera_id.is_not(None)
+        AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_not(None)
     )
     return session.scalars(query.where(among(AlertRecord.camera_id, ids))).all()
 
@@ -119,7 +120,7 @@ def firing_groups(session: Session) -> Sequence[AlertRecord]:
     """The alerts of groups that fire, the newest first."""
     return session.scalars(
         select(AlertRecord)
-        .where(AlertRecord.state == "firing", AlertRecord.camera_id.is_(None))
+        .where(AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_(None))
         .order_by(AlertRecord.opened_at.desc())
     ).all()
 

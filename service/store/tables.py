@@ -1,64 +1,28 @@
 """Records of the store. Angles are radians, times aware UTC; track times seconds since epoch."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
-from sqlalchemy import (
-    JSON,
-    DateTime,
-    Dialect,
-    ForeignKey,
-    Index,
-    LargeBinary,
-    MetaData,
-    String,
-    TypeDecorator,
-    UniqueConstraint,
-    text,
-)
-from sqlalchemy.orm import DeclarativeBase, Mapped, composite, mapped_column
+from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, String, UniqueConstraint, text
+from sqlalchemy.orm import Mapped, composite, mapped_column
 
 from models.drift.verdict import Drift
 from models.geometry.pose_parameters import PoseParameters
-
-NAMING = {
-    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-    "ck": "ck_%(table_name)s_%(constraint_name)s",
-    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
-    "pk": "pk_%(table_name)s",
-}
-
-
-class UtcDateTime(TypeDecorator[datetime]):
-    """Aware UTC times; SQLite keeps them without their zone."""
-
-    impl = DateTime
-    cache_ok = True
-
-    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Refuse naive times; store UTC."""
-        if value is None:
-            return None
-        if value.tzinfo is None:
-            raise ValueError(f"time: an aware time is needed, got {value}")
-        return value.astimezone(UTC).replace(tzinfo=None)
-
-    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Give the zone back."""
-        return None if value is None else value.replace(tzinfo=UTC)
-
-
-class Record(DeclarativeBase):
-    """Base of all records."""
-
-    metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = {
-        datetime: UtcDateTime,
-        dict[str, Any]: JSON,
-        list[float]: JSON,
-        list[str]: JSON,
-    }
+from service.kinds import (
+    AlertKind,
+    AlertSource,
+    AlertState,
+    Answer,
+    EventType,
+    Origin,
+    Outcome,
+    PoseState,
+    Severity,
+    TrainingState,
+)
+from service.reason_words import in_words
+from service.reasons import Reasons, code_of, values_of
+from service.store.record import Record, one_of
 
 
 def _camera_key() -> Any:
@@ -131,11 +95,14 @@ class PriorPoseRecord(Record):
     heading_rad: Mapped[float]
     x_m: Mapped[float]
     y_m: Mapped[float]
-    origin: Mapped[str]  # registered, changed, accepted
+    origin: Mapped[Origin]
     trusted_by: Mapped[str | None]
     created_at: Mapped[datetime]
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
+        Index(None, "camera_id", "id"),
+    )
 
 
 class SiteReferenceRecord(Record):
@@ -154,7 +121,7 @@ class SiteReferenceRecord(Record):
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
-    origin: Mapped[str]  # registered, changed, accepted, reset, put_back, source
+    origin: Mapped[Origin]
     source: Mapped[str | None]
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
@@ -163,16 +130,20 @@ class SiteReferenceRecord(Record):
     tracks: Mapped[int]
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     walking_speed_mps: Mapped[float | None]
-    doubt: Mapped[str]
+    doubts: Mapped[Reasons]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
-    answer: Mapped[str | None]  # put_back, false_alarm
+    answer: Mapped[Answer | None]
     answered_by: Mapped[str | None]
     answered_at: Mapped[datetime | None]
     created_at: Mapped[datetime]
     ready_at: Mapped[datetime | None]
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        one_of("origin", Origin),
+        one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
+        Index(None, "camera_id", "id"),
+    )
 
 
 class FlowMapRecord(Record):
@@ -232,7 +203,7 @@ class TrainingRecord(Record):
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
-    state: Mapped[str]  # queued, running, succeeded, failed, cancelled
+    state: Mapped[TrainingState]
     attempt: Mapped[int]
     cancel_requested: Mapped[bool]
     step: Mapped[int]
@@ -245,7 +216,11 @@ class TrainingRecord(Record):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
-    __table_args__ = (Index(None, "camera_id", "queued_at"), Index(None, "state"))
+    __table_args__ = (
+        one_of("state", TrainingState),
+        Index(None, "camera_id", "queued_at"),
+        Index(None, "state"),
+    )
 
 
 class ModelRecord(Record):
@@ -300,8 +275,8 @@ class EstimateRecord(Record):
     model_id: Mapped[str | None] = _key("models.id", "SET NULL", index=True)
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     reference_id: Mapped[int | None] = _key("site_references.id", index=True)
-    state: Mapped[str]  # learning, ok, drifting, out_of_range
-    reason: Mapped[str]
+    state: Mapped[PoseState]
+    reasons: Mapped[Reasons]
     told: Mapped[list[str]]  # of tilt, roll, height, heading
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
@@ -334,7 +309,11 @@ class EstimateRecord(Record):
         "drift_height_m", "drift_tilt_rad", "drift_roll_rad", "drift_heading_rad"
     )
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        # That nobody comes is no estimate's to say.
+        one_of("state", [state for state in PoseState if state is not PoseState.NO_DATA]),
+        Index(None, "camera_id", "id"),
+    )
 
     @property
     def drift(self) -> Drift:
@@ -345,6 +324,9 @@ class EstimateRecord(Record):
             angle_rad=self.drift_angle_rad,
             told=tuple(self.told),
         )
+
+
+_FIRING = f"state = '{AlertState.FIRING}'"
 
 
 class AlertRecord(Record):
@@ -363,12 +345,12 @@ class AlertRecord(Record):
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
     group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
-    kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale, tracker
-    state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference, rhythm, upkeep, group, tracks
+    kind: Mapped[AlertKind]
+    state: Mapped[AlertState]
+    source: Mapped[AlertSource]
     told: Mapped[bool] = mapped_column(default=False)
-    severity: Mapped[str]  # warning, critical
-    reason: Mapped[str]
+    severity: Mapped[Severity]
+    reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]
     opened_at: Mapped[datetime]
     changed_at: Mapped[datetime | None]
@@ -380,29 +362,49 @@ class AlertRecord(Record):
     silenced_by: Mapped[str | None]
     resolved_at: Mapped[datetime | None]
     resolved_by: Mapped[str | None]
-    outcome: Mapped[str | None]  # put_back, accepted, false_alarm, cleared
+    outcome: Mapped[Outcome | None]
     note: Mapped[str | None]
 
     __table_args__ = (
+        one_of("kind", AlertKind),
+        one_of("state", AlertState),
+        one_of("source", AlertSource),
+        one_of("severity", Severity),
+        one_of("outcome", Outcome),
         Index(
             "uq_alerts_firing",
             "camera_id",
             "kind",
             unique=True,
-            sqlite_where=text("state = 'firing'"),
-            postgresql_where=text("state = 'firing'"),
+            sqlite_where=text(_FIRING),
+            postgresql_where=text(_FIRING),
         ),
         Index(
             "uq_alerts_firing_group",
             "track_source",
             "kind",
             unique=True,
-            sqlite_where=text("state = 'firing' AND camera_id IS NULL"),
-            postgresql_where=text("state = 'firing' AND camera_id IS NULL"),
+            sqlite_where=text(f"{_FIRING} AND camera_id IS NULL"),
+            postgresql_where=text(f"{_FIRING} AND camera_id IS NULL"),
         ),
         Index(None, "opened_at"),
         Index(None, "camera_id", "opened_at"),
     )
+
+    @property
+    def reason(self) -> str:
+        """Why it was opened, in words."""
+        return in_words(self.reasons)
+
+    @property
+    def reason_code(self) -> str | None:
+        """The code of the first reason; None of a group that is about to be told."""
+        return code_of(self.reasons)
+
+    @property
+    def reason_values(self) -> dict[str, Any]:
+        """The numbers and names of the first reason, angles in degrees."""
+        return values_of(self.reasons)
 
 
 class EventRecord(Record):
@@ -411,8 +413,11 @@ class EventRecord(Record):
     __tablename__ = "events"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    type: Mapped[str]  # pose, alert, training
+    type: Mapped[EventType]
     payload: Mapped[dict[str, Any]]
     created_at: Mapped[datetime]
 
-    __table_args__ = ({"sqlite_autoincrement": True},)  # an id is never given twice
+    __table_args__ = (
+        one_of("type", EventType),
+        {"sqlite_autoincrement": True},  # an id is never given twice
+    )

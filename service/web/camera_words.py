@@ -8,6 +8,7 @@ from datetime import datetime, tzinfo
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
+from service.kinds import AlertKind, Outcome
 from service.recalibration.camera_page import CameraPage
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
@@ -16,19 +17,19 @@ from service.web.sentences import Z90, signed
 from service.web.words import NAMES, ago
 
 KINDS = {
-    "drift": "The camera moved",
-    "clock": "The clock looks wrong",
-    "out_of_range": "Beyond the model's range",
-    "no_data": "No people come",
-    "stale": "Its estimate is not being made",
-    "tracker": "Another tracker posts",
+    AlertKind.DRIFT: "The camera moved",
+    AlertKind.CLOCK: "The clock looks wrong",
+    AlertKind.OUT_OF_RANGE: "Beyond the model's range",
+    AlertKind.NO_DATA: "No people come",
+    AlertKind.STALE: "Its estimate is not being made",
+    AlertKind.TRACKER: "Another tracker posts",
 }
 OUTCOMES = {
-    "put_back": "put back",
-    "accepted": "new pose accepted",
-    "false_alarm": "false alarm",
-    "cleared": "ended by itself",
-    "camera_removed": "camera removed",
+    Outcome.PUT_BACK: "put back",
+    Outcome.ACCEPTED: "new pose accepted",
+    Outcome.FALSE_ALARM: "false alarm",
+    Outcome.CLEARED: "ended by itself",
+    Outcome.CAMERA_REMOVED: "camera removed",
 }
 _UNCHANGED_M = 0.05
 

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 
 from models.estimation.numbers import ANGLES
+from service.kinds import AlertKind, PoseState
+from service.reason_words import in_words
 from service.recalibration.camera_page import CameraPage
+from service.recalibration.camera_state import MOVED
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord
 from service.web.moments import when
@@ -19,9 +22,9 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
     """The state of a camera in plain words."""
     standing, estimate = page.pose.standing, page.pose.estimate
     quiet = ""
-    if page.silence is not None and standing.silent and standing.state != "learning":
+    if page.silence is not None and standing.silent and standing.state is not PoseState.LEARNING:
         since = when(datetime.fromtimestamp(page.silence.last_s, UTC), page.now, zone)
-        quiet = f"No people since {since}: {page.silence.reason}."
+        quiet = f"No people since {since}: {in_words(page.silence.reasons)}."
     return " ".join(part for part in (_how_it_stands(page, estimate, zone), quiet) if part)
 
 
@@ -29,21 +32,21 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
     standing = page.pose.standing
     state, told = standing.state, estimate is not None and bool(estimate.told)
     doubts = [alert for alert in standing.alerts if alert.kind in POSE_KINDS]
-    if state in ("drifting", "out_of_range") and not standing.judged:
+    if state in MOVED and not standing.judged:
         words = _moved(page, estimate, zone) if estimate is not None and told else _alarmed(doubts)
         return f"{words} That is what is known last: the next people will tell how it stands now."
     if estimate is not None and standing.judged and estimate.drifted:
         return _moved(page, estimate, zone)
     if doubts:  # of a reference, or about a move whose size is not told
         return _alarmed(doubts)
-    if state == "learning" or estimate is None or not standing.judged:
+    if state is PoseState.LEARNING or estimate is None or not standing.judged:
         return _waiting(page)
-    if state == "no_data":
+    if state is PoseState.NO_DATA:
         return "When it was last told, it stood where it should."
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
-    if state == "out_of_range":
+    if state is PoseState.OUT_OF_RANGE:
         how = moved_words(estimate)
         edge = "At the edge of what its model was trained for"
         return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
@@ -54,7 +57,7 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
 
 
 def _alarmed(doubts: Sequence[AlertRecord]) -> str:
-    return f"It may not stand where it should: {doubts[0].reason.rstrip('.')}."
+    return f"It may not stand where it should: {doubts[0].reason}."
 
 
 def turn_words(estimate: EstimateRecord) -> str:
@@ -115,7 +118,7 @@ def _moved(page: CameraPage, estimate: EstimateRecord, zone: tzinfo) -> str:
     since = ""
     if estimate.drift_since is not None:
         since = f" about {when(estimate.drift_since, page.now, zone)}"
-    if any(story.record.kind == "clock" for story in page.firing):
+    if any(story.record.kind == AlertKind.CLOCK for story in page.firing):
         how = moved_words(estimate)
         return (
             f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
@@ -141,7 +144,7 @@ def _sure(estimate: EstimateRecord) -> str:
 
 def _waiting(page: CameraPage) -> str:
     reference, standing = page.pose.reference, page.pose.standing
-    if standing.state in ("ok", "no_data"):
+    if standing.state in (PoseState.OK, PoseState.NO_DATA):
         who = standing.reference.answered_by or "somebody"
         return f"Where it should be, as {who} said. The next people will tell."
     if not reference.ready:

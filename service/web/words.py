@@ -5,15 +5,15 @@ from datetime import UTC, datetime, tzinfo
 
 from models.drift.verdict import Drift
 from models.estimation.numbers import ANGLES
-from service.recalibration.camera_state import PoseState
+from service.kinds import AlertKind, PoseState
 from service.recalibration.fleet import FleetCamera
 
-STATES: dict[PoseState, str] = {
-    "drifting": "Moved",
-    "out_of_range": "Far off",
-    "no_data": "No people",
-    "learning": "Learning",
-    "ok": "Steady",
+STATES = {
+    PoseState.DRIFTING: "Moved",
+    PoseState.OUT_OF_RANGE: "Far off",
+    PoseState.NO_DATA: "No people",
+    PoseState.LEARNING: "Learning",
+    PoseState.OK: "Steady",
 }
 # Operators say pan. Height is told apart.
 NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
@@ -22,23 +22,25 @@ _MINUTE_S, _HOUR_S, _DAY_S = 60.0, 3600.0, 86_400.0
 
 def situation(camera: FleetCamera, now: datetime) -> str:
     """What a camera does, in one line."""
-    if camera.state == "drifting" and any(alert.kind == "clock" for alert in camera.alerts):
+    if camera.state is PoseState.DRIFTING and any(
+        alert.kind is AlertKind.CLOCK for alert in camera.alerts
+    ):
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
-    if camera.alert is not None and camera.alert.kind == "stale":
+    if camera.alert is not None and camera.alert.kind is AlertKind.STALE:
         return "its estimate is not being made: what was seen last may be long ago"
-    if camera.state == "learning":
+    if camera.state is PoseState.LEARNING:
         return _learning(camera)
-    if camera.state == "no_data":
+    if camera.state is PoseState.NO_DATA:
         silent_s = now.timestamp() - (camera.last_track_s or now.timestamp())
         return f"no people seen for {duration(silent_s)}, longer than is usual here"
     moved = drift_words(camera.drift)
-    if camera.state == "ok" and not camera.judged:
+    if camera.state is PoseState.OK and not camera.judged:
         return "where it should be, as somebody said; the next people will tell"
     if moved and not camera.judged:
         moved = f"{moved} when it was last told"
-    if camera.state == "out_of_range":
+    if camera.state is PoseState.OUT_OF_RANGE:
         return f"{moved or 'moved'}: further than it was trained for, so this is rough"
-    if camera.state == "drifting":
+    if camera.state is PoseState.DRIFTING:
         return moved or "moved, but by how much is not told yet"
     return "standing still"
 

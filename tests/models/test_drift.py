@@ -9,6 +9,7 @@ from models.drift.clock import clock_fault
 from models.drift.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
+from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
 LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7)
@@ -164,11 +165,14 @@ def test_what_drifted_has_to_be_told_to_end():
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():
-    words = clock_fault(drift(height_m=7.2), PRIOR, 25.0)
-    assert "+20 %" in words
-    assert "30 frames a second were taken for 25" in words
-    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), PRIOR, 25.0) == words
-    assert "lowered" in clock_fault(drift(height_m=5.0), PRIOR, None)
+    found = clock_fault(drift(height_m=7.2), PRIOR, 25.0)
+    assert found is not None
+    assert found.code is TracksCode.SCALE_CHANGED
+    assert found.values == {"factor": pytest.approx(1.2), "rate_hz": 25.0}
+    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), PRIOR, 25.0) == found
+    lowered = clock_fault(drift(height_m=5.0), PRIOR, None)
+    assert lowered is not None
+    assert lowered.values == {"factor": pytest.approx(5 / 6), "rate_hz": 25.0}
     for found in (
         drift(height_m=6.4),  # 7 %: under the least
         drift(height_m=7.2, sd_log=0.05),  # within its deviation

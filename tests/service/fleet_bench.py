@@ -11,6 +11,7 @@ import numpy as np
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.job_queue import JobQueue
+from service.reasons import as_said
 from service.recalibration.alerts import acknowledge_alert, open_alert
 from service.recalibration.cameras import CameraSpec, register_camera
 from service.settings import Settings
@@ -81,7 +82,7 @@ class Fleet:
             alert = open_alert(
                 session, self.settings, camera_id, kind, severity,
                 {"tilt_rad": math.radians(tilt_deg)}, self.now - timedelta(minutes=9),
-                reason=f"tilt {tilt_deg:+.2f} deg",
+                reasons=as_said(f"tilt {tilt_deg:+.2f} deg"),
             )  # fmt: skip
             assert alert is not None
             if by is not None:
@@ -137,7 +138,8 @@ class Fleet:
             noise = self.random.gauss
             yield EstimateRecord(
                 camera_id=camera_id, model_id=None, prior_pose_id=reference.prior_pose_id,
-                reference_id=reference.id, state=state if share else "ok", reason="made up",
+                reference_id=reference.id, state=state if share else "ok",
+                reasons=as_said("made up"),
                 told=["tilt", "roll", "height", "heading"],
                 height_m=6.0 + height * share, tilt_rad=POSE.tilt_rad + tilt * share,
                 roll_rad=POSE.roll_rad, heading_rad=pan * share,

@@ -61,6 +61,8 @@ def test_a_reference_is_learned_of_the_first_tracks_without_any_model(street):
     body = street.look()
     assert body["state"] == "learning"
     assert body["reason"] == "40 of 60 reference tracks"
+    assert body["reason_code"] == "reference_tracks"
+    assert body["reason_values"] == {"tracks": 40, "wanted": 60}
     assert served(body) == pytest.approx(numbers(PRIOR))
     assert (body["estimated"], body["sd"], body["drift"]) == ([], None, None)
     assert body["estimates"]["joint"]["tracks"] == 40  # under an assumed walking speed

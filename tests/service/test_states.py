@@ -9,6 +9,8 @@ from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.app import create_app
+from service.kinds import AlertSource
+from service.reasons import as_said
 from service.recalibration import upkeep
 from service.recalibration.alerts import open_alert
 from service.recalibration.estimates import store_estimate
@@ -190,10 +192,10 @@ def test_a_camera_put_back_while_it_is_learned_is_learned_of_people_who_come_the
 
 def test_a_camera_put_back_whose_reference_is_in_doubt_is_learned_anew(bench):
     with bench.store.write() as session:
-        references.newest(session, "corner").doubt = "people walk at 3 m/s"
+        references.newest(session, "corner").doubts = as_said("people walk at 3 m/s")
         open_alert(
             session, bench.settings, "corner", "drift", "warning", {}, None,
-            reason="people walk at 3 m/s", source="reference",
+            reasons=as_said("people walk at 3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     resolve(bench, "put_back")
     assert bench.pose()["reference"]["state"] == "learning"
@@ -204,7 +206,7 @@ def test_an_alert_of_a_reference_in_doubt_shows_on_a_camera_that_is_ok(bench):
     with bench.store.write() as session:
         open_alert(
             session, bench.settings, "corner", "clock", "warning", {}, None,
-            reason="people walk at 3 m/s", source="reference",
+            reasons=as_said("people walk at 3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     assert states(bench.http) == {"ok"}
     assert "alert: the clock looks wrong" in fleet_row(bench.http)
@@ -223,8 +225,8 @@ def test_accepting_by_resolving_accepts_the_pose(bench):
 def test_there_is_no_accepting_where_nothing_is_told(bench):
     with bench.store.write() as session:
         open_alert(
-            session, bench.settings, "corner", "clock", "warning", {}, None, reason="3 m/s",
-            source="reference",
+            session, bench.settings, "corner", "clock", "warning", {}, None,
+            reasons=as_said("3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
     problem(bench.http.post(url, json={"outcome": "accepted"}), 409, "conflict")
@@ -299,7 +301,14 @@ def test_an_alert_shows_on_its_page_however_many_came_after_it(bench):
     for _ in range(55):
         with bench.store.write() as session:
             alert = open_alert(
-                session, bench.settings, "corner", "no_data", "warning", {}, None, reason="none"
+                session,
+                bench.settings,
+                "corner",
+                "no_data",
+                "warning",
+                {},
+                None,
+                reasons=as_said("none"),
             )
             alert.state, alert.resolved_at, alert.outcome = "resolved", alert.opened_at, "cleared"
     (drift,) = bench.alerts(state="firing")
@@ -312,7 +321,7 @@ def test_a_member_of_a_group_is_in_the_metrics(bench):
     with bench.store.write() as session:
         alert = alerts.firing(session, "corner", "drift")
         group = open_alert(
-            session, bench.settings, "corner", "no_data", "warning", {}, None, reason="x"
+            session, bench.settings, "corner", "no_data", "warning", {}, None, reasons=as_said("x")
         )
         alert.group_id = group.id
     text = bench.http.get("/metrics").text

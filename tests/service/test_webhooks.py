@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
+from service.reasons import as_said
 from service.recalibration import alerts
 from service.recalibration.outbox import ALERT_FIELDS, ALERT_FLAGS
 from service.schemas.alerts import AlertOut
@@ -67,7 +68,14 @@ def test_an_alert_and_its_message_are_one_transaction(post_room, inbox):
     hook = post_room.hook(inbox.url)
     with post_room.store.write() as session:
         alerts.open_alert(
-            session, post_room.settings, "corner", "drift", "warning", {}, None, reason="r"
+            session,
+            post_room.settings,
+            "corner",
+            "drift",
+            "warning",
+            {},
+            None,
+            reasons=as_said("r"),
         )
         session.flush()
         session.rollback()
@@ -205,7 +213,7 @@ def test_a_replay_is_the_same_message_again(post_room, inbox):
     assert first.body == second.body
     assert len(inbox.deduped()) == 1
     assert len(post_room.log(hook)[0]["attempts"]) == 2
-    post_room.change(hook, enabled=False, disabled_reason="gone")
+    post_room.change(hook, enabled=False, disabled_reasons=as_said("gone"))
     problem(post_room.http.post(f"/deliveries/{delivery['id']}/replay"), 409, "conflict")
 
 

@@ -16,14 +16,13 @@ _FORMAT = 1
 
 
 def reference_to_bytes(reference: SiteReference) -> bytes:
-    """NumPy's `.npz` of a reference."""
+    """NumPy's `.npz` of a reference, but for its doubt, which is told once."""
     values: dict[str, Any] = {
         "format": _FORMAT,
         "offset": reference.offset,
         "offset_covariance": reference.offset_covariance,
         "inflation": reference.inflation,
         "tracks": reference.tracks,
-        "doubt": reference.doubt,
         "boxes": reference.boxes,
         **_learned_arrays("speeds", reference.speeds),
     }
@@ -52,7 +51,6 @@ def reference_from_bytes(data: bytes) -> SiteReference:
             offset_covariance=values["offset_covariance"],
             inflation=float(values["inflation"]),
             tracks=int(values["tracks"]),
-            doubt=str(values["doubt"]),
             boxes=str(values["boxes"]),
         )
     except (OSError, ValueError, KeyError) as error:
