@@ -117,7 +117,7 @@ def test_posts_come_between_the_bites(room):
     def post():
         while not seen or seen[-1] > 200:
             with room.connected() as connection:
-                put(connection, "events", type="post", payload="{}")
+                put(connection, "events", type="pose", payload="{}")
                 seen.append(connection.execute("SELECT count(*) FROM tracks").fetchone()[0])
 
     poster = threading.Thread(target=post)
