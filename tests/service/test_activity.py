@@ -9,6 +9,7 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
+from service.kinds import Act
 from service.migrate import alembic_config, migrate
 from service.recalibration.activity import note
 from service.recalibration.retention import limits_of_all
