@@ -41,13 +41,28 @@ def test_down_to_nothing_and_up_again(tmp_path):
     alembic.command.upgrade(config, "head")
 
 
+# A word for each column that takes those of a vocabulary alone.
+WORDS = {
+    "prior_poses": {"origin": "registered"},
+    "site_references": {"origin": "registered"},
+    "trainings": {"state": "succeeded"},
+    "estimates": {"state": "ok"},
+    "alerts": {"kind": "drift", "state": "firing", "source": "estimate", "severity": "warning"},
+    "events": {"type": "pose"},
+    "webhooks": {"format": "webhook"},
+    "deliveries": {"type": "test", "state": "pending"},
+    "activity": {"what": "camera.changed"},
+}
+
+
 def put(connection, table, **values):
     """Insert a row with something in every column that needs it."""
     some = {"JSON": "[]", "DATETIME": "2026-11-20 08:00:00", "BLOB": b""}
     for _, name, kind, needed, default, key in connection.execute(f"PRAGMA table_info({table})"):
         if needed and default is None and not (key and kind == "INTEGER"):
             number = kind in ("INTEGER", "DOUBLE", "FLOAT", "BOOLEAN")
-            values.setdefault(name, some.get(kind, 1 if number else "some"))
+            word = WORDS.get(table, {}).get(name, "some")
+            values.setdefault(name, some.get(kind, 1 if number else word))
     names = ", ".join(values)
     marks = ", ".join("?" * len(values))
     connection.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", list(values.values()))

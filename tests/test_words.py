@@ -21,13 +21,11 @@ WORDS = {str(word) for words in VOCABULARIES for word in words}
 # Names of fields in JSON bodies, too: as a key, or to look one up, such a word is no member of a
 # vocabulary. (`"alert"` is a field of a log line, `"drift"` one of an alert's body.)
 FIELDS = {
-    "acknowledged", "alert", "drift", "ok", "pending", "pose", "reference", "rhythm", "silenced",
-    "source", "tracks", "training", "estimate", "firing", "accepted", "registered", "maintenance",
-    "test", "clock", "upkeep",
+    "accepted", "alert", "drift", "firing", "pending", "pose", "reference", "registered", "rhythm",
+    "source", "tracks",
 }  # fmt: skip
 # Values that are spelled like a word of a vocabulary, and mean something else.
 OTHERS = {
-    ("alarm_study.py", "clock"): "a column of a table of false alarms",
     ("backup/checking.py", "ok"): "a verdict, defined there",
     ("centred.py", "tracks"): "a column of a table",
     ("flow_study.py", "tracks"): "a column of a table",
@@ -38,6 +36,7 @@ OTHERS = {
     ("jobs/housekeeping.py", "stale"): "the name of a log line",
     ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
     ("jobs/rounds.py", "clock"): "the name of a round",
+    ("reasons.py", "maintenance"): "the code of a reason, defined there",
     ("recalibration/growth.py", "registered"): "the key of an estimator's answer",
     ("recalibration/outbox.py", "acknowledged"): "the name of a flag",
     ("recalibration/outbox.py", "drift"): "the name of a field",

@@ -70,7 +70,7 @@ def open_alert(
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
     if record is not None:
-        if source is AlertSource.REFERENCE:
+        if source == AlertSource.REFERENCE:
             return record
         change: MessageType | None = None
         if record.severity != severity or record.source != source:

@@ -120,7 +120,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
         state = PoseState.DRIFTING if drifts else PoseState.OUT_OF_RANGE
         if estimate is not None and estimate.state in MOVED:
             state = estimate.state
-    elif reference.ready_at is None or (not judged and cause is not Cause.FALSE_ALARM):
+    elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
     elif facts.silent:
         state = PoseState.NO_DATA
@@ -199,7 +199,7 @@ def _since(
     reference = facts.reference
     if alerts:
         return alert_since(alerts[0])
-    if state is PoseState.NO_DATA and facts.last_track_s is not None:
+    if state == PoseState.NO_DATA and facts.last_track_s is not None:
         return datetime.fromtimestamp(facts.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
         return reference.answered_at

@@ -121,7 +121,7 @@ def _resolve(
 ) -> None:
     if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
         close_alert(session, record, Outcome(answer), note, by)
-    elif answer is Answer.ACCEPTED:
+    elif answer == Answer.ACCEPTED:
         accept_pose(session, queue, settings, record.camera_id, by, note)
     else:
         _answer(session, queue, record.camera_id, answer, by, note)
@@ -137,7 +137,7 @@ def _answer(
 ) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
     close_pose_alerts(session, camera_id, Outcome(answer), by, note)
-    act = Act.POSE_PUT_BACK if answer is Answer.PUT_BACK else Act.POSE_FALSE_ALARM
+    act = Act.POSE_PUT_BACK if answer == Answer.PUT_BACK else Act.POSE_FALSE_ALARM
     note_activity(session, act, by=by, camera_id=camera_id, text=note)
     keep_answer(session, camera_id, answer, by)
     request_estimate(session, queue, camera_id)

@@ -93,7 +93,7 @@ class FleetCamera:
         if self.alert is not None:
             if not self.alert.waits:
                 return 5 if self.alert.silenced_until else 3
-            return 0 if self.alert.severity is Severity.CRITICAL else 1
+            return 0 if self.alert.severity == Severity.CRITICAL else 1
         return _RANKS[self.state]
 
     @property
@@ -131,7 +131,7 @@ def list_fleet(
             judged=each.judged,
             since=each.since,
             last_track_s=each.last_track_s,
-            drift=_drift(each.estimate) if each.state is not PoseState.LEARNING else None,
+            drift=_drift(each.estimate) if each.state != PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
             learned=_learned(settings, each, counts),
             wanted=wanted_tracks(each.reference, settings),

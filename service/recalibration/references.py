@@ -88,7 +88,7 @@ def keep_answer(session: Session, camera_id: str, answer: Answer, by: str | None
     """
     reference = references.newest(session, camera_id)
     newest_s = tracks.newest_end_s(session, camera_id)
-    if answer is Answer.PUT_BACK and (reference.ready_at is None or reference.doubts):
+    if answer == Answer.PUT_BACK and (reference.ready_at is None or reference.doubts):
         begin_reference(session, camera_id, Origin.PUT_BACK, from_s=newest_s, by=by)
     elif reference.ready_at is not None:
         if newest_s is not None:

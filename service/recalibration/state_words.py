@@ -29,7 +29,7 @@ def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reas
     if window is not None:
         found.append(_window(window))
     estimate = standing.estimate
-    if standing.judged and estimate is not None and standing.state is not PoseState.NO_DATA:
+    if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
         found += estimate.reasons
     elif standing.state in MOVED:
         if estimate is not None and estimate.told:

@@ -76,7 +76,7 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
     """Store a webhook; its secret is shown this once."""
     now = datetime.now(UTC)
     webhook_id = secrets.token_hex(16)
-    secret = new_secret() if spec.format is WebhookFormat.WEBHOOK else None
+    secret = new_secret() if spec.format == WebhookFormat.WEBHOOK else None
     record = WebhookRecord(
         id=webhook_id,
         name=spec.name,

@@ -103,7 +103,7 @@ class GuardMiddleware:
             raise ForbiddenError(
                 f"scope: this needs {need}, {caller.name} has {', '.join(sorted(caller.scopes))}"
             )
-        if need == "ingest" and not caller.may_post(parameters["camera_id"]):
+        if need == TokenScope.INGEST and not caller.may_post(parameters["camera_id"]):
             raise ForbiddenError(f"camera_id: {caller.name} posts for other cameras")
 
         def holds() -> bool:

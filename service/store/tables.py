@@ -311,7 +311,7 @@ class EstimateRecord(Record):
 
     __table_args__ = (
         # That nobody comes is no estimate's to say.
-        one_of("state", [state for state in PoseState if state is not PoseState.NO_DATA]),
+        one_of("state", [state for state in PoseState if state != PoseState.NO_DATA]),
         Index(None, "camera_id", "id"),
     )
 

@@ -22,7 +22,7 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
     """The state of a camera in plain words."""
     standing, estimate = page.pose.standing, page.pose.estimate
     quiet = ""
-    if page.silence is not None and standing.silent and standing.state is not PoseState.LEARNING:
+    if page.silence is not None and standing.silent and standing.state != PoseState.LEARNING:
         since = when(datetime.fromtimestamp(page.silence.last_s, UTC), page.now, zone)
         quiet = f"No people since {since}: {in_words(page.silence.reasons)}."
     return " ".join(part for part in (_how_it_stands(page, estimate, zone), quiet) if part)
@@ -39,14 +39,14 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
         return _moved(page, estimate, zone)
     if doubts:  # of a reference, or about a move whose size is not told
         return _alarmed(doubts)
-    if state is PoseState.LEARNING or estimate is None or not standing.judged:
+    if state == PoseState.LEARNING or estimate is None or not standing.judged:
         return _waiting(page)
-    if state is PoseState.NO_DATA:
+    if state == PoseState.NO_DATA:
         return "When it was last told, it stood where it should."
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
-    if state is PoseState.OUT_OF_RANGE:
+    if state == PoseState.OUT_OF_RANGE:
         how = moved_words(estimate)
         edge = "At the edge of what its model was trained for"
         return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."

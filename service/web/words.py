@@ -22,25 +22,25 @@ _MINUTE_S, _HOUR_S, _DAY_S = 60.0, 3600.0, 86_400.0
 
 def situation(camera: FleetCamera, now: datetime) -> str:
     """What a camera does, in one line."""
-    if camera.state is PoseState.DRIFTING and any(
-        alert.kind is AlertKind.CLOCK for alert in camera.alerts
+    if camera.state == PoseState.DRIFTING and any(
+        alert.kind == AlertKind.CLOCK for alert in camera.alerts
     ):
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
-    if camera.alert is not None and camera.alert.kind is AlertKind.STALE:
+    if camera.alert is not None and camera.alert.kind == AlertKind.STALE:
         return "its estimate is not being made: what was seen last may be long ago"
-    if camera.state is PoseState.LEARNING:
+    if camera.state == PoseState.LEARNING:
         return _learning(camera)
-    if camera.state is PoseState.NO_DATA:
+    if camera.state == PoseState.NO_DATA:
         silent_s = now.timestamp() - (camera.last_track_s or now.timestamp())
         return f"no people seen for {duration(silent_s)}, longer than is usual here"
     moved = drift_words(camera.drift)
-    if camera.state is PoseState.OK and not camera.judged:
+    if camera.state == PoseState.OK and not camera.judged:
         return "where it should be, as somebody said; the next people will tell"
     if moved and not camera.judged:
         moved = f"{moved} when it was last told"
-    if camera.state is PoseState.OUT_OF_RANGE:
+    if camera.state == PoseState.OUT_OF_RANGE:
         return f"{moved or 'moved'}: further than it was trained for, so this is rough"
-    if camera.state is PoseState.DRIFTING:
+    if camera.state == PoseState.DRIFTING:
         return moved or "moved, but by how much is not told yet"
     return "standing still"
 

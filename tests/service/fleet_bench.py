@@ -138,7 +138,8 @@ class Fleet:
             noise = self.random.gauss
             yield EstimateRecord(
                 camera_id=camera_id, model_id=None, prior_pose_id=reference.prior_pose_id,
-                reference_id=reference.id, state=state if share else "ok",
+                reference_id=reference.id,
+                state=state if share and state != "no_data" else "ok",
                 reasons=as_said("made up"),
                 told=["tilt", "roll", "height", "heading"],
                 height_m=6.0 + height * share, tilt_rad=POSE.tilt_rad + tilt * share,

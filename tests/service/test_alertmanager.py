@@ -8,6 +8,7 @@ import pytest
 
 from service.delivery.alertmanager import alert_name, postable_alerts
 from service.jobs.housekeeping import run_reconcile
+from service.kinds import MessageType
 from service.reasons import as_said
 from service.recalibration import alerts
 from service.recalibration.outbox import alert_body
@@ -203,7 +204,7 @@ def test_what_is_silenced_here_or_gone_with_its_camera_has_ended_there(post_room
     with post_room.store.write() as session:
         record = alerts.show_alert(session, drift)
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
-        alerts._tell(session, record, "silenced")
+        alerts._tell(session, record, MessageType.ALERT_SILENCED)
     post_room.change(manager, refreshed_at=None)
     post_room.send(manager)
     assert standing(inbox) == [("SurefootCameraNoData", "warning")]

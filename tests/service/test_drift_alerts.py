@@ -88,7 +88,7 @@ def test_a_pan_alone_fires_and_clears_as_any_drift(bench):
     assert "heading -5.00 deg" in alert["reason"]
     assert alert["reason_code"] == "beyond_limits"
     assert alert["reason_values"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
-    assert alert["reason_values"]["floor_deg"] == pytest.approx(0.5)
+    assert alert["reason_values"]["floor_deg"] == pytest.approx(1.0)
     for _ in range(4):
         bench.see(PRIOR)  # by speeds alone: they cannot tell that it was turned back
     assert len(bench.alerts(state="firing")) == 1

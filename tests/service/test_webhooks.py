@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
+from service.kinds import MessageType
 from service.reasons import as_said
 from service.recalibration import alerts
 from service.recalibration.outbox import ALERT_FIELDS, ALERT_FLAGS
@@ -134,7 +135,7 @@ def test_a_silenced_alert_is_quiet_until_it_ends(post_room, inbox):
     with post_room.store.write() as session:
         record = alerts.show_alert(session, alert_id)
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
-        alerts._tell(session, record, "silenced")
+        alerts._tell(session, record, MessageType.ALERT_SILENCED)
     post_room.open(severity="critical")
     post_room.http.post(f"/alerts/{alert_id}/acknowledge").raise_for_status()
     post_room.end()
@@ -213,7 +214,7 @@ def test_a_replay_is_the_same_message_again(post_room, inbox):
     assert first.body == second.body
     assert len(inbox.deduped()) == 1
     assert len(post_room.log(hook)[0]["attempts"]) == 2
-    post_room.change(hook, enabled=False, disabled_reasons=as_said("gone"))
+    post_room.change(hook, enabled=False, disabled_reason="gone")
     problem(post_room.http.post(f"/deliveries/{delivery['id']}/replay"), 409, "conflict")
 
 
