@@ -72,18 +72,18 @@ def check(
     """Look a data directory over; 1 where something is wrong. A service may run meanwhile."""
     from rich.table import Table
 
-    from service.backup.checking import check_data_dir, repair_weights
+    from service.backup.checking import Verdict, check_data_dir, repair_weights
 
     settings = _begin(data_dir)
     if repair:
         _say(f"{repair_weights(settings)} models deleted, to be trained anew")
     findings = check_data_dir(settings)
     table = Table("looked at", "verdict", "detail", title=str(settings.data_dir))
-    colours = {"ok": "green", "note": "yellow", "fault": "red"}
+    colours = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.FAULT: "red"}
     for one in findings:
         table.add_row(one.what, f"[{colours[one.verdict]}]{one.verdict}[/]", one.detail)
     Console().print(table)
-    raise typer.Exit(int(any(one.verdict == "fault" for one in findings)))
+    raise typer.Exit(int(any(one.verdict is Verdict.FAULT for one in findings)))
 
 
 def rotate_key(

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,8 @@ from service.demo_folder import (
     remove_left_over,
     require_free,
 )
+from service.formats.degrees import degrees, in_degrees
+from service.kinds import AlertState, ReferenceState
 from service.process import end_like_ctrl_c
 from service.replay import post_tracks
 from service.settings import Settings
@@ -76,7 +78,7 @@ class _Screen:
 
     def _words(self, pose: dict[str, Any]) -> str:
         reference = pose["reference"]
-        if reference["state"] == "learning":
+        if reference["state"] == ReferenceState.LEARNING:
             return f"learning what is usual here: {pose['reason']}"
         usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
         if self.alert is None:
@@ -177,9 +179,11 @@ def _show(
 def _looked_at(http: httpx.Client, screen: _Screen, newest_s: float) -> bool:
     """Whether the newest track is in the reference or the estimate that is shown."""
     pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
-    alerts = http.get("/alerts", params={"camera_id": CAMERA_ID, "state": "firing"}).json()["items"]
+    alerts = http.get(
+        "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}
+    ).json()["items"]
     screen.pose, screen.alert = pose, alerts[0] if alerts else None
-    if pose["reference"]["state"] == "learning":
+    if pose["reference"]["state"] == ReferenceState.LEARNING:
         return bool(pose["reference"]["tracks"] < _REFERENCE_TRACKS)
     newest = pose["to"] and datetime.fromisoformat(pose["to"]).timestamp() >= newest_s - 1e-3
     return bool(newest) or screen.tracks == _REFERENCE_TRACKS
@@ -205,8 +209,10 @@ def _close(console: Console, screen: _Screen, url: str, took_s: float) -> bool:
         console.print("[red]no alert came[/]")
         return False
     served = np.array(screen.pose["pose"]["quaternion_wxyz"])
-    to_knocked = math.degrees(angle_between(served, KNOCK.apply(PRIOR).quaternion_wxyz))
-    to_prior = math.degrees(angle_between(served, PRIOR.quaternion_wxyz))
+    to_knocked, to_prior = (
+        degrees(float(angle_between(served, pose.quaternion_wxyz)))
+        for pose in (KNOCK.apply(PRIOR), PRIOR)
+    )
     console.print(
         f"\nKnocked at {screen.knocked_at:%H:%M:%S}; the alert says "
         f"{_clock(screen.alert['changed_at'])}.\n"
@@ -238,11 +244,7 @@ def _camera() -> dict[str, Any]:
         "name": "Demo street",
         "intrinsics": {name: getattr(LENS, name) for name in
                        ("width", "height", "fx", "fy", "cx", "cy")},
-        "prior_pose": {
-            "height_m": PRIOR.height_m,
-            "tilt_deg": math.degrees(PRIOR.tilt_rad),
-            "roll_deg": math.degrees(PRIOR.roll_rad),
-        },
+        "prior_pose": in_degrees(asdict(PRIOR)),
         "reference_tracks": _REFERENCE_TRACKS,
     }  # fmt: skip
 
@@ -298,8 +300,8 @@ def _wait_for_interrupt() -> None:
 def _row(pose: CameraPose) -> Sequence[str]:
     return [
         f"{pose.height_m:.2f}",
-        f"{math.degrees(pose.tilt_rad):.2f}",
-        f"{math.degrees(pose.roll_rad):.2f}",
+        f"{degrees(pose.tilt_rad):.2f}",
+        f"{degrees(pose.roll_rad):.2f}",
     ]
 
 

@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from models.evaluation.flow_study import REFERENCE_TRACKS, SiteResults, study_site
+from models.evaluation.flow_study import REFERENCE_TRACKS, ChangedResult, SiteResults, study_site
+from models.reasons import TracksCode
 
 _TABLE_WIDTH = 110
 
@@ -89,10 +90,14 @@ def changed_table(found: Sequence[SiteResults]) -> Table:
         shares = (
             float(np.mean([result.off_truth_deg > 1 for result in own])),
             float(np.mean([all(result.covered) for result in own])),
-            float(np.mean(["path" in result.reason for result in own])),
+            float(np.mean([_blames_paths(result) for result in own])),
         )
         table.add_row(str(own[0].tracks), *angles, *(f"{share:.0%}" for share in shares))
     return table
+
+
+def _blames_paths(result: ChangedResult) -> bool:
+    return result.reason is not None and result.reason.code is TracksCode.PATHS_CHANGED
 
 
 def _spread(values: Sequence[float]) -> str:

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import httpx
 from models.evaluation.scenes import Knock, Scene, SceneTrack, knock_trajectory, load_scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from service.formats.degrees import in_degrees
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
@@ -129,14 +130,7 @@ def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str,
             "cy": lens.cy,
             "distortion": list(lens.distortion),
         },
-        "prior_pose": {
-            "height_m": pose.height_m,
-            "tilt_deg": math.degrees(pose.tilt_rad),
-            "roll_deg": math.degrees(pose.roll_rad),
-            "heading_deg": math.degrees(pose.heading_rad),
-            "x_m": pose.x_m,
-            "y_m": pose.y_m,
-        },
+        "prior_pose": in_degrees(asdict(pose)),
     }
 
 

@@ -20,6 +20,8 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, angle_between
 from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
+from service.formats.degrees import degrees
+from service.kinds import ReferenceState
 from service.replay import camera_body, client_of
 
 _SOURCE = "surefoot-protocol"
@@ -84,7 +86,7 @@ def replay_protocol(
         http.post("/cameras", json={**body, "reference_tracks": wanted}).raise_for_status()
         lost = _post(http, camera_id, case.reference, "r", shifts[0], case.intrinsics)
         _wait(
-            http, camera_id, lambda pose: pose["reference"]["state"] == "ready",
+            http, camera_id, lambda pose: pose["reference"]["state"] == ReferenceState.READY,
             lambda pose: on_progress("reference", pose["reference"]["tracks"], wanted),
         )  # fmt: skip
         lost += _post(http, camera_id, case.seen, "s", shifts[1], case.intrinsics)
@@ -97,7 +99,7 @@ def replay_protocol(
         case=case,
         camera_id=camera_id,
         served=served,
-        angle_error_deg=math.degrees(
+        angle_error_deg=degrees(
             float(
                 angle_between(
                     np.array(served["pose"]["quaternion_wxyz"]), case.true_pose.quaternion_wxyz
@@ -117,10 +119,10 @@ def print_outcome(outcome: ProtocolReplay, console: Console) -> None:
         table.add_column(column, justify="right" if column else "left")
     prior, true = outcome.case.prior_pose, outcome.case.true_pose
     for field, before, after in (
-        ("tilt_deg", math.degrees(prior.tilt_rad), math.degrees(true.tilt_rad)),
-        ("roll_deg", math.degrees(prior.roll_rad), math.degrees(true.roll_rad)),
+        ("tilt_deg", degrees(prior.tilt_rad), degrees(true.tilt_rad)),
+        ("roll_deg", degrees(prior.roll_rad), degrees(true.roll_rad)),
         ("height_m", prior.height_m, true.height_m),
-        ("heading_deg", math.degrees(prior.heading_rad), math.degrees(true.heading_rad)),
+        ("heading_deg", degrees(prior.heading_rad), degrees(true.heading_rad)),
     ):
         shown = "not told" if sd.get(field) is None else f"{sd[field]:.3f}"
         table.add_row(field, f"{before:.3f}", f"{after:.3f}", f"{pose[field]:.3f}", shown)

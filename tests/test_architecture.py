@@ -11,8 +11,9 @@ ROOT = Path(__file__).parent.parent
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
-    {"data_dir", "memory", "process"},
-    {"settings", "errors", "logs"},
+    {"data_dir", "kinds", "memory", "process"},
+    {"settings", "errors", "logs", "reasons"},
+    {"reason_words"},
     {"formats", "store", "delivery", "reach"},
     {"job_queue"},
     {"recalibration"},
@@ -36,7 +37,7 @@ SERVICE_ROOMS = [
     {"cli"},
 ]
 MODEL_ROOMS = [
-    {"errors"},
+    {"errors", "reasons"},
     {"packing", "quantiles"},
     {"geometry"},
     {"trajectory"},

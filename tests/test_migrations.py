@@ -1,20 +1,25 @@
+import json
 import sqlite3
 from datetime import UTC, datetime
 
 import alembic.command
 import pytest
-from sqlalchemy import text
+from fastapi.testclient import TestClient
+from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
 
+from service.app import create_app
 from service.migrate import migrate
+from service.reason_words import in_words
 from service.recalibration.alerts import list_alerts
 from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
 from service.store import references, sources
 from service.store.alerts import AlertFilter
 from service.store.database import Store
+from service.store.record import Record
 from service.store.revisions import alembic_config
-from service.store.tables import Record
+from service.store.tables import EstimateRecord
 
 
 def test_migrating_twice_changes_nothing(settings):
@@ -36,13 +41,28 @@ def test_down_to_nothing_and_up_again(tmp_path):
     alembic.command.upgrade(config, "head")
 
 
+# A word for each column that takes those of a vocabulary alone.
+WORDS = {
+    "prior_poses": {"origin": "registered"},
+    "site_references": {"origin": "registered"},
+    "trainings": {"state": "succeeded"},
+    "estimates": {"state": "ok"},
+    "alerts": {"kind": "drift", "state": "firing", "source": "estimate", "severity": "warning"},
+    "events": {"type": "pose"},
+    "webhooks": {"format": "webhook"},
+    "deliveries": {"type": "test", "state": "pending"},
+    "activity": {"what": "camera.changed"},
+}
+
+
 def put(connection, table, **values):
     """Insert a row with something in every column that needs it."""
     some = {"JSON": "[]", "DATETIME": "2026-11-20 08:00:00", "BLOB": b""}
     for _, name, kind, needed, default, key in connection.execute(f"PRAGMA table_info({table})"):
         if needed and default is None and not (key and kind == "INTEGER"):
             number = kind in ("INTEGER", "DOUBLE", "FLOAT", "BOOLEAN")
-            values.setdefault(name, some.get(kind, 1 if number else "some"))
+            word = WORDS.get(table, {}).get(name, "some")
+            values.setdefault(name, some.get(kind, 1 if number else word))
     names = ", ".join(values)
     marks = ", ".join("?" * len(values))
     connection.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", list(values.values()))
@@ -111,6 +131,111 @@ def test_the_newest_reference_is_bound_to_the_source_of_its_tracks(tmp_path):
         assert all(each.told_at is not None for each in found)
     alembic.command.downgrade(config, "2026_11_24_parent_indexes")
     migrate(settings)
+
+
+def test_what_was_kept_in_degrees_is_told_as_it_was(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_25_track_sources")
+    raw = {"joint": {"height_m": 6.4, "tilt_deg": 22.123456789, "roll_deg": -1.7, "tracks": 40},
+           "registered": {"height_m": 6.3, "tilt_deg": 21.9, "roll_deg": 1e-17,
+                          "heading_deg": -170.3, "tracks": 40}}  # fmt: skip
+    drift = {"height_m": None, "tilt_deg": 5.3, "roll_deg": None, "heading_deg": -0.1,
+             "angle_deg": 5.4}  # fmt: skip
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        put(connection, "site_references", id=1, camera_id="old", prior_pose_id=1, doubt="",
+            origin="registered", ready_at="2026-11-20 07:00:00", offsets="{}")  # fmt: skip
+        for number in range(1, 2103):  # more than two bites of them
+            put(connection, "estimates", id=number, camera_id="old", prior_pose_id=1, state="ok",
+                reference_id=1, told='["tilt"]', raw=json.dumps(raw))  # fmt: skip
+        for kind, told in (("drift", drift), ("no_data", {})):
+            put(connection, "alerts", id=kind, camera_id="old", kind=kind, state="resolved",
+                source="estimate", severity="warning", drift=json.dumps(told))  # fmt: skip
+
+    def kept():
+        with sqlite3.connect(settings.database_path) as connection:
+            for query in ("SELECT DISTINCT raw FROM estimates", "SELECT drift FROM alerts"):
+                yield from (json.loads(row[0]) for row in connection.execute(f"{query} ORDER BY 1"))
+
+    migrate(settings)
+    stored = list(kept())
+    assert stored[0]["registered"]["heading_rad"] == pytest.approx(-2.97229572)
+    assert "_deg" not in json.dumps(stored)
+    with TestClient(create_app(settings)) as http:
+        told = http.get("/cameras/old/pose").json()["estimates"]
+        found = {each["id"]: each["drift"] for each in http.get("/alerts").json()["items"]}
+    for name, body in raw.items():
+        assert told[name] == pytest.approx(body, rel=1e-15)
+    assert found == {"drift": pytest.approx(drift, rel=1e-15), "no_data": {}}
+    alembic.command.downgrade(config, "2026_11_25_track_sources")
+    again, *alerts = kept()
+    assert list(again["registered"]) == list(raw["registered"])
+    assert again["joint"] == pytest.approx(raw["joint"], rel=1e-15)
+    assert pytest.approx(drift, rel=1e-15) in alerts
+
+
+def test_what_was_said_in_sentences_stays_readable(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_26_closed_words")
+    source = 'byte\'s "own"'
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
+        put(connection, "prior_poses", id=1, camera_id="old", origin="registered")
+        for number, doubt in ((1, "people walk at 3 m/s"), (2, "")):
+            put(connection, "site_references", id=number, camera_id="old", prior_pose_id=1,
+                origin="registered", doubt=doubt)  # fmt: skip
+        put(connection, "estimates", camera_id="old", prior_pose_id=1, state="ok",
+            reason="it's 5 \"deg\"; so")  # fmt: skip
+        known = {"state": "firing", "severity": "critical", "drift": "{}"}
+        put(connection, "alerts", id="one", camera_id="old", kind="drift", source="estimate",
+            reason="far", **known)  # fmt: skip
+        put(connection, "alerts", id="all", kind="no_data", source="group", reason="3 cameras of",
+            camera_ids='["a", "b", "old"]', track_source=source, **known)  # fmt: skip
+    alembic.command.upgrade(config, "head")
+    with Store(settings).read() as session:
+        first, second = references.of_camera(session, "old", 2)[::-1]
+        assert (in_words(first.doubts), second.doubts) == ("people walk at 3 m/s", ())
+        (estimate,) = session.scalars(select(EstimateRecord))
+        assert in_words(estimate.reasons) == 'it\'s 5 "deg"; so'
+        alerts = {alert.id: alert for alert in list_alerts(session, AlertFilter(), 10)}
+        assert (alerts["one"].reason, alerts["one"].reason_code) == ("far", "as_said")
+        assert alerts["all"].reason_code == "fell_silent_together"
+        assert alerts["all"].reason_values == {"cameras": 3, "track_source": source}
+        assert alerts["all"].reason.startswith(f"3 cameras of the tracker {source!r} fell silent")
+    alembic.command.downgrade(config, "2026_11_26_closed_words")
+    with sqlite3.connect(settings.database_path) as connection:
+        said = connection.execute("SELECT reason FROM alerts ORDER BY id").fetchall()
+        assert said == [("fell_silent_together",), ("far",)]
+        said = connection.execute("SELECT doubt FROM site_references ORDER BY id").fetchall()
+        assert said == [("people walk at 3 m/s",), ("",)]
+
+
+def test_making_tables_anew_keeps_numbers_and_triggers(tmp_path):
+    settings = Settings(data_dir=tmp_path)
+    config = alembic_config(settings.database_url)
+    alembic.command.upgrade(config, "2026_11_25_track_sources")
+    with sqlite3.connect(settings.database_path) as connection:
+        for number in (7, 8):
+            put(connection, "events", id=number, type="alert", payload="{}")
+        connection.execute("DELETE FROM events WHERE id = 8")
+        put(connection, "activity", what="pose.accepted", details="{}")
+        connection.execute("UPDATE sqlite_sequence SET seq = 41 WHERE name = 'activity'")
+    for revision in ("head", "2026_11_25_track_sources"):
+        way = alembic.command.upgrade if revision == "head" else alembic.command.downgrade
+        way(config, revision)
+        with sqlite3.connect(settings.database_path) as connection:
+            insert = "INSERT INTO events (type, payload, created_at) VALUES ('pose', '{}', '2026')"
+            numbers = [connection.execute(insert).lastrowid]
+            connection.rollback()
+            with pytest.raises(sqlite3.IntegrityError, match="never changed"):
+                connection.execute("UPDATE activity SET by = 'Eve'")
+            (last,) = connection.execute(
+                "SELECT seq FROM sqlite_sequence WHERE name = 'activity'"
+            ).fetchone()
+            assert (numbers, last) == ([9], 41)
 
 
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):

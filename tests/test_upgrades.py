@@ -108,6 +108,11 @@ def rows_of(path):
         }
 
 
+def columns_of(data_dir, table):
+    with sqlite3.connect(Settings(data_dir=data_dir).database_path) as connection:
+        return {row[1] for row in connection.execute(f"PRAGMA table_info({table})")}
+
+
 @pytest.mark.parametrize("revision", REVISIONS)
 def test_a_database_of_a_revision_keeps_its_rows_and_is_served(released, tmp_path, revision):
     settings = Settings(data_dir=tmp_path / "data", epochs=1)
@@ -132,6 +137,8 @@ def test_a_database_of_a_revision_keeps_its_rows_and_is_served(released, tmp_pat
         assert pose["pose"]["height_m"] == pytest.approx(6.1)
         (alert,) = http.get("/alerts").raise_for_status().json()["items"]
         assert (alert["kind"], alert["severity"]) == ("drift", "critical")
+        if "reason" in columns_of(released(revision), "alerts"):
+            assert (alert["reason"], alert["reason_code"]) == ("it has turned", "as_said")
         for page in ("/", "/ui/cameras/corner", "/metrics", "/webhooks"):
             http.get(page, headers={"accept": "text/html"}).raise_for_status()
         receipt = http.post("/cameras/corner/tracks", json={"tracks": [

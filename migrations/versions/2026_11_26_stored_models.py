@@ -14,7 +14,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 revision = "2026_11_26_stored_models"
-down_revision = "2026_11_25_track_sources"
+down_revision = "2026_11_26_radians_of_alerts"
 branch_labels = None
 depends_on = None
 
@@ -83,6 +83,7 @@ def _rewrite(made_of: Callable[[str, bytes], bytes]) -> None:
 def _packed(form: str, data: bytes) -> bytes:
     values = _read_archive(data)
     if form == "site":
+        values.pop("doubt", None)  # told once, by the row
         values = {_SITE.get(name, name): part for name, part in values.items()}
     if form == "chart":
         paces = _read_archive(values.pop("paces").tobytes())
@@ -103,7 +104,7 @@ def _archived(form: str, data: bytes) -> bytes:
     values = {**header["values"], **load(raw)}
     old = {new: old for old, new in _SITE.items()}
     if form == "site":
-        values = {old.get(name, name): part for name, part in values.items()}
+        values = {old.get(name, name): part for name, part in values.items()} | {"doubt": ""}
     if form == "chart":
         names = [name for name in values if name.startswith("paces.")]
         paces = {name.removeprefix("paces."): values.pop(name) for name in names}

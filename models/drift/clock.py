@@ -5,6 +5,8 @@ import math
 from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift
 from models.estimation.numbers import ANGLES, NUMBERS
+from models.geometry.pose import CameraPose
+from models.reasons import Reason, TracksCode
 
 _SIGMAS = 4.0
 _LEAST_LOG = math.log(1.08)
@@ -23,8 +25,8 @@ def may_be_clock(reading: Reading) -> bool:
     return reading.number in (_HEIGHT, CLOCK) and reading.parties < _PARTIES_FOR_POSE
 
 
-def clock_fault(drift: Drift, frame_rate_hz: float | None) -> str | None:
-    """What a change of scale with unchanged angles looks like, in words; None where it is none.
+def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
+    """What a change of scale with unchanged angles looks like; None where it is none.
 
     Times that are too long by a factor make people slow, and only a higher camera makes them walk
     as before: the height grows by that factor and nothing else does. A camera that was raised
@@ -32,19 +34,17 @@ def clock_fault(drift: Drift, frame_rate_hz: float | None) -> str | None:
 
     Args:
         drift: the estimate against the prior pose.
+        prior: that pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
     if not set(NUMBERS) <= set(drift.told):
         return None
-    if abs(drift.log_height) <= max(_SIGMAS * drift.log_height_sd, _LEAST_LOG):
+    factor = 1 + drift.by.height_m / prior.height_m
+    relative_sd = drift.sd.height_m / (factor * prior.height_m)
+    if abs(math.log(factor)) <= max(_SIGMAS * relative_sd, _LEAST_LOG):
         return None
     for angle, sd in (drift.of(name) for name in ANGLES if name in drift.told):
         if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
             return None
-    factor = math.exp(drift.log_height)
-    rate_hz = frame_rate_hz or _USUAL_RATE_HZ
-    return (
-        f"the scale has changed by {100 * (factor - 1):+.0f} % and the angles have not: as if "
-        f"{rate_hz * factor:.3g} frames a second were taken for {rate_hz:.3g}, or the camera was "
-        f"{'raised' if factor > 1 else 'lowered'}"
-    )
+    values = {"factor": factor, "rate_hz": frame_rate_hz or _USUAL_RATE_HZ}
+    return Reason(code=TracksCode.SCALE_CHANGED, values=values)

@@ -9,7 +9,7 @@ or, on a holiday or in the rain, quiet. Times are seconds since the epoch, hours
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from enum import StrEnum
 
 import numpy as np
 
@@ -35,7 +35,13 @@ _HOURS_PER_YEAR = 8766.0
 _FEW = 3.0  # parties
 _SURELY = 1e-3  # chance below which people should have been seen: then the fixed limit counts
 
-SilenceVerdict = Literal["usual", "improbable", "too_long"]
+
+class SilenceVerdict(StrEnum):
+    """What a silence is taken for."""
+
+    USUAL = "usual"
+    IMPROBABLE = "improbable"
+    TOO_LONG = "too_long"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,12 +165,12 @@ def judge_silence(
 ) -> SilenceVerdict:
     """Whether a silence is too improbable to be one; the numbers are `chance_of_silence`'s."""
     if silent_s < rule.least_s or not is_missed(rhythm, missed):
-        return "usual"
+        return SilenceVerdict.USUAL
     chance = chance_of_silence(rhythm, missed, silent_s, seen, expected)
     if silent_s > rule.limit_s and chance < _SURELY:
-        return "too_long"
+        return SilenceVerdict.TOO_LONG
     allowed = rule.false_per_year / max(rhythm.arrivals_per_year, 1.0)
-    return "improbable" if chance < allowed else "usual"
+    return SilenceVerdict.IMPROBABLE if chance < allowed else SilenceVerdict.USUAL
 
 
 def is_missed(rhythm: Rhythm, missed: float) -> bool:

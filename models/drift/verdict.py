@@ -3,12 +3,11 @@
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from models.drift.chart import Reading
-from models.estimation.numbers import WITH_HEADING
+from models.estimation.numbers import ANGLES, WITH_HEADING
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, angle_between
+from models.geometry.pose_parameters import PoseParameters
+from models.geometry.rotation import angle_between
 
 # What a clock that is wrong looks like in a pose is a height.
 _CHARTED = (*WITH_HEADING, "height")
@@ -16,33 +15,25 @@ _CHARTED = (*WITH_HEADING, "height")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """Estimate minus prior pose, each number with the standard deviation of the estimate.
+    """Estimate minus prior pose: `by` how much, and the standard deviations of the estimate.
 
-    `told` names those of tilt, roll, height, heading that the tracks can tell; the others stand
-    here but count nowhere. `angle_rad` is the whole rotation between prior and `pose_after`.
+    `told` names the parameters that the tracks can tell; the others stand here but count nowhere.
+    `angle_rad` is the whole rotation that the told angles make.
     """
 
-    tilt_rad: float
-    roll_rad: float
-    height_m: float
-    log_height: float
-    heading_rad: float
+    by: PoseParameters
+    sd: PoseParameters
     angle_rad: float
-    tilt_sd_rad: float
-    roll_sd_rad: float
-    height_sd_m: float
-    log_height_sd: float
-    heading_sd_rad: float
     told: tuple[str, ...]
 
     def of(self, name: str) -> tuple[float, float]:
-        """A number's drift and its standard deviation: in metres for height, else in radians."""
-        return {
-            "tilt": (self.tilt_rad, self.tilt_sd_rad),
-            "roll": (self.roll_rad, self.roll_sd_rad),
-            "height": (self.height_m, self.height_sd_m),
-            "heading": (self.heading_rad, self.heading_sd_rad),
-        }[name]
+        """A parameter's drift and its standard deviation: in metres for height, else in radians."""
+        return self.by.of(name), self.sd.of(name)
+
+    @property
+    def turned(self) -> bool:
+        """Whether an angle is told."""
+        return bool(set(ANGLES) & set(self.told))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,31 +74,25 @@ class DriftVerdict:
 
 
 def drift_between(
-    values: Array, covariance: Array, told: tuple[str, ...], prior: CameraPose
+    found: PoseParameters, sd: PoseParameters, told: tuple[str, ...], prior: CameraPose
 ) -> Drift:
     """How far an estimate is from the prior pose; x and y count as unmoved.
 
     Args:
-        values: tilt, roll (radians), log height, heading (radians) (4,).
-        covariance: of these (4, 4).
+        found: what is estimated.
+        sd: its standard deviations.
         told: those of tilt, roll, height, heading that the tracks can tell.
         prior: the prior pose.
     """
-    tilt, roll, log_height, heading = (float(value) for value in values)
-    tilt_sd, roll_sd, log_height_sd, heading_sd = map(float, np.sqrt(np.diag(covariance)))
-    height_m = math.exp(log_height)
     drift = Drift(
-        tilt_rad=min(max(tilt, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
-        roll_rad=math.remainder(roll - prior.roll_rad, 2 * math.pi),
-        height_m=height_m - prior.height_m,
-        log_height=log_height - math.log(prior.height_m),
-        heading_rad=math.remainder(heading - prior.heading_rad, 2 * math.pi),
+        by=PoseParameters(
+            height_m=found.height_m - prior.height_m,
+            tilt_rad=min(max(found.tilt_rad, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
+            roll_rad=math.remainder(found.roll_rad - prior.roll_rad, 2 * math.pi),
+            heading_rad=math.remainder(found.heading_rad - prior.heading_rad, 2 * math.pi),
+        ),
+        sd=sd,
         angle_rad=0.0,
-        tilt_sd_rad=tilt_sd,
-        roll_sd_rad=roll_sd,
-        height_sd_m=height_m * log_height_sd,
-        log_height_sd=log_height_sd,
-        heading_sd_rad=heading_sd,
         told=tuple(name for name in WITH_HEADING if name in told),
     )
     turned = pose_after(drift, prior)
@@ -119,7 +104,7 @@ def drift_between(
 def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
     """The prior pose moved by what is told of the drift; what is not told stays the prior's."""
     turn = 2 * math.pi
-    by = {name: drift.of(name)[0] if name in drift.told else 0.0 for name in WITH_HEADING}
+    by = {name: drift.by.of(name) if name in drift.told else 0.0 for name in WITH_HEADING}
     heading = prior.heading_rad + by["heading"]
     return replace(
         prior,
@@ -189,7 +174,7 @@ def _ratios(drift: Drift, limits: DriftLimits) -> dict[str, float]:
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
     """The told numbers that are beyond their limits, and whether they have grown."""
     found = _ratios(drift, limits).items()
-    return {name: drift.of(name)[0] > 0 for name, ratio in found if ratio >= 1}
+    return {name: drift.by.of(name) > 0 for name, ratio in found if ratio >= 1}
 
 
 def _is_well(

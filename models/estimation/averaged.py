@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import (
     Array,
     angles_from_rotation,
@@ -31,19 +32,14 @@ class TrackPredictions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseEstimate:
-    """Height, tilt and roll from tracks, each with its standard deviation.
+    """Height, tilt and roll from tracks, with their standard deviations.
 
-    `heading_rad` is the heading of the averaged orientation. It is no measurement (a ground plane
-    and walking people do not show it) but part of the paper's angle error.
+    The heading is that of the averaged orientation. It is no measurement (a ground plane and
+    walking people do not show it) but part of the paper's angle error.
     """
 
-    height_m: float
-    tilt_rad: float
-    roll_rad: float
-    heading_rad: float
-    height_sd_m: float
-    tilt_sd_rad: float
-    roll_sd_rad: float
+    value: PoseParameters
+    sd: PoseParameters
     tracks: int
 
 
@@ -86,13 +82,18 @@ def averaged_estimate(predictions: TrackPredictions, seed: int) -> PoseEstimate:
     )
     tilts, rolls, headings = angles_from_rotation(rotation_from_quaternion(means))
     return PoseEstimate(
-        height_m=float(heights[0]),
-        tilt_rad=float(tilts[0]),
-        roll_rad=float(rolls[0]),
-        heading_rad=float(headings[0]),
-        height_sd_m=float(heights[1:].std(ddof=1)),
-        tilt_sd_rad=float(tilts[1:].std(ddof=1)),
-        roll_sd_rad=float(_around(rolls[1:], rolls[0]).std(ddof=1)),
+        value=PoseParameters(
+            height_m=float(heights[0]),
+            tilt_rad=float(tilts[0]),
+            roll_rad=float(rolls[0]),
+            heading_rad=float(headings[0]),
+        ),
+        sd=PoseParameters(
+            height_m=float(heights[1:].std(ddof=1)),
+            tilt_rad=float(tilts[1:].std(ddof=1)),
+            roll_rad=float(_around(rolls[1:], rolls[0]).std(ddof=1)),
+            heading_rad=float(_around(headings[1:], headings[0]).std(ddof=1)),
+        ),
         tracks=count,
     )
 
@@ -101,9 +102,9 @@ def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
     """The estimate as a pose; what tracks cannot tell (x, y, heading) is the prior pose's."""
     return replace(
         prior,
-        height_m=max(estimate.height_m, 1e-3),
-        tilt_rad=estimate.tilt_rad,
-        roll_rad=estimate.roll_rad,
+        height_m=max(estimate.value.height_m, 1e-3),
+        tilt_rad=estimate.value.tilt_rad,
+        roll_rad=estimate.value.roll_rad,
     )
 
 

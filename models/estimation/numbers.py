@@ -7,6 +7,7 @@ import numpy as np
 
 from models.errors import ShapeError
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
 
 # As they are named where they are told or not, in the order of every (3,) and (4,).
@@ -43,7 +44,7 @@ class NumbersEstimate:
 
 def numbers_of(pose: CameraPose) -> Array:
     """Tilt, roll (radians) and log height (3,) of a pose."""
-    return np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+    return array_of(pose)[:3]
 
 
 def without_offset(

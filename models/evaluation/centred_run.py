@@ -87,8 +87,9 @@ def run_averaged(
     _, predictions = average_windows(height_m, quaternions, windows.owner_idx)
     estimate = averaged_estimate(predictions, seed)
     estimate_s = time.monotonic() - started
+    found = estimate.value
     raw = quaternion_from_rotation(
-        rotation_from_angles(estimate.tilt_rad, estimate.roll_rad, estimate.heading_rad)
+        rotation_from_angles(found.tilt_rad, found.roll_rad, found.heading_rad)
     )
     truth = scene.true_pose
     served = pose_of(estimate, truth)
@@ -100,11 +101,11 @@ def run_averaged(
         step_s=step_s,
         tracks=estimate.tracks,
         true_height_m=truth.height_m,
-        height_m=estimate.height_m,
-        tilt_deg=float(np.degrees(estimate.tilt_rad)),
-        roll_deg=float(np.degrees(estimate.roll_rad)),
-        height_sd_m=estimate.height_sd_m,
-        height_error_m=abs(estimate.height_m - truth.height_m),
+        height_m=found.height_m,
+        tilt_deg=float(np.degrees(found.tilt_rad)),
+        roll_deg=float(np.degrees(found.roll_rad)),
+        height_sd_m=estimate.sd.height_m,
+        height_error_m=abs(found.height_m - truth.height_m),
         angle_error_deg=_angle_deg(raw, truth.quaternion_wxyz),
         served_angle_error_deg=_angle_deg(served.quaternion_wxyz, truth.quaternion_wxyz),
         held_out_height_error_m=metrics.median_height_error_m,

@@ -27,6 +27,7 @@ from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import Z90
+from models.reasons import Reason
 from models.simulation.site import draw_new_lane, walk_changed
 
 REFERENCE_TRACKS = 2000
@@ -66,7 +67,7 @@ class ChangedResult:
     unchanged_off_truth_deg: float
     off_truth_log_height: float
     covered: tuple[bool, ...]
-    reason: str
+    reason: Reason | None
     registered: bool
 
 

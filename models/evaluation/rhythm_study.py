@@ -16,6 +16,7 @@ import numpy as np
 from models.drift.rhythm import (
     Rhythm,
     SilenceRule,
+    SilenceVerdict,
     delay_of,
     expected_tracks,
     judge_silence,
@@ -137,7 +138,7 @@ def _alerts(
         seen=float(np.diff(before)[0]),
         expected=_expected(rhythm, cells, last_s - _LOOK_BACK_S, last_s),
     )
-    return verdict != "usual"
+    return verdict is not SilenceVerdict.USUAL
 
 
 def _expected(rhythm: Rhythm, cells: np.ndarray, from_s: float, to_s: float) -> float:

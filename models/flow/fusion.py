@@ -15,7 +15,9 @@ from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
+from models.reasons import Reason, TracksCode
 
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
@@ -29,16 +31,17 @@ _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
-    `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` says in
-    words what is to be said of the flow map. `raw` (4,) is before the map's bias is taken off; None
-    where the map had no part: then all is the joint estimate's and the heading the prior pose's.
+    `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` is
+    what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
+    off; None where the map had no part: then all is the joint estimate's and the heading the prior
+    pose's.
     `rivals` are headings (radians) of other poses that explain the tracks about as well.
     """
 
     values: Array
     covariance: Array
     told: tuple[str, ...]
-    reason: str
+    reason: Reason | None
     raw: Array | None = None
     rivals: tuple[float, ...] = ()
 
@@ -46,6 +49,21 @@ class FusedEstimate:
     def registered(self) -> bool:
         """Whether the flow map had a part."""
         return self.raw is not None
+
+    @property
+    def parameters(self) -> PoseParameters:
+        """What is estimated, named."""
+        return PoseParameters.of_array(self.values)
+
+    @property
+    def sd(self) -> PoseParameters:
+        """The standard deviations, named."""
+        return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
+
+    @property
+    def raw_parameters(self) -> PoseParameters | None:
+        """What `raw` is, named."""
+        return None if self.raw is None else PoseParameters.of_array(self.raw)
 
 
 def fused_estimate(
@@ -89,7 +107,7 @@ def fused_estimate(
     covariance = covariance + elsewhere(peaks, chances)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
     if reference.fit.has_changed(party_fits(walkers, site, values)):
-        return by_speeds_alone(joint, prior, "the paths have changed: the flow map is left out")
+        return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     rivals = tuple(
         float(peak.candidate[3])
         for peak, chance in zip(peaks, chances, strict=True)
@@ -100,13 +118,15 @@ def fused_estimate(
         values=values,
         covariance=covariance,
         told=tuple(n for n, telling in zip(WITH_HEADING, sd <= TELLING_SD, strict=True) if telling),
-        reason=_words(float(values[3]), rivals, float(sd[3]), prior),
+        reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
     )
 
 
-def by_speeds_alone(joint: JointEstimate, prior: CameraPose, reason: str = "") -> FusedEstimate:
+def by_speeds_alone(
+    joint: JointEstimate, prior: CameraPose, reason: Reason | None = None
+) -> FusedEstimate:
     """The joint estimate with the prior's heading, which it cannot tell."""
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
@@ -119,14 +139,15 @@ def by_speeds_alone(joint: JointEstimate, prior: CameraPose, reason: str = "") -
     )
 
 
-def _words(heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPose) -> str:
+def _reason(
+    heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPose
+) -> Reason | None:
     if rivals:
         turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
-        said = " and ".join(f"{math.degrees(turn):+.1f} deg" for turn in turns)
-        return f"turns of {said} explain where people walk about as well"
+        return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
     if sd > TELLING_SD[3]:
-        return f"where people walk does not tell the heading (sd {math.degrees(sd):.1f} deg)"
-    return ""
+        return Reason(code=TracksCode.HEADING_UNTOLD, values={"heading_sd_rad": sd})
+    return None
 
 
 def _chances(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) -> Array:

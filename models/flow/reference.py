@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import numbers_of
 from models.flow.cross_fit import CrossFit, cross_fit
 from models.flow.evidence import walkers_of
 from models.flow.fit import UsualFit, usual_fit
@@ -17,6 +16,7 @@ from models.flow.site_map import mapped
 from models.flow.view import Coverage
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
 
 _GROUP = 6  # parties after one another
@@ -80,7 +80,7 @@ class FlowReference:
 
 def candidate_of(pose: CameraPose) -> Array:
     """Tilt, roll, log height, heading (4,) of a pose."""
-    return np.array([*numbers_of(pose), pose.heading_rad])
+    return array_of(pose)
 
 
 def learn_flow(

@@ -112,7 +112,7 @@ def estimate_pose(
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
     """How far an estimate is from the prior pose."""
-    return drift_between(fused.values, fused.covariance, fused.told, prior)
+    return drift_between(fused.parameters, fused.sd, fused.told, prior)
 
 
 def _fused(tracks: Observations, joint: JointEstimate, site: CameraSite) -> FusedEstimate:

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, get_args
 
-Scope = Literal["ingest", "read", "operate", "admin"]
-SCOPES: tuple[Scope, ...] = get_args(Scope)
+from service.kinds import TokenScope
+
 # Each of these holds those before it; posting tracks is apart, so that a tracker's token reads
 # nothing and an operator's invents no people.
-_LADDER: tuple[Scope, ...] = ("read", "operate", "admin")
+_LADDER = (TokenScope.READ, TokenScope.OPERATE, TokenScope.ADMIN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +24,7 @@ class Caller:
     session_hash: str | None = None
     cameras: frozenset[str] | None = None
 
-    def may(self, scope: str) -> bool:
+    def may(self, scope: TokenScope) -> bool:
         """Whether what needs a scope is allowed."""
         return scope in widened(self.scopes)
 

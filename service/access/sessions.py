@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from service.access.callers import Caller
 from service.access.tokens import caller_of, caller_of_token, is_valid
 from service.errors import ForbiddenError, UnauthorizedError
+from service.kinds import Act, TokenScope
 from service.recalibration.activity import note
 from service.settings import Settings
 from service.store import access
@@ -28,7 +29,7 @@ def check_login(session: Session, token: str) -> Caller:
     caller = caller_of_token(session, token.strip())
     if caller is None:
         raise UnauthorizedError("token: nobody is let in with this; it may be over or revoked")
-    if not caller.may("read"):
+    if not caller.may(TokenScope.READ):
         raise ForbiddenError("token: pages need the scope read, this is for posting tracks alone")
     return caller
 
@@ -47,7 +48,9 @@ def log_in(session: Session, settings: Settings, caller: Caller) -> str:
             expires_at=now + timedelta(hours=settings.session_hours),
         )
     )
-    note(session, "session.began", by=caller.name, via=caller.token_id, subject_id=caller.token_id)
+    note(
+        session, Act.SESSION_BEGAN, by=caller.name, via=caller.token_id, subject_id=caller.token_id
+    )
     return cookie
 
 
@@ -56,12 +59,14 @@ def log_out(session: Session, caller: Caller) -> None:
     if caller.session_hash is None:
         return
     access.end_session(session, caller.session_hash)
-    note(session, "session.ended", by=caller.name, via=caller.token_id, subject_id=caller.token_id)
+    note(
+        session, Act.SESSION_ENDED, by=caller.name, via=caller.token_id, subject_id=caller.token_id
+    )
 
 
 def note_refused(session: Session, address: str) -> None:
     """Keep that somebody was not let in; never with what."""
-    note(session, "login.refused", by=None, details={"address": address})
+    note(session, Act.LOGIN_REFUSED, by=None, details={"address": address})
 
 
 def caller_of_session(session: Session, cookie: str) -> Caller | None:

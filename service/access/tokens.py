@@ -9,8 +9,9 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.access.callers import SCOPES, Caller
+from service.access.callers import Caller
 from service.errors import FieldError, MalformedError, NotFoundError
+from service.kinds import Act, TokenScope
 from service.recalibration.activity import note
 from service.store import access
 from service.store.access_tables import TokenRecord
@@ -52,7 +53,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
         id=token_id,
         name=spec.name.strip(),
         secret_sha256=_hash(secret),
-        scopes=[scope for scope in SCOPES if scope in spec.scopes],
+        scopes=[scope for scope in TokenScope if scope in spec.scopes],
         cameras=None if spec.cameras is None else sorted(set(spec.cameras)),
         created_at=now,
         created_by=by,
@@ -63,7 +64,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     session.add(record)
     session.flush()
     details = {"name": record.name, "scopes": record.scopes, "cameras": record.cameras}
-    note(session, "token.added", by=by, subject_id=token_id, details=details)
+    note(session, Act.TOKEN_ADDED, by=by, subject_id=token_id, details=details)
     return MadeToken(record=record, text=f"{_PREFIX}_{token_id}_{secret}")
 
 
@@ -89,7 +90,7 @@ def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord
     if record.revoked_at is None:
         record.revoked_at = datetime.now(UTC)
         details = {"name": record.name}
-        note(session, "token.revoked", by=by, subject_id=token_id, details=details)
+        note(session, Act.TOKEN_REVOKED, by=by, subject_id=token_id, details=details)
     access.end_sessions(session, token_id=token_id)
     return record
 
@@ -133,15 +134,15 @@ def _hash(secret: str) -> str:
 
 
 def _check(spec: TokenSpec, now: datetime) -> None:
-    unknown = [scope for scope in spec.scopes if scope not in SCOPES]
+    unknown = [scope for scope in spec.scopes if scope not in list(TokenScope)]
     if not 0 < len(spec.name.strip()) <= MAX_NAME:
         _refuse("name", f"1 to {MAX_NAME} characters are needed, got {len(spec.name.strip())}")
     if not spec.name.isprintable():
         _refuse("name", "letters that can be printed, on one line, are needed")
     if unknown or not spec.scopes:
         got = ", ".join(unknown) or "none"
-        _refuse("scopes", f"some of {', '.join(SCOPES)} are needed, got {got:.80}")
-    if spec.cameras is not None and ("ingest" not in spec.scopes or not spec.cameras):
+        _refuse("scopes", f"some of {', '.join(TokenScope)} are needed, got {got:.80}")
+    if spec.cameras is not None and (TokenScope.INGEST not in spec.scopes or not spec.cameras):
         _refuse("cameras", "cameras are named for the scope ingest alone, one at least")
     if spec.expires_at is not None and spec.expires_at <= now:
         _refuse("expires_at", f"a time after now is needed, got {spec.expires_at.isoformat()}")

@@ -5,8 +5,8 @@ import stat
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
-from typing import Literal
 
 from service.backup.manifest import hash_file
 from service.backup.placing import READY
@@ -29,7 +29,13 @@ from service.store.revisions import known_revisions, require_known
 _LEAST_FREE = 200e6
 _HOUR_S = 3600.0
 
-Verdict = Literal["ok", "note", "fault"]
+
+class Verdict(StrEnum):
+    """What was found of one thing."""
+
+    OK = "ok"
+    NOTE = "note"
+    FAULT = "fault"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +63,7 @@ def check_data_dir(settings: Settings) -> list[Finding]:
             findings += _weights(settings)
             findings += [_key(settings, path)]
     except StartError as error:
-        findings.append(Finding(what="database", verdict="fault", detail=str(error)))
+        findings.append(Finding(what="database", verdict=Verdict.FAULT, detail=str(error)))
     return [*findings, _modes(folder), _space(settings), _left_over(folder)]
 
 
@@ -81,7 +87,7 @@ def repair_weights(settings: Settings) -> int:
 def _in_use(folder: Path) -> Finding:
     users = running_in(folder)
     detail = f"in use by {', '.join(users)}" if users else "nothing uses it"
-    return Finding(what="use", verdict="ok", detail=detail)
+    return Finding(what="use", verdict=Verdict.OK, detail=detail)
 
 
 def _database(path: Path) -> Iterator[Finding]:
@@ -95,16 +101,16 @@ def _database(path: Path) -> Iterator[Finding]:
         current = revision == newest
         yield Finding(
             what="schema",
-            verdict="ok" if current else "note",
+            verdict=Verdict.OK if current else Verdict.NOTE,
             detail=revision or "none" if current else f"{revision}: the next start migrates it",
         )
     except StartError as error:
-        yield Finding(what="schema", verdict="fault", detail=str(error))
+        yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
     missing = sorted(set(ENGINE_TABLES) - files.tables(path))
     yield _finding("job engine", missing, "its tables are there", "missing: ")
     shrinks = files.shrinks(path)
     detail = "unused space is given back" if shrinks else "the file cannot shrink until a start"
-    yield Finding(what="shrinking", verdict="ok" if shrinks else "note", detail=detail)
+    yield Finding(what="shrinking", verdict=Verdict.OK if shrinks else Verdict.NOTE, detail=detail)
 
 
 def _weights(settings: Settings) -> Iterator[Finding]:
@@ -124,7 +130,7 @@ def _weights(settings: Settings) -> Iterator[Finding]:
     detail = f"{len(unused)} files that no model names; retention deletes them"
     yield Finding(
         what="unused weights",
-        verdict="note" if unused else "ok",
+        verdict=Verdict.NOTE if unused else Verdict.OK,
         detail=detail if unused else "none",
     )
 
@@ -148,12 +154,12 @@ def _key(settings: Settings, path: Path) -> Finding:
         if sealed:
             require_openable(sealer_of(settings), secrets)
     except StartError as error:
-        return Finding(what="key", verdict="fault", detail=str(error))
+        return Finding(what="key", verdict=Verdict.FAULT, detail=str(error))
     plain = len(secrets) - len(sealed)
     if plain:
         detail = f"{plain} secrets in plain text: the next start seals them"
-        return Finding(what="key", verdict="note", detail=detail)
-    return Finding(what="key", verdict="ok", detail=f"opens {len(sealed)} secrets")
+        return Finding(what="key", verdict=Verdict.NOTE, detail=detail)
+    return Finding(what="key", verdict=Verdict.OK, detail=f"opens {len(sealed)} secrets")
 
 
 def _modes(folder: Path) -> Finding:
@@ -165,7 +171,7 @@ def _modes(folder: Path) -> Finding:
     detail = f"others may read {', '.join(wide[:5])}; the next start changes what is ours"
     return Finding(
         what="modes",
-        verdict="note" if wide else "ok",
+        verdict=Verdict.NOTE if wide else Verdict.OK,
         detail=detail if wide else "all is its user's alone",
     )
 
@@ -177,7 +183,7 @@ def _space(settings: Settings) -> Finding:
     detail = f"{megabytes(free)} free"
     if few:
         detail += f"; a migration or backup needs about {megabytes(int(wanted))}"
-    return Finding(what="space", verdict="note" if few else "ok", detail=detail)
+    return Finding(what="space", verdict=Verdict.NOTE if few else Verdict.OK, detail=detail)
 
 
 def _left_over(folder: Path) -> Finding:
@@ -188,17 +194,17 @@ def _left_over(folder: Path) -> Finding:
     )
     if (folder / READY).exists():
         detail = "a restore was cut off; the next start ends it"
-        return Finding(what="left over", verdict="note", detail=detail)
+        return Finding(what="left over", verdict=Verdict.NOTE, detail=detail)
     found += strangers_in(folder)
     return Finding(
         what="left over",
-        verdict="note" if found else "ok",
+        verdict=Verdict.NOTE if found else Verdict.OK,
         detail=f"not in use: {', '.join(found[:5])}" if found else "nothing",
     )
 
 
 def _finding(what: str, wrong: list[str], well: str, before: str = "") -> Finding:
     if not wrong:
-        return Finding(what=what, verdict="ok", detail=well)
+        return Finding(what=what, verdict=Verdict.OK, detail=well)
     more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
-    return Finding(what=what, verdict="fault", detail=f"{before}{'; '.join(wrong[:3])}{more}")
+    return Finding(what=what, verdict=Verdict.FAULT, detail=f"{before}{'; '.join(wrong[:3])}{more}")

@@ -7,7 +7,8 @@ Times and numbers are annotations.
 
 from typing import Any
 
-SEVERITIES = ("warning", "critical")
+from service.kinds import Severity
+
 _TEST_LASTS = "This is a test of surefoot; it ends by itself."
 
 
@@ -25,7 +26,7 @@ def postable_alerts(
     alert = _postable(body, body["severity"], public_url)
     if not changed:
         return [alert]
-    others = [severity for severity in SEVERITIES if severity != body["severity"]]
+    others = [severity for severity in Severity if severity != body["severity"]]
     return [alert, *(_postable(ended(body, at), severity, public_url) for severity in others)]
 
 

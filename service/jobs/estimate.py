@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from service.jobs.context import JobContext
 from service.jobs.predictions import predict_pending
+from service.reason_words import in_words
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather, weigh
 from service.recalibration.growth import grow, keep_growth, take_growth
@@ -66,7 +67,7 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
         said = lacks.said if finding is None else finding.lacks
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks="; ".join(said) or None)
+        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks=in_words(said) or None)
     _grow_unless_failed(context, camera_id, unpacked)
 
 

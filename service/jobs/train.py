@@ -7,6 +7,7 @@ from collections.abc import Callable
 from models.errors import CalibrationError
 from service.jobs.context import JobContext
 from service.jobs.training_child import Progress, Trained, TrainingDiedError, train_apart
+from service.kinds import TrainingState
 from service.recalibration.trainings import (
     TrainingAttempt,
     begin_training,
@@ -39,7 +40,7 @@ def run_training(context: JobContext, training_id: str) -> None:
             log.error("training_died", extra=fields)
             if not left:
                 with context.store.write() as session:
-                    end_training(session, attempt, "failed", str(error))
+                    end_training(session, attempt, TrainingState.FAILED, str(error))
 
 
 def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
@@ -54,7 +55,7 @@ def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
     except TrainingStoppedError:
         log.info("training_cancelled", extra=fields)
         with context.store.write() as session:
-            end_training(session, attempt, "cancelled")
+            end_training(session, attempt, TrainingState.CANCELLED)
         return
     except TrainingDiedError:
         raise
@@ -67,7 +68,7 @@ def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
             exc_info=None if foreseen else error,
         )
         with context.store.write() as session:
-            end_training(session, attempt, "failed", str(error) or repr(error))
+            end_training(session, attempt, TrainingState.FAILED, str(error) or repr(error))
         return
     with context.store.write() as session:
         publish_model(

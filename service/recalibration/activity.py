@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from service.kinds import Act, AlertKind, Outcome
 from service.store import activity
 from service.store.activity_tables import ActivityRecord
 from service.store.actor import actor_of
@@ -13,15 +14,15 @@ from service.store.actor import actor_of
 
 def note(
     session: Session,
-    what: str,
+    what: Act,
     *,
     by: str | None,
     via: str | None = None,
     camera_id: str | None = None,
     subject_id: str | None = None,
-    kind: str | None = None,
+    kind: AlertKind | None = None,
     until: datetime | None = None,
-    outcome: str | None = None,
+    outcome: Outcome | None = None,
     text: str | None = None,
     details: dict[str, Any] | None = None,
 ) -> None:
@@ -31,7 +32,7 @@ def note(
 
     Args:
         session: of the deed itself: what is rolled back was not done.
-        what: a subject and a verb: `alert.resolved`, `token.added`.
+        what: was done.
         by: who; None where the service did it by itself, or nobody said a name.
         via: the id of the token that it was done with.
         camera_id: the camera, if it is about one; the entry stays when the camera goes.

@@ -8,6 +8,19 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError, NotFoundError
+from service.formats.degrees import in_degrees
+from service.kinds import (
+    Act,
+    AlertAct,
+    AlertKind,
+    AlertSource,
+    AlertState,
+    EventType,
+    MessageType,
+    Outcome,
+    Severity,
+)
+from service.reasons import Reasons
 from service.recalibration.activity import note as note_activity
 from service.recalibration.groups import group_with
 from service.recalibration.outbox import json_time, queue_alert
@@ -17,21 +30,35 @@ from service.store.activity_tables import ActivityRecord
 from service.store.alerts import AlertFilter
 from service.store.tables import AlertRecord
 
-# What an act of a person is told as.
-_CHANGES = {"acknowledged": "acknowledged", "silenced": "silenced", "silence_ended": "updated"}
+_KEPT_AS = {
+    AlertAct.OPENED: Act.ALERT_OPENED,
+    AlertAct.ESCALATED: Act.ALERT_ESCALATED,
+    AlertAct.ACKNOWLEDGED: Act.ALERT_ACKNOWLEDGED,
+    AlertAct.SILENCED: Act.ALERT_SILENCED,
+    AlertAct.SILENCE_ENDED: Act.ALERT_SILENCE_ENDED,
+    AlertAct.RESOLVED: Act.ALERT_RESOLVED,
+}
+# What an act is told as; that an alert grew is told with what made it grow.
+_TOLD_AS = {
+    AlertAct.OPENED: MessageType.ALERT_OPENED,
+    AlertAct.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
+    AlertAct.SILENCED: MessageType.ALERT_SILENCED,
+    AlertAct.SILENCE_ENDED: MessageType.ALERT_UPDATED,
+    AlertAct.RESOLVED: MessageType.ALERT_RESOLVED,
+}
 
 
 def open_alert(
     session: Session,
     settings: Settings,
     camera_id: str,
-    kind: str,
-    severity: str,
+    kind: AlertKind,
+    severity: Severity,
     drift: dict[str, Any],
     changed_at: datetime | None,
     *,
-    reason: str,
-    source: str = "estimate",
+    reasons: Reasons,
+    source: AlertSource = AlertSource.ESTIMATE,
 ) -> AlertRecord | None:
     """Open an alert, or bring the open one up to date; None where somebody is at the camera.
 
@@ -43,27 +70,27 @@ def open_alert(
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
     if record is not None:
-        if source == "reference":
+        if source == AlertSource.REFERENCE:
             return record
-        change = None
+        change: MessageType | None = None
         if record.severity != severity or record.source != source:
-            change = "updated"
-        if (record.severity, severity) == ("warning", "critical"):
-            _keep_act(session, record, "escalated", None)
+            change = MessageType.ALERT_UPDATED
+        if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
+            _keep_act(session, record, AlertAct.ESCALATED, None)
         record.drift, record.severity, record.updated_at = drift, severity, now
-        record.reason, record.source = reason, source
+        record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
     else:
-        change = "opened"
+        change = MessageType.ALERT_OPENED
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
             track_source=tracks.newest_source(session, camera_id),
             kind=kind,
-            state="firing",
+            state=AlertState.FIRING,
             source=source,
             severity=severity,
-            reason=reason,
+            reasons=reasons,
             drift=drift,
             told=False,
             opened_at=now,
@@ -72,24 +99,24 @@ def open_alert(
         )
         session.add(record)
         session.flush()
-        _keep_act(session, record, "opened", None)
+        _keep_act(session, record, AlertAct.OPENED, None)
     group = group_with(session, settings, record)
     if group is not None:
-        _keep_act(session, group, "opened", None)
-        _tell(session, group, "opened")
+        _keep_act(session, group, AlertAct.OPENED, None)
+        _tell(session, group, MessageType.ALERT_OPENED)
     if change is not None:
         _tell(session, record, change)
     return record
 
 
-def fired_by_estimate(session: Session, camera_id: str) -> set[str]:
+def fired_by_estimate(session: Session, camera_id: str) -> set[AlertKind]:
     """The kinds of a camera's open alerts that its estimates stand behind."""
     found = (alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
-    return {record.kind for record in found if record and record.source == "estimate"}
+    return {record.kind for record in found if record and record.source == AlertSource.ESTIMATE}
 
 
 def end_alert(
-    session: Session, camera_id: str, kind: str, outcome: str, note: str | None = None
+    session: Session, camera_id: str, kind: AlertKind, outcome: Outcome, note: str | None = None
 ) -> None:
     """End the open alert of a camera and kind, if there is one."""
     record = alerts.firing(session, camera_id, kind)
@@ -98,7 +125,7 @@ def end_alert(
 
 
 def close_pose_alerts(
-    session: Session, camera_id: str, outcome: str, by: str | None, note: str | None = None
+    session: Session, camera_id: str, outcome: Outcome, by: str | None, note: str | None = None
 ) -> None:
     """End the open alerts that measure a camera against its prior pose, if there are any."""
     for kind in alerts.POSE_KINDS:
@@ -108,7 +135,7 @@ def close_pose_alerts(
 
 
 def close_alert(
-    session: Session, record: AlertRecord, outcome: str, note: str | None, by: str | None
+    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
 ) -> None:
     """End an open alert with what a person says came of it."""
     _end(session, record, outcome, note, by)
@@ -117,7 +144,7 @@ def close_alert(
 def end_empty_groups(session: Session) -> None:
     """End groups whose members are gone with their cameras."""
     for group in alerts.groups_without_members(session):
-        _end(session, group, "cleared", None, None)
+        _end(session, group, Outcome.CLEARED, None, None)
 
 
 def list_alerts(session: Session, wanted: AlertFilter, limit: int) -> Sequence[AlertRecord]:
@@ -140,7 +167,7 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
 def acts_of(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
     """What was done with an alert since it opened, oldest first."""
     entries = activity.of_subject(session, alert_id)
-    return [entry for entry in entries if entry.what != "alert.opened"]
+    return [entry for entry in entries if entry.what != Act.ALERT_OPENED]
 
 
 def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
@@ -154,7 +181,7 @@ def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertR
     if record.acknowledged_at is None:
         record.acknowledged_by = by or "someone"
         record.acknowledged_at = datetime.now(UTC)
-        note_act(session, record, "acknowledged", record.acknowledged_by)
+        note_act(session, record, AlertAct.ACKNOWLEDGED, record.acknowledged_by)
     return record
 
 
@@ -166,7 +193,7 @@ def require_firing(session: Session, alert_id: str) -> AlertRecord:
         ConflictError: it is resolved.
     """
     record = show_alert(session, alert_id)
-    if record.state != "firing":
+    if record.state != AlertState.FIRING:
         raise ConflictError(f"state: only a firing alert takes this, it is {record.state}")
     return record
 
@@ -174,7 +201,7 @@ def require_firing(session: Session, alert_id: str) -> AlertRecord:
 def note_act(
     session: Session,
     record: AlertRecord,
-    act: str,
+    act: AlertAct,
     by: str | None,
     *,
     until: datetime | None = None,
@@ -183,37 +210,38 @@ def note_act(
     """Keep what was done with an open alert, and tell of it."""
     record.updated_at = datetime.now(UTC)
     _keep_act(session, record, act, by, until=until, note=note)
-    _tell(session, record, _CHANGES[act])
+    _tell(session, record, _TOLD_AS[act])
 
 
 def _end(
-    session: Session, record: AlertRecord, outcome: str, note: str | None, by: str | None
+    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
 ) -> None:
     now = datetime.now(UTC)
-    record.state, record.outcome, record.note, record.resolved_by = "resolved", outcome, note, by
+    record.state, record.outcome = AlertState.RESOLVED, outcome
+    record.note, record.resolved_by = note, by
     record.resolved_at = record.updated_at = now
-    _keep_act(session, record, "resolved", by, outcome=outcome, note=note)
+    _keep_act(session, record, AlertAct.RESOLVED, by, outcome=outcome, note=note)
     session.flush()
-    _tell(session, record, "resolved")
+    _tell(session, record, MessageType.ALERT_RESOLVED)
     group = None if record.group_id is None else alerts.find(session, record.group_id)
     over = group is not None and not alerts.firing_members(session, group.id)
-    if group is not None and group.state == "firing" and over:
+    if group is not None and group.state == AlertState.FIRING and over:
         _end(session, group, outcome, note, by)
 
 
 def _keep_act(
     session: Session,
     record: AlertRecord,
-    act: str,
+    act: AlertAct,
     by: str | None,
     *,
     until: datetime | None = None,
-    outcome: str | None = None,
+    outcome: Outcome | None = None,
     note: str | None = None,
 ) -> None:
     note_activity(
         session,
-        f"alert.{act}",
+        _KEPT_AS[act],
         by=by,
         camera_id=record.camera_id,
         subject_id=record.id,
@@ -221,14 +249,18 @@ def _keep_act(
         until=until,
         outcome=outcome,
         text=note,
-        details={"severity": record.severity, "reason": record.reason},
+        details={
+            "severity": record.severity,
+            "reason": record.reason,
+            "reason_code": record.reason_code,
+        },
     )
 
 
-def _tell(session: Session, record: AlertRecord, change: str) -> None:
-    """Tell of a change: opened, updated, acknowledged, silenced, resolved."""
+def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
+    """Tell of a change to an alert."""
     # A group speaks for its members; the end of one that was told by itself is told so, too.
-    if record.group_id is not None and not (record.told and record.state == "resolved"):
+    if record.group_id is not None and not (record.told and record.state == AlertState.RESOLVED):
         return
     record.told = True
     payload = {
@@ -238,7 +270,9 @@ def _tell(session: Session, record: AlertRecord, change: str) -> None:
         "state": record.state,
         "severity": record.severity,
         "reason": record.reason,
-        "drift": record.drift,
+        "reason_code": record.reason_code,
+        "reason_values": record.reason_values,
+        "drift": in_degrees(record.drift),
         "outcome": record.outcome,
         "acknowledged_by": record.acknowledged_by,
         "silenced_until": record.silenced_until and json_time(record.silenced_until),
@@ -248,5 +282,5 @@ def _tell(session: Session, record: AlertRecord, change: str) -> None:
         "camera_ids": record.camera_ids,
         "group_id": record.group_id,
     }
-    events.add(session, "alert", payload, datetime.now(UTC))
-    queue_alert(session, record, change)
+    events.add(session, EventType.ALERT, payload, datetime.now(UTC))
+    queue_alert(session, record, message)

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.misplacement import Misplacement, misplacements
 from models.trajectory import Trajectory
+from service.kinds import AlertState
 from service.recalibration.alerts import list_alerts
 from service.recalibration.cameras import CameraView, view_camera
 from service.recalibration.deeds import Deed, deeds_of
@@ -73,7 +74,7 @@ class CameraPage:
     @property
     def past(self) -> tuple[AlertStory, ...]:
         """The alerts that have ended."""
-        return tuple(story for story in self.alerts if story.record.state != "firing")
+        return tuple(story for story in self.alerts if story.record.state != AlertState.FIRING)
 
     @property
     def attended(self) -> MaintenanceRecord | None:
@@ -94,7 +95,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     camera = view_camera(session, camera_id)
     pose = view_pose(session, settings, camera_id)
     estimate = pose.estimate
-    ended = AlertFilter(state="resolved", camera_id=camera_id)
+    ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
     found = [*pose.standing.alerts, *list_alerts(session, ended, _ALERTS)]
     windows = maintenance.of_camera(session, camera_id)
     over = sum(window.until <= now for window in windows)

@@ -9,24 +9,21 @@ from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal
 
 from sqlalchemy.orm import Session
 
+from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.recalibration.attendance import Attendance, attendance_by
 from service.recalibration.outbox import is_silenced
 from service.recalibration.presence import is_no_data
 from service.recalibration.references import made_against
 from service.recalibration.rhythms import unpacked
 from service.settings import Settings
-from service.store import estimates, figures, fleet
+from service.store import figures, fleet
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord, SiteReferenceRecord
 
-PoseState = Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
-# Since what a camera waits for people to tell how it stands.
-Cause = Literal["reference", "maintenance", "put_back", "false_alarm"]
-_MOVED: dict[str, PoseState] = {"drifting": "drifting", "out_of_range": "out_of_range"}
+MOVED = (PoseState.DRIFTING, PoseState.OUT_OF_RANGE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,12 +83,15 @@ def standings(
     firing: dict[str, list[AlertRecord]] = defaultdict(list)
     for alert in fleet.firing(session, ids):
         firing[str(alert.camera_id)].append(alert)
+    held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
+    untold = [i for i in held if i in newest and not newest[i].told]
+    told_before = figures.newest_told_estimates(session, untold) if untold else {}
     found = {}
     for camera_id, last_s in ended_s.items():
         known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
         last_told = newest.get(camera_id)
-        if _holds(firing[camera_id]) and last_told is not None and not last_told.told:
-            last_told = estimates.newest_told(session, camera_id)
+        if camera_id in untold:
+            last_told = told_before.get(camera_id)
         facts = CameraFacts(
             reference=references[camera_id],
             estimate=newest.get(camera_id),
@@ -116,17 +116,18 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
     state: PoseState
     if holding:
         estimate = estimate if judged else facts.last_told
-        drifts = any(alert.kind != "out_of_range" for alert in holding)
-        state = "drifting" if drifts else "out_of_range"
-        state = state if estimate is None else _MOVED.get(estimate.state, state)
-    elif reference.ready_at is None or (not judged and cause != "false_alarm"):
-        state = "learning"
+        drifts = any(alert.kind != AlertKind.OUT_OF_RANGE for alert in holding)
+        state = PoseState.DRIFTING if drifts else PoseState.OUT_OF_RANGE
+        if estimate is not None and estimate.state in MOVED:
+            state = estimate.state
+    elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
+        state = PoseState.LEARNING
     elif facts.silent:
-        state = "no_data"
+        state = PoseState.NO_DATA
     elif judged and estimate is not None:
-        state = "learning" if estimate.state == "learning" else _MOVED.get(estimate.state, "ok")
+        state = estimate.state
     else:
-        state = "ok"
+        state = PoseState.OK
     return Standing(
         camera_id=reference.camera_id,
         state=state,
@@ -144,7 +145,9 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
 
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
     """The alerts that say that a camera has moved, as estimates found."""
-    return [each for each in alerts if each.kind in POSE_KINDS and each.source == "estimate"]
+    return [
+        each for each in alerts if each.kind in POSE_KINDS and each.source == AlertSource.ESTIMATE
+    ]
 
 
 def _counting(facts: CameraFacts, now: datetime) -> EstimateRecord | None:
@@ -167,15 +170,17 @@ def _cause(reference: SiteReferenceRecord, attended: Attendance, now: datetime) 
     left_s = attended.free_since_s(now)
     if reference.answer is not None and reference.answered_at is not None:
         if left_s is not None and left_s > reference.answered_at.timestamp():
-            return "maintenance"
-        return "false_alarm" if reference.answer == "false_alarm" else "put_back"
+            return Cause.MAINTENANCE
+        if reference.answer == Answer.FALSE_ALARM:
+            return Cause.FALSE_ALARM
+        return Cause.PUT_BACK
     if left_s is not None and left_s > max(reference.from_s or 0.0, reference.to_s or 0.0):
-        return "maintenance"
-    return "put_back" if reference.origin == "put_back" else "reference"
+        return Cause.MAINTENANCE
+    return Cause.PUT_BACK if reference.origin == Origin.PUT_BACK else Cause.REFERENCE
 
 
 def _urgency(alert: AlertRecord, now: datetime) -> tuple[bool, bool, datetime]:
-    return not waits(alert, now), alert.severity != "critical", alert_since(alert)
+    return not waits(alert, now), alert.severity != Severity.CRITICAL, alert_since(alert)
 
 
 def waits(alert: AlertRecord, now: datetime) -> bool:
@@ -194,8 +199,8 @@ def _since(
     reference = facts.reference
     if alerts:
         return alert_since(alerts[0])
-    if state == "no_data" and facts.last_track_s is not None:
+    if state == PoseState.NO_DATA and facts.last_track_s is not None:
         return datetime.fromtimestamp(facts.last_track_s, UTC)
-    if cause in ("put_back", "false_alarm") and reference.answered_at is not None:
+    if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
         return reference.answered_at
     return reference.created_at if reference.ready_at is None else reference.ready_at

@@ -15,6 +15,7 @@ from service.errors import (
     TooManyCamerasError,
 )
 from service.job_queue import JobQueue
+from service.kinds import Act, AlertState, Origin, Outcome
 from service.recalibration.activity import note
 from service.recalibration.alerts import close_pose_alerts, end_alert, list_alerts
 from service.recalibration.references import begin_reference
@@ -106,10 +107,10 @@ def register_camera(
     _set_intrinsics(record, spec.intrinsics)
     session.add(record)
     session.flush()
-    add_prior_pose(session, camera_id, spec.prior_pose, "registered", None)
-    begin_reference(session, camera_id, "registered", from_s=None)
+    add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
+    begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
     queue_training(session, queue, settings, camera_id)
-    note(session, "camera.registered", by=None, camera_id=camera_id)
+    note(session, Act.CAMERA_REGISTERED, by=None, camera_id=camera_id)
     return view_camera(session, camera_id)
 
 
@@ -163,17 +164,17 @@ def change_camera(
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
-            close_pose_alerts(session, camera_id, "accepted", name_in(session, None))
+            close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, None))
         # Tracks seen so far may be of another pose or lens, but not of other people.
         from_s = references.newest(session, camera_id).from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
         pose = change.prior_pose or view.prior_pose
         renew_prior_pose(
-            session, queue, settings, camera_id, pose, "changed", from_s=from_s, by=None
+            session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
         )
     fields = [field for field in change.__slots__ if getattr(change, field) is not None]
-    note(session, "camera.changed", by=None, camera_id=camera_id, details={"fields": fields})
+    note(session, Act.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
     session.flush()
     return view_camera(session, camera_id)
 
@@ -187,10 +188,12 @@ def remove_camera(session: Session, camera_id: str, etag: str) -> None:
     """
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
-    for alert in list_alerts(session, AlertFilter(state="firing", camera_id=camera_id), _MANY):
-        end_alert(session, camera_id, alert.kind, "camera_removed")
+    for alert in list_alerts(
+        session, AlertFilter(state=AlertState.FIRING, camera_id=camera_id), _MANY
+    ):
+        end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
     details = {"name": view.record.name}
-    note(session, "camera.removed", by=None, camera_id=camera_id, details=details)
+    note(session, Act.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
     session.delete(view.record)
 
 
@@ -212,7 +215,7 @@ def renew_prior_pose(
     settings: Settings,
     camera_id: str,
     pose: CameraPose,
-    origin: str,
+    origin: Origin,
     *,
     from_s: float | None,
     by: str | None,
@@ -229,7 +232,7 @@ def renew_prior_pose(
 
 
 def add_prior_pose(
-    session: Session, camera_id: str, pose: CameraPose, origin: str, by: str | None
+    session: Session, camera_id: str, pose: CameraPose, origin: Origin, by: str | None
 ) -> None:
     """Make a pose the prior pose; the earlier ones stay as history."""
     session.add(

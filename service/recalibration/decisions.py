@@ -3,12 +3,11 @@
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
 
-from typing import Literal
-
 from sqlalchemy.orm import Session
 
 from service.errors import ConflictError
 from service.job_queue import JobQueue
+from service.kinds import Act, AlertState, Answer, Origin, Outcome
 from service.recalibration.activity import note as note_activity
 from service.recalibration.alerts import close_alert, close_pose_alerts, require_firing
 from service.recalibration.cameras import renew_prior_pose, require_camera
@@ -18,8 +17,6 @@ from service.recalibration.trainings import request_estimate
 from service.settings import Settings
 from service.store import alerts, tracks
 from service.store.tables import AlertRecord
-
-Outcome = Literal["put_back", "accepted", "false_alarm"]
 
 
 def accept_pose(
@@ -39,11 +36,11 @@ def accept_pose(
     view = view_pose(session, settings, camera_id)
     if not view.told:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
-    close_pose_alerts(session, camera_id, "accepted", by, note)
-    note_activity(session, "pose.accepted", by=by, camera_id=camera_id, text=note)
+    close_pose_alerts(session, camera_id, Outcome.ACCEPTED, by, note)
+    note_activity(session, Act.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)
     from_s = tracks.newest_end_s(session, camera_id)
     renew_prior_pose(
-        session, queue, settings, camera_id, view.pose, "accepted", from_s=from_s, by=by
+        session, queue, settings, camera_id, view.pose, Origin.ACCEPTED, from_s=from_s, by=by
     )
     return view_pose(session, settings, camera_id)
 
@@ -62,7 +59,7 @@ def put_back(
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    _answer(session, queue, camera_id, "put_back", by, note)
+    _answer(session, queue, camera_id, Answer.PUT_BACK, by, note)
     return view_pose(session, settings, camera_id)
 
 
@@ -80,10 +77,10 @@ def learn_anew(
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    close_pose_alerts(session, camera_id, "put_back", by, note)
-    note_activity(session, "reference.reset", by=by, camera_id=camera_id, text=note)
+    close_pose_alerts(session, camera_id, Outcome.PUT_BACK, by, note)
+    note_activity(session, Act.REFERENCE_RESET, by=by, camera_id=camera_id, text=note)
     from_s = tracks.newest_end_s(session, camera_id)
-    begin_reference(session, camera_id, "reset", from_s=from_s, by=by)
+    begin_reference(session, camera_id, Origin.RESET, from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)
     return view_pose(session, settings, camera_id)
 
@@ -93,7 +90,7 @@ def resolve_alert(
     queue: JobQueue,
     settings: Settings,
     alert_id: str,
-    outcome: Outcome,
+    answer: Answer,
     note: str | None,
     by: str | None,
 ) -> AlertRecord:
@@ -108,8 +105,8 @@ def resolve_alert(
     """
     record = require_firing(session, alert_id)
     for each in (*alerts.firing_members(session, record.id), record):
-        if each.state == "firing":
-            _resolve(session, queue, settings, each, outcome, note, by)
+        if each.state == AlertState.FIRING:
+            _resolve(session, queue, settings, each, answer, note, by)
     return record
 
 
@@ -118,28 +115,29 @@ def _resolve(
     queue: JobQueue,
     settings: Settings,
     record: AlertRecord,
-    outcome: Outcome,
+    answer: Answer,
     note: str | None,
     by: str | None,
 ) -> None:
     if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
-        close_alert(session, record, outcome, note, by)
-    elif outcome == "accepted":
+        close_alert(session, record, Outcome(answer), note, by)
+    elif answer == Answer.ACCEPTED:
         accept_pose(session, queue, settings, record.camera_id, by, note)
     else:
-        _answer(session, queue, record.camera_id, outcome, by, note)
+        _answer(session, queue, record.camera_id, answer, by, note)
 
 
 def _answer(
     session: Session,
     queue: JobQueue,
     camera_id: str,
-    answer: Literal["put_back", "false_alarm"],
+    answer: Answer,
     by: str | None,
     note: str | None,
 ) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
-    close_pose_alerts(session, camera_id, answer, by, note)
-    note_activity(session, f"pose.{answer}", by=by, camera_id=camera_id, text=note)
+    close_pose_alerts(session, camera_id, Outcome(answer), by, note)
+    act = Act.POSE_PUT_BACK if answer == Answer.PUT_BACK else Act.POSE_FALSE_ALARM
+    note_activity(session, act, by=by, camera_id=camera_id, text=note)
     keep_answer(session, camera_id, answer, by)
     request_estimate(session, queue, camera_id)

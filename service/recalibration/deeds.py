@@ -5,6 +5,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
+from service.kinds import Act, AlertKind, Outcome
 from service.store import activity
 
 _MOST = 40
@@ -19,11 +20,11 @@ class Deed:
     """
 
     at: datetime
-    what: str
+    what: Act
     by: str | None
-    kind: str | None = None
+    kind: AlertKind | None = None
     until: datetime | None = None
-    outcome: str | None = None
+    outcome: Outcome | None = None
     note: str | None = None
 
 

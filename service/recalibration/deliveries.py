@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.delivery.send import Outcome
 from service.job_queue import JobQueue
+from service.kinds import DeliveryState, WebhookFormat
 from service.recalibration.messages import Message, all_firing, message_of
 from service.recalibration.outbox import wake
 from service.settings import Settings
@@ -89,7 +90,7 @@ def record_attempt(
     if outcome.ok:
         _succeeded(session, webhook, now)
         if not replayed:
-            _finish(delivery, "delivered", now)
+            _finish(delivery, DeliveryState.DELIVERED, now)
         return
     delay_s = _delay_s(settings, delivery.tries, outcome)
     _failed(settings, webhook, outcome, delay_s, now)
@@ -99,7 +100,7 @@ def record_attempt(
     delivery.next_attempt_at = now + timedelta(seconds=delay_s)
     patience = timedelta(hours=settings.webhook_patience_h)
     if outcome.status_code == GONE or delivery.next_attempt_at - delivery.queued_at > patience:
-        _finish(delivery, "failed", now)
+        _finish(delivery, DeliveryState.FAILED, now)
 
 
 def next_refresh(session: Session, settings: Settings, webhook_id: str) -> Refresh | None:
@@ -171,7 +172,7 @@ def _is_open(webhook: WebhookRecord, now: datetime) -> bool:
 
 
 def _needs_refresh(settings: Settings, webhook: WebhookRecord, now: datetime) -> bool:
-    if webhook.format != "alertmanager":
+    if webhook.format != WebhookFormat.ALERTMANAGER:
         return False
     every = timedelta(seconds=settings.alertmanager_refresh_s)
     # Either way: one of the future was before the clock was set back.
@@ -211,7 +212,7 @@ def _failed(
         )
 
 
-def _finish(delivery: DeliveryRecord, state: str, now: datetime) -> None:
+def _finish(delivery: DeliveryRecord, state: DeliveryState, now: datetime) -> None:
     delivery.state, delivery.finished_at, delivery.next_attempt_at = state, now, None
 
 

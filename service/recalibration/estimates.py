@@ -1,6 +1,5 @@
 """From what the tracks of a window come to, to a stored estimate, its alerts and its training."""
 
-import math
 from datetime import UTC, datetime
 from typing import Any
 
@@ -8,24 +7,29 @@ from sqlalchemy.orm import Session
 
 from models.drift.chart import CLOCK
 from models.drift.clock import clock_fault, may_be_clock
+from models.drift.said import reason_of_drift, reason_of_reading
 from models.drift.verdict import (
     Drift,
     DriftVerdict,
     judge,
     pose_after,
 )
-from models.estimation.numbers import ANGLES, NUMBERS
-from models.geometry.rotation import Array
+from models.estimation.numbers import NUMBERS
+from models.geometry.pose_parameters import PoseParameters
+from models.reasons import Reason
 from models.recalibration import drift_of
+from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
+from service.kinds import AlertKind, EventType, Outcome, PoseState, Severity
+from service.reasons import ServiceCode, some
 from service.recalibration.alerts import end_alert, fired_by_estimate, open_alert
 from service.recalibration.evidence import Evidence, Finding
 from service.recalibration.limits import drift_limits
 from service.recalibration.ranges import beyond_range, train_around
 from service.recalibration.references import is_overtaken, made_against
-from service.recalibration.words import FIELDS, describe_drift, describe_reading, shown
 from service.settings import Settings
 from service.store import cameras, estimates, events, references
+from service.store.packing import told_drift
 from service.store.tables import EstimateRecord, SiteReferenceRecord
 
 
@@ -49,7 +53,8 @@ def store_estimate(
     drift = drift_of(finding.fused, evidence.prior)
     if evidence.site is None:
         record = _record(reference, evidence, finding, drift, learning=True)
-        record.state, record.reason = "learning", "the reference is being learned"
+        record.state = PoseState.LEARNING
+        record.reasons = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
     else:
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)
@@ -58,9 +63,9 @@ def store_estimate(
         "camera_id": record.camera_id,
         "state": record.state,
         "tracks": record.tracks,
-        "drift": drift_body(drift) if record.told else None,
+        "drift": in_degrees(told_drift(drift)) if record.told else None,
     }
-    events.add(session, "pose", payload, record.created_at)
+    events.add(session, EventType.POSE, payload, record.created_at)
     return record
 
 
@@ -74,7 +79,7 @@ def _judge(
     drift: Drift,
     record: EstimateRecord,
 ) -> None:
-    """Set state, reason, drift and alerts of an estimate after the reference."""
+    """Set state, reasons, drift and alerts of an estimate after the reference."""
     if finding.change is not None:
         reference.window_from_s = finding.change.ended_s
         reference.changed_s = finding.change.started_s
@@ -85,7 +90,7 @@ def _judge(
     if last is not None and not made_against(reference, last):
         last = None
     drifted: tuple[str, ...] = ()
-    if firing & {"drift", "clock"}:
+    if firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
         # An alert of before this reference stands until what is seen after it ends it.
         before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
         drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
@@ -94,7 +99,7 @@ def _judge(
     limits = drift_limits(settings)
     camera = cameras.find(session, camera_id)
     assert camera is not None
-    clock = clock_fault(drift, camera.frame_rate_hz)
+    clock = clock_fault(drift, evidence.prior, camera.frame_rate_hz)
     reading = finding.reading
     if reading is not None and clock is None and not drifted and may_be_clock(reading):
         reading = None
@@ -103,28 +108,29 @@ def _judge(
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
     edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
-    record.state = "ok" if drift.told else "learning"
+    record.state = PoseState.OK if drift.told else PoseState.LEARNING
     if verdict.drifting:
-        record.state = "drifting"
-    words = [describe_drift(drift, verdict, limits)]
-    if clock is not None:
-        words.append(clock)
+        record.state = PoseState.DRIFTING
+    training = None
     if edge is not None:
-        record.state = "out_of_range"
+        record.state = PoseState.OUT_OF_RANGE
         training = train_around(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
-        words.append(f"{edge}; a training around the new estimate {training}")
-    if finding.reading is not None:
-        words.append(describe_reading(finding.reading))
-    words.append(finding.fused.reason)
-    if not set(NUMBERS) <= set(drift.told):
-        words.append(finding.joint.reason)
-    words.append(reference.doubt)
-    record.reason = "; ".join(word for word in (*words, *finding.lacks) if word)
+    record.reasons = some(
+        reason_of_drift(drift, verdict, limits),
+        clock,
+        edge,
+        training,
+        None if finding.reading is None else reason_of_reading(finding.reading),
+        finding.fused.reason,
+        None if set(NUMBERS) <= set(drift.told) else finding.joint.reason,
+        *reference.doubts,
+        *finding.lacks,
+    )
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.number == CLOCK:
-        clock = describe_reading(reading)
+        clock = reason_of_reading(reading)
     _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 
 
@@ -136,31 +142,34 @@ def _alert(
     verdict: DriftVerdict,
     *,
     charted: bool,
-    clock: str | None,
-    edge: str | None,
+    clock: Reason | None,
+    edge: Reason | None,
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     camera_id = record.camera_id
     firing = fired_by_estimate(session, camera_id)
-    body = drift_body(drift)
-    severity = "critical" if verdict.excess >= 2 else "warning"
+    body = told_drift(drift)
+    severity = Severity.CRITICAL if verdict.excess >= 2 else Severity.WARNING
     since = record.drift_since
     if edge is not None:
-        open_alert(session, settings, camera_id, "out_of_range", severity, body, since, reason=edge)
-    elif "out_of_range" in firing:
-        end_alert(session, camera_id, "out_of_range", "cleared")
+        kind = AlertKind.OUT_OF_RANGE
+        open_alert(session, settings, camera_id, kind, severity, body, since, reasons=(edge,))
+    elif AlertKind.OUT_OF_RANGE in firing:
+        end_alert(session, camera_id, AlertKind.OUT_OF_RANGE, Outcome.CLEARED)
     if not verdict.drifting:
-        for kind in firing & {"drift", "clock"}:
-            end_alert(session, camera_id, kind, "cleared")
+        for kind in firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
+            end_alert(session, camera_id, kind, Outcome.CLEARED)
         return
     # What was named a clock fault stays one until an angle has drifted too.
-    is_clock = clock is not None or ("clock" in firing and verdict.drifted == ("height",))
-    kind, other = ("clock", "drift") if is_clock else ("drift", "clock")
+    is_clock = clock is not None or (AlertKind.CLOCK in firing and verdict.drifted == ("height",))
+    kind, other = AlertKind.DRIFT, AlertKind.CLOCK
+    if is_clock:
+        kind, other = other, kind
     if other in firing:
-        end_alert(session, camera_id, other, "cleared", note=f"it is told as {kind} now")
+        end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
     if drift.told or charted:
-        reason = clock or record.reason
-        open_alert(session, settings, camera_id, kind, severity, body, since, reason=reason)
+        reasons = record.reasons if clock is None else (clock,)
+        open_alert(session, settings, camera_id, kind, severity, body, since, reasons=reasons)
 
 
 def _since(
@@ -200,18 +209,9 @@ def _record(
         prior_pose_id=reference.prior_pose_id,
         reference_id=reference.id,
         told=[] if learning else list(drift.told),
-        height_m=pose.height_m,
-        tilt_rad=pose.tilt_rad,
-        roll_rad=pose.roll_rad,
-        heading_rad=pose.heading_rad,
-        height_sd_m=drift.height_sd_m,
-        tilt_sd_rad=drift.tilt_sd_rad,
-        roll_sd_rad=drift.roll_sd_rad,
-        heading_sd_rad=drift.heading_sd_rad,
-        drift_height_m=drift.height_m,
-        drift_tilt_rad=drift.tilt_rad,
-        drift_roll_rad=drift.roll_rad,
-        drift_heading_rad=drift.heading_rad,
+        pose=PoseParameters.of_pose(pose),
+        pose_sd=drift.sd,
+        drift_by=drift.by,
         drift_angle_rad=drift.angle_rad,
         suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=0,
@@ -228,38 +228,18 @@ def _record(
 
 
 def _raw(finding: Finding) -> dict[str, Any]:
-    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw
-    raw = {"joint": {**_raw_numbers(joint.raw), "tracks": joint.walkers}}
+    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw_parameters
+    raw = {"joint": {**_without_heading(joint.raw_parameters), "tracks": joint.walkers}}
     if registered is not None:
         raw["registered"] = {
-            **_raw_numbers(registered),
-            "heading_deg": math.degrees(registered[3]),
+            **_without_heading(registered),
+            "heading_rad": registered.heading_rad,
             "tracks": joint.walkers,
         }
     if averaged is not None:
-        raw["averaged"] = {
-            "height_m": averaged.height_m,
-            "tilt_deg": math.degrees(averaged.tilt_rad),
-            "roll_deg": math.degrees(averaged.roll_rad),
-            "tracks": averaged.tracks,
-        }
+        raw["averaged"] = {**_without_heading(averaged.value), "tracks": averaged.tracks}
     return raw
 
 
-def _raw_numbers(numbers: Array) -> dict[str, float]:
-    tilt, roll, log_height = (float(number) for number in numbers[:3])
-    return {
-        "height_m": math.exp(log_height),
-        "tilt_deg": math.degrees(tilt),
-        "roll_deg": math.degrees(roll),
-    }
-
-
-def drift_body(drift: Drift) -> dict[str, float | None]:
-    """The told drift as JSON, as in the pose and its alerts."""
-    body: dict[str, float | None] = {
-        field: shown(name, drift.of(name)[0]) if name in drift.told else None
-        for name, field in FIELDS.items()
-    }
-    turned = set(ANGLES) & set(drift.told)
-    return {**body, "angle_deg": math.degrees(drift.angle_rad) if turned else None}
+def _without_heading(found: PoseParameters) -> dict[str, float]:
+    return {"height_m": found.height_m, "tilt_rad": found.tilt_rad, "roll_rad": found.roll_rad}

@@ -34,6 +34,8 @@ from models.recalibration import (
 )
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.kinds import AlertKind
+from service.reasons import Reasons
 from service.recalibration.alerts import fired_by_estimate
 from service.recalibration.lacks import Lacks
 from service.recalibration.limits import drift_limits
@@ -106,7 +108,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
-    lacks: tuple[str, ...] = ()
+    lacks: Reasons = ()
 
     @property
     def newest_pk(self) -> int:
@@ -159,7 +161,7 @@ def gather(
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
         limits=drift_limits(settings),
-        drifting=bool(fired_by_estimate(session, camera_id) & {"drift", "clock"}),
+        drifting=bool(fired_by_estimate(session, camera_id) & {AlertKind.DRIFT, AlertKind.CLOCK}),
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
     )

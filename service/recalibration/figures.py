@@ -5,7 +5,9 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.recalibration.camera_state import PoseState, Standing, standings
+from models.drift.verdict import Drift
+from service.kinds import AlertKind, PoseState, Severity, TrainingState
+from service.recalibration.camera_state import Standing, standings
 from service.recalibration.outbox import is_silenced
 from service.settings import Settings
 from service.store import cameras, events, figures, unseen, webhooks
@@ -13,13 +15,12 @@ from service.store import cameras, events, figures, unseen, webhooks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFigures:
-    """A camera: its state, its newest track, and those numbers of its drift that are told."""
+    """A camera: its state, its newest track and its drift, where there is an estimate."""
 
     camera_id: str
     state: PoseState
     last_track_s: float | None
-    drift_rad: dict[str, float]
-    drift_height_m: float | None
+    drift: Drift | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,8 +31,8 @@ class AlertFigures:
     """
 
     camera_id: str
-    kind: str
-    severity: str
+    kind: AlertKind
+    severity: Severity
     silenced: bool
     grouped: bool
 
@@ -59,7 +60,7 @@ class Figures:
     cameras: tuple[CameraFigures, ...]
     alerts: tuple[AlertFigures, ...]
     webhooks: tuple[WebhookFigures, ...]
-    trainings: dict[str, int]
+    trainings: dict[TrainingState, int]
     heartbeats_s: dict[str, float]
     worker_starts: dict[str, int]
     unseen_s: dict[str, float]
@@ -100,20 +101,15 @@ def take_figures(session: Session, settings: Settings) -> Figures:
 
 
 def _cameras(standing: dict[str, Standing]) -> tuple[CameraFigures, ...]:
-    found = []
-    for camera_id, each in standing.items():
-        estimate, angles = each.estimate, [name for name in each.told if name != "height"]
-        height = estimate is not None and "height" in each.told
-        found.append(
-            CameraFigures(
-                camera_id=camera_id,
-                state=each.state,
-                last_track_s=each.last_track_s,
-                drift_rad={name: getattr(estimate, f"drift_{name}_rad") for name in angles},
-                drift_height_m=estimate.drift_height_m if estimate and height else None,
-            )
+    return tuple(
+        CameraFigures(
+            camera_id=camera_id,
+            state=each.state,
+            last_track_s=each.last_track_s,
+            drift=None if each.estimate is None else each.estimate.drift,
         )
-    return tuple(found)
+        for camera_id, each in standing.items()
+    )
 
 
 def _webhooks(session: Session, now: datetime) -> tuple[WebhookFigures, ...]:

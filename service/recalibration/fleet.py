@@ -1,32 +1,32 @@
 """All cameras at a glance: what each does, and which of them need a person first."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.drift.verdict import Drift
+from service.kinds import AlertKind, PoseState, Severity, TrainingState
+from service.reasons import Reasons
 from service.recalibration.attendance import Attendance
-from service.recalibration.camera_state import PoseState, Standing, alert_since, standings
+from service.recalibration.camera_state import Standing, alert_since, standings
 from service.recalibration.limits import drift_limits
 from service.recalibration.outbox import is_silenced
-from service.recalibration.references import tracks_so_far, wanted_tracks
+from service.recalibration.references import wanted_tracks
 from service.settings import Settings
 from service.store import fleet
 from service.store.tables import AlertRecord, EstimateRecord, TrainingRecord
 
 _HISTORY = 24  # estimates of a sparkline
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FleetDrift:
-    """What is told of a camera's drift; a number that is not told, or not sure, is None."""
-
-    angle_rad: float | None
-    tilt_rad: float | None
-    roll_rad: float | None
-    heading_rad: float | None
-    height_m: float | None
+# How soon a camera without an alert needs a person.
+_RANKS = {
+    PoseState.DRIFTING: 2,
+    PoseState.OUT_OF_RANGE: 2,
+    PoseState.NO_DATA: 4,
+    PoseState.LEARNING: 6,
+    PoseState.OK: 7,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,9 +34,9 @@ class FleetAlert:
     """An alert that fires, as far as a row has room for it."""
 
     alert_id: str
-    kind: str
-    severity: str
-    reason: str
+    kind: AlertKind
+    severity: Severity
+    reasons: Reasons
     since: datetime
     acknowledged_by: str | None
     silenced_until: datetime | None
@@ -52,7 +52,7 @@ class FleetAlert:
 class FleetTraining:
     """A training that waits or is under way; `share` is how much of it is done."""
 
-    state: str
+    state: TrainingState
     share: float
 
 
@@ -61,8 +61,9 @@ class FleetCamera:
     """A camera in one line.
 
     `history` has the drift of its newest estimates in units of the limits, oldest first, None
-    where nothing was told. `learned` and `wanted` are people of the reference being learned.
-    `judged` says whether the drift is of how it stands now, and not only the last that is known.
+    where nothing was told. `drift` tells only what is sure. `learned` and `wanted` are people of
+    the reference being learned. `judged` says whether the drift is of how it stands now, and not
+    only the last that is known.
     """
 
     camera_id: str
@@ -71,11 +72,10 @@ class FleetCamera:
     judged: bool
     since: datetime
     last_track_s: float | None
-    drift: FleetDrift | None
+    drift: Drift | None
     history: tuple[float | None, ...]
     learned: int | None
     wanted: int
-    doubt: str
     alerts: tuple[FleetAlert, ...]
     training: FleetTraining | None
     attended_until: datetime | None
@@ -93,8 +93,8 @@ class FleetCamera:
         if self.alert is not None:
             if not self.alert.waits:
                 return 5 if self.alert.silenced_until else 3
-            return 0 if self.alert.severity == "critical" else 1
-        return {"drifting": 2, "out_of_range": 2, "no_data": 4, "learning": 6, "ok": 7}[self.state]
+            return 0 if self.alert.severity == Severity.CRITICAL else 1
+        return _RANKS[self.state]
 
     @property
     def order(self) -> tuple[int, float, str]:
@@ -120,7 +120,8 @@ def list_fleet(
     standing = standings(session, settings, ids)
     names = dict(fleet.names(session, ids))
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
-    counts = fleet.learning_counts(session, ids)
+    attended = {i: each.attended.spans for i, each in standing.items() if _learns(each)}
+    counts = fleet.learning_counts(session, ids, attended)
     trainings = fleet.unfinished_trainings(session, ids)
     found = [
         FleetCamera(
@@ -130,11 +131,10 @@ def list_fleet(
             judged=each.judged,
             since=each.since,
             last_track_s=each.last_track_s,
-            drift=_drift(each.estimate) if each.state != "learning" else None,
+            drift=_drift(each.estimate) if each.state != PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
-            learned=_learned(session, settings, each, counts),
+            learned=_learned(settings, each, counts),
             wanted=wanted_tracks(each.reference, settings),
-            doubt=each.reference.doubt,
             alerts=tuple(_alert(record, now) for record in each.alerts),
             training=_training(trainings.get(camera_id)),
             attended_until=_attended_until(each.attended, now),
@@ -166,7 +166,7 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
         alert_id=record.id,
         kind=record.kind,
         severity=record.severity,
-        reason=record.reason,
+        reasons=record.reasons,
         since=alert_since(record),
         acknowledged_by=record.acknowledged_by,
         silenced_until=record.silenced_until if is_silenced(record, now) else None,
@@ -174,40 +174,24 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
     )
 
 
-def _drift(estimate: EstimateRecord | None) -> FleetDrift | None:
-    """What is told and sure enough to be said: beyond 2 sd, or what has been found to drift."""
+def _drift(estimate: EstimateRecord | None) -> Drift | None:
+    """What is sure enough to be said: beyond 2 sd, or what has been found to drift."""
     if estimate is None or not estimate.told:
         return None
-    e = estimate
-    numbers = {
-        "tilt": (e.drift_tilt_rad, e.tilt_sd_rad),
-        "roll": (e.drift_roll_rad, e.roll_sd_rad),
-        "heading": (e.drift_heading_rad, e.heading_sd_rad or 0.0),
-        "height": (e.drift_height_m, e.height_sd_m),
-    }
-    sure = {
-        name: value
-        for name, (value, sd) in numbers.items()
-        if name in e.told and (name in e.drifted or abs(value) > 2 * sd)
-    }
-    return FleetDrift(
-        angle_rad=e.drift_angle_rad if set(sure) - {"height"} else None,
-        tilt_rad=sure.get("tilt"),
-        roll_rad=sure.get("roll"),
-        heading_rad=sure.get("heading"),
-        height_m=sure.get("height"),
-    )
+    drift, drifted = estimate.drift, estimate.drifted
+    said = {name: drift.of(name) for name in drift.told}
+    sure = [name for name, (by, sd) in said.items() if name in drifted or abs(by) > 2 * sd]
+    return replace(drift, told=tuple(sure))
 
 
-def _learned(
-    session: Session, settings: Settings, standing: Standing, counts: dict[str, int]
-) -> int | None:
-    reference = standing.reference
-    if reference.ready_at is not None:
+def _learns(standing: Standing) -> bool:
+    return standing.reference.ready_at is None
+
+
+def _learned(settings: Settings, standing: Standing, counts: dict[str, int]) -> int | None:
+    if not _learns(standing):
         return None
-    if standing.attended.spans:
-        return tracks_so_far(session, settings, reference)  # few, which need a statement each
-    return min(counts.get(reference.camera_id, 0), wanted_tracks(reference, settings))
+    return min(counts.get(standing.camera_id, 0), wanted_tracks(standing.reference, settings))
 
 
 def _training(record: TrainingRecord | None) -> FleetTraining | None:

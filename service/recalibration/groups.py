@@ -7,12 +7,18 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason
+from service.kinds import AlertKind, AlertSource, AlertState, Severity
+from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, tracks
 from service.store.tables import AlertRecord
 
 # What a group is called, and which alerts of cameras can have its cause.
-_CAUSES = {"clock": ("drift", "clock"), "no_data": ("no_data",)}
+_CAUSES = {
+    AlertKind.CLOCK: (AlertKind.DRIFT, AlertKind.CLOCK),
+    AlertKind.NO_DATA: (AlertKind.NO_DATA,),
+}
 _FED_WITHIN = timedelta(days=1)  # a camera without tracks for longer is no longer fed by its source
 
 
@@ -43,10 +49,10 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
             camera_ids=[],
             track_source=source,
             kind=kind,
-            state="firing",
-            source="group",
-            severity="critical",
-            reason="",
+            state=AlertState.FIRING,
+            source=AlertSource.GROUP,
+            severity=Severity.CRITICAL,
+            reasons=(),
             drift={},
             told=False,
             opened_at=now,
@@ -62,7 +68,7 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     began = [_began_at(member) for member in together]
     group.changed_at = min([*began, *([group.changed_at] if group.changed_at else [])])
     group.updated_at = now
-    group.reason = _reason(group)
+    group.reasons = (_reason(group),)
     session.flush()
     return group if opened else None
 
@@ -96,15 +102,8 @@ def _began_at(record: AlertRecord) -> datetime:
     return record.changed_at or record.opened_at
 
 
-def _reason(group: AlertRecord) -> str:
-    count, source = len(group.camera_ids or []), group.track_source
-    if group.kind == "no_data":
-        return (
-            f"{count} cameras of the tracker {source!r} fell silent together: the tracker, its "
-            "network or its clock is the likely cause, rather than each camera by itself"
-        )
-    return (
-        f"{count} cameras of the tracker {source!r} moved together: the tracker or its clock is "
-        "the likely cause, rather than each camera by itself; cameras that hang on one mast or "
-        "building would look the same"
-    )
+def _reason(group: AlertRecord) -> Reason:
+    silent = group.kind == AlertKind.NO_DATA
+    code = ServiceCode.FELL_SILENT_TOGETHER if silent else ServiceCode.MOVED_TOGETHER
+    count, source = len(group.camera_ids or []), group.track_source or ""
+    return Reason(code=code, values={"cameras": count, "track_source": source})

@@ -5,7 +5,9 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from models.errors import CheckpointError
+from models.reasons import Reason
 from models.recalibration import Lack
+from service.reasons import ServiceCode
 
 log = logging.getLogger("surefoot.recalibration")
 
@@ -13,11 +15,11 @@ _Made = TypeVar("_Made")
 
 
 class Lacks:
-    """What of a camera's estimate could not be made; `said` has it in words."""
+    """What of a camera's estimate could not be made; `said` has it as reasons."""
 
     def __init__(self, camera_id: str) -> None:
         self._camera_id = camera_id
-        self.said: list[str] = []
+        self.said: list[Reason] = []
 
     def unless_failed(self, what: str, make: Callable[[], _Made]) -> _Made | None:
         """What is made; None if it failed. `what` is of the log's event, `flow_map` say."""
@@ -41,6 +43,6 @@ class Lacks:
 
     def add(self, what: str, why: str) -> None:
         """Say that something is missing, and why."""
-        words = f"without the {what.replace('_', ' ')}: {why}"
-        if words not in self.said:
-            self.said.append(words)
+        reason = Reason(code=ServiceCode.WITHOUT_PART, values={"part": what, "why": why})
+        if reason not in self.said:
+            self.said.append(reason)

@@ -1,40 +1,40 @@
 """Learn a camera's reference once its tracks are there: a job's work, seconds of a core."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
 from models.errors import TooFewTrajectoriesError
-from models.estimation.averaged import (
-    FEWEST_TRACKS,
-    PoseEstimate,
-    TrackPredictions,
-    averaged_estimate,
-)
 from models.estimation.joint.packing import reference_to_bytes
 from models.estimation.joint.site import SiteReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.reasons import TracksCode
 from models.recalibration import learn_site, observe
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
+from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.reasons import some
 from service.recalibration.activity import note
 from service.recalibration.alerts import open_alert
 from service.recalibration.attendance import attendance_of
-from service.recalibration.evidence import as_predictions, walk_of
+from service.recalibration.evidence import walk_of
 from service.recalibration.paths import LearnedPaths, paths_of
 from service.recalibration.references import wanted_tracks
 from service.recalibration.unpacked import Unpacked
 from service.settings import Settings
-from service.store import cameras, maintenance, references, tracks, trainings
+from service.store import cameras, maintenance, references, tracks
 from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables import FlowMapRecord, PredictionRecord
+from service.store.tables import FlowMapRecord
 
-_DOUBT_KINDS = {"scale": "clock", "pose": "drift"}
+# What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
+_DOUBT_KINDS: dict[StrEnum, AlertKind] = {
+    TracksCode.SPEED_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.STATURE_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.PRIOR_POSE_DOUBTED: AlertKind.DRIFT,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,6 @@ class ReferencePeriod:
     walk: WalkConfig
     trajectories: tuple[Trajectory, ...]
     to_s: float
-    predictions: TrackPredictions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +55,6 @@ class LearnedReference:
 
     site: SiteReference
     paths: LearnedPaths | None
-    offsets: dict[str, Any]
 
 
 def take_period(
@@ -77,10 +75,6 @@ def take_period(
     if len(records) < wanted:
         return None
     intrinsics = intrinsics_of(camera)
-    model = trainings.newest_model(session, camera_id)
-    found: Sequence[PredictionRecord] = []
-    if model is not None:
-        found = tracks.predictions(session, model.id, [record.id for record in records])
     return ReferencePeriod(
         reference_id=reference.id,
         intrinsics=intrinsics,
@@ -88,7 +82,6 @@ def take_period(
         walk=walk_of(camera),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
         to_s=records[-1].ended_s,
-        predictions=as_predictions(found),
     )
 
 
@@ -99,11 +92,7 @@ def learn_period(period: ReferencePeriod, seed: int) -> LearnedReference | None:
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    offsets = {"joint": _joint_offset(site.speeds)}
-    if len(period.predictions) >= FEWEST_TRACKS:
-        estimate = averaged_estimate(period.predictions, seed)
-        offsets["averaged"] = _averaged_offset(estimate, period.prior)
-    return LearnedReference(site=site.speeds, paths=paths_of(site), offsets=offsets)
+    return LearnedReference(site=site.speeds, paths=paths_of(site))
 
 
 def keep_reference(
@@ -128,11 +117,10 @@ def keep_reference(
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
-    record.offsets = learned.offsets
-    record.doubt = site.doubt
+    record.doubts = some(site.doubt)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
-    note(session, "reference.learned", by=None, camera_id=camera_id, details=details)
+    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,
@@ -144,43 +132,15 @@ def keep_reference(
             learned_at=record.ready_at,
         )
     )
-    if site.doubt:
+    if site.doubt is not None:
         open_alert(
             session,
             settings,
             camera_id,
-            _DOUBT_KINDS[site.doubt_about],
-            "warning",
+            _DOUBT_KINDS[site.doubt.code],
+            Severity.WARNING,
             drift={},
             changed_at=None,
-            reason=site.doubt,
-            source="reference",
+            reasons=(site.doubt,),
+            source=AlertSource.REFERENCE,
         )
-
-
-def _joint_offset(site: SiteReference) -> dict[str, Any]:
-    tilt, roll, log_height = (float(number) for number in site.offset)
-    variances = [float(site.offset_covariance[k, k]) for k in range(3)]
-    return {
-        "tilt_deg": math.degrees(tilt),
-        "roll_deg": math.degrees(roll),
-        "log_height": log_height,
-        "sd": {
-            "tilt_deg": math.degrees(math.sqrt(variances[0])),
-            "roll_deg": math.degrees(math.sqrt(variances[1])),
-            "log_height": math.sqrt(variances[2]),
-        },
-    }
-
-
-def _averaged_offset(estimate: PoseEstimate, prior: CameraPose) -> dict[str, Any]:
-    return {
-        "tilt_deg": math.degrees(estimate.tilt_rad - prior.tilt_rad),
-        "roll_deg": math.degrees(math.remainder(estimate.roll_rad - prior.roll_rad, 2 * math.pi)),
-        "log_height": math.log(max(estimate.height_m, 1e-3) / prior.height_m),
-        "sd": {
-            "tilt_deg": math.degrees(estimate.tilt_sd_rad),
-            "roll_deg": math.degrees(estimate.roll_sd_rad),
-            "log_height": estimate.height_sd_m / max(estimate.height_m, 1e-3),
-        },
-    }

@@ -5,6 +5,8 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason
+from service.reason_words import in_words
 from service.recalibration.waiting import lies_ahead
 from service.store import cameras, tracks
 from service.store.tables import CameraRecord
@@ -75,11 +77,11 @@ def end_look(
         camera.estimate_lacks = lacks
 
 
-def note_lacks(session: Session, camera_id: str, said: Sequence[str]) -> None:
+def note_lacks(session: Session, camera_id: str, said: Sequence[Reason]) -> None:
     """Note what failed beside an estimate after that was stored."""
     camera = cameras.find(session, camera_id)
     if camera is not None:
-        camera.estimate_lacks = "; ".join((*filter(None, [camera.estimate_lacks]), *said))
+        camera.estimate_lacks = "; ".join((*filter(None, [camera.estimate_lacks]), in_words(said)))
 
 
 def fail_look(session: Session, camera_id: str, error: str) -> None:

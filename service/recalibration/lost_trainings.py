@@ -3,6 +3,7 @@
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
+from service.kinds import TrainingState
 from service.recalibration.trainings import finish
 from service.store import trainings
 
@@ -20,5 +21,7 @@ def requeue_lost(session: Session, queue: JobQueue, camera_id: str) -> bool:
             continue
         found = True
         if record.attempt >= _ATTEMPTS:
-            finish(session, record, "failed", f"given up after {record.attempt} attempts")
+            finish(
+                session, record, TrainingState.FAILED, f"given up after {record.attempt} attempts"
+            )
     return found

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.delivery.alertmanager import ended, postable_alerts, postable_test
 from service.delivery.signing import signed_headers
+from service.kinds import WebhookFormat
 from service.recalibration.keys import old_secret_of, secret_of
 from service.recalibration.outbox import alert_body, is_silenced, json_time
 from service.settings import Settings
@@ -33,7 +34,7 @@ def message_of(
     now: datetime,
 ) -> Message:
     """The request of a delivery: a signed one, or an Alertmanager's."""
-    if webhook.format == "alertmanager":
+    if webhook.format == WebhookFormat.ALERTMANAGER:
         return _to_alertmanager(webhook, _stands(session, settings, delivery, now))
     body = _json(delivery.payload)
     secrets = [secret_of(settings, webhook) or ""]

@@ -11,7 +11,9 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue, queue_of
+from service.kinds import DeliveryState, MessageType
 from service.store import webhooks
 from service.store.delivery_tables import DeliveryRecord, WebhookRecord
 from service.store.tables import AlertRecord
@@ -24,6 +26,8 @@ ALERT_FIELDS = (
     "state",
     "severity",
     "reason",
+    "reason_code",
+    "reason_values",
     "drift",
     "opened_at",
     "changed_at",
@@ -43,31 +47,31 @@ ALERT_FIELDS = (
 )
 ALERT_FLAGS = ("acknowledged", "silenced")
 # A silenced alert is quiet but for these.
-_TOLD_IN_SILENCE = ("silenced", "resolved")
+_TOLD_IN_SILENCE = (MessageType.ALERT_SILENCED, MessageType.ALERT_RESOLVED)
 _JOB_LOST = timedelta(seconds=30)
 
 
-def queue_alert(session: Session, record: AlertRecord, change: str) -> None:
+def queue_alert(session: Session, record: AlertRecord, message: MessageType) -> None:
     """Tell the webhooks that want it of a change to an alert.
 
     Args:
         session: of the change itself.
         record: the alert, changed.
-        change: opened, updated, acknowledged, silenced or resolved.
+        message: what is told of it.
     """
     now = datetime.now(UTC)
-    if is_silenced(record, now) and change not in _TOLD_IN_SILENCE:
+    if is_silenced(record, now) and message not in _TOLD_IN_SILENCE:
         return
     for webhook in webhooks.enabled(session):
         if webhook.kinds is None or record.kind in webhook.kinds:
             body = alert_body(record)
-            add_delivery(session, webhook, f"alert.{change}", body, now, alert_id=record.id)
+            add_delivery(session, webhook, message, body, now, alert_id=record.id)
 
 
 def add_delivery(
     session: Session,
     webhook: WebhookRecord,
-    type_: str,
+    type_: MessageType,
     data: dict[str, Any],
     now: datetime,
     *,
@@ -80,7 +84,7 @@ def add_delivery(
         alert_id=alert_id,
         type=type_,
         payload={"type": type_, "timestamp": json_time(now), "data": data},
-        state="pending",
+        state=DeliveryState.PENDING,
         attempts=0,
         tries=0,
         next_attempt_at=now,
@@ -104,6 +108,7 @@ def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetim
 def alert_body(record: AlertRecord) -> dict[str, Any]:
     """An alert as clients see it."""
     values = {name: getattr(record, name) for name in ALERT_FIELDS}
+    values["drift"] = in_degrees(record.drift)
     told = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()

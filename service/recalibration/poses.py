@@ -8,10 +8,13 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
-from service.recalibration.camera_state import PoseState, Standing, standings
+from service.kinds import PoseState
+from service.reason_words import in_words
+from service.reasons import Reasons
+from service.recalibration.camera_state import Standing, standings
 from service.recalibration.cameras import require_camera
 from service.recalibration.references import tracks_so_far
-from service.recalibration.state_words import reason_of
+from service.recalibration.state_words import reasons_of
 from service.settings import Settings
 from service.store import cameras, estimates, trainings
 from service.store.packing import intrinsics_of, pose_of_prior
@@ -34,7 +37,7 @@ class PoseView:
 
     camera_id: str
     standing: Standing
-    reason: str
+    reasons: Reasons
     pose: CameraPose
     reference: ReferenceView
     model_id: str | None
@@ -44,6 +47,11 @@ class PoseView:
     def state(self) -> PoseState:
         """How the camera stands, in a word."""
         return self.standing.state
+
+    @property
+    def reason(self) -> str:
+        """Why it stands so, in words."""
+        return in_words(self.reasons)
 
     @property
     def estimate(self) -> EstimateRecord | None:
@@ -66,16 +74,16 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     session.flush()
     standing = standings(session, settings, (camera_id,))[camera_id]
     model = trainings.newest_model(session, camera_id)
-    reason = reason_of(session, settings, standing)
+    reasons = reasons_of(session, settings, standing)
     pose = pose_of_prior(cameras.prior_pose(session, camera_id))
     estimate = standing.estimate
     if estimate is not None:
         pose = replace(
             pose,
-            height_m=estimate.height_m,
-            tilt_rad=estimate.tilt_rad,
-            roll_rad=estimate.roll_rad,
-            heading_rad=estimate.heading_rad,
+            height_m=estimate.pose.height_m,
+            tilt_rad=estimate.pose.tilt_rad,
+            roll_rad=estimate.pose.roll_rad,
+            heading_rad=estimate.pose.heading_rad,
         )
     record = standing.reference
     reference = ReferenceView(
@@ -88,11 +96,11 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of, the lens of `pose.yaml` too.
     lens = intrinsics_of(camera)
-    served = (standing.state, reason, pose, estimate_id, reference, model_id, lens)
+    served = (standing.state.value, in_words(reasons), pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
         standing=standing,
-        reason=reason,
+        reasons=reasons,
         pose=pose,
         reference=reference,
         model_id=model_id,

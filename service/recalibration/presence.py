@@ -6,7 +6,16 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.drift.rhythm import SilenceRule, expected_tracks, is_missed, judge_silence
+from models.drift.rhythm import (
+    SilenceRule,
+    SilenceVerdict,
+    expected_tracks,
+    is_missed,
+    judge_silence,
+)
+from models.reasons import Reason
+from service.kinds import AlertKind, AlertSource, Outcome, Severity
+from service.reasons import Reasons, ServiceCode
 from service.recalibration.alerts import end_alert, open_alert
 from service.recalibration.attendance import attendance_of
 from service.recalibration.rhythms import CameraRhythm, cells_of, rhythm_of
@@ -18,20 +27,24 @@ _LOOK_BACK_S = 3 * _HOUR_S  # the level of the day is told by these hours before
 _LONGEST_S = 28 * 24 * _HOUR_S
 _GAPS = 3.0  # so many usual gaps in a row are no usual one
 _STATE_BY_S = 6 * _HOUR_S  # a pose that nobody has confirmed for longer is not ok, however quiet
-_SEVERITIES = {"usual": None, "improbable": "warning", "too_long": "critical"}
+_SEVERITIES = {
+    SilenceVerdict.USUAL: None,
+    SilenceVerdict.IMPROBABLE: Severity.WARNING,
+    SilenceVerdict.TOO_LONG: Severity.CRITICAL,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Silence:
-    """How long a camera has been silent, whether that is `no_data`, and why, in words.
+    """How long a camera has been silent, whether that is `no_data`, and why.
 
     `severity` is that of the alert that it deserves; None where silence is usual by now.
     """
 
     last_s: float
     no_data: bool
-    reason: str
-    severity: str | None
+    reasons: Reasons
+    severity: Severity | None
 
 
 def silence_of(
@@ -64,27 +77,29 @@ def watch_presence(
     session: Session, settings: Settings, camera_id: str, now: datetime
 ) -> str | None:
     """Open or end the alert about a silent camera; says what it did."""
-    firing = alerts.firing(session, camera_id, "no_data")
+    firing = alerts.firing(session, camera_id, AlertKind.NO_DATA)
     if firing is not None:
         received_at = tracks.newest_received_at(session, camera_id)
         if received_at is not None and received_at > firing.opened_at:
-            end_alert(session, camera_id, "no_data", "cleared", note="tracks come again")
+            end_alert(
+                session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note="tracks come again"
+            )
             return "tracks come again"
     silence = silence_of(session, settings, camera_id, now)
     if silence is None or silence.severity is None:
         return None
-    if firing is not None and silence.severity in (firing.severity, "warning"):
+    if firing is not None and silence.severity in (firing.severity, Severity.WARNING):
         return None
     opened = open_alert(
         session,
         settings,
         camera_id,
-        "no_data",
+        AlertKind.NO_DATA,
         silence.severity,
         {},
         datetime.fromtimestamp(silence.last_s, UTC),
-        reason=silence.reason,
-        source="rhythm",
+        reasons=silence.reasons,
+        source=AlertSource.RHYTHM,
     )
     return None if opened is None else "no tracks come"
 
@@ -100,9 +115,13 @@ def _by_the_limit(
     return Silence(
         last_s=last_s,
         no_data=is_no_data(settings, None, last_s, now),
-        reason=f"the newest track ended {_hours(silent_s)} ago; "
-        f"up to {settings.no_data_after_h:g} h are waited for",
-        severity="warning" if now.timestamp() - begun_s > limit_s else None,
+        reasons=(
+            Reason(
+                code=ServiceCode.SILENT_UNKNOWN,
+                values={"silent_s": silent_s, "limit_s": limit_s},
+            ),
+        ),
+        severity=Severity.WARNING if now.timestamp() - begun_s > limit_s else None,
     )
 
 
@@ -119,7 +138,7 @@ def _by_rhythm(
     until_s = now_s - known.delay_s
     limit_s = settings.no_data_after_h * _HOUR_S
     from_s = max(last_s, until_s - _LONGEST_S)
-    missed, verdict = _expected(settings, known, from_s, until_s), "usual"
+    missed, verdict = _expected(settings, known, from_s, until_s), SilenceVerdict.USUAL
     if is_missed(rhythm, missed):  # at night, hundreds of cameras need no closer look
         from_s = max(from_s, _answered_s(session, camera_id, now))
         verdict = judge_silence(
@@ -135,17 +154,15 @@ def _by_rhythm(
             seen=tracks.count_ended(session, camera_id, last_s - _LOOK_BACK_S, last_s),
             expected=_expected(settings, known, last_s - _LOOK_BACK_S, last_s),
         )
-    words = f"no track for {_hours(now_s - last_s)}"
+    code, values = ServiceCode.SILENT_USUAL, {"silent_s": now_s - last_s}
     if is_missed(rhythm, missed):
-        words += f", where about {missed:.0f} are usual by now"
-    else:
-        words += ", as is usual at this hour"
+        code, values["missed_tracks"] = ServiceCode.SILENT_UNUSUAL, missed
     if known.delay_s > settings.no_data_min_s:
-        words += f"; its tracks come up to {_hours(known.delay_s)} late"
+        values["late_s"] = known.delay_s
     return Silence(
         last_s=last_s,
         no_data=is_no_data(settings, known, last_s, now),
-        reason=words,
+        reasons=(Reason(code=code, values=values),),
         severity=_SEVERITIES[verdict],
     )
 
@@ -160,7 +177,7 @@ def _expected(settings: Settings, known: CameraRhythm, from_s: float, to_s: floa
 def _answered_s(session: Session, camera_id: str, now: datetime) -> float:
     """Until when a silence has been explained: by maintenance, or by who ended its alert."""
     attended_s = attendance_of(session, camera_id, now).judged_from_s or 0.0
-    last = alerts.newest(session, camera_id, "no_data")
+    last = alerts.newest(session, camera_id, AlertKind.NO_DATA)
     if last is None or last.resolved_at is None:
         return attended_s
     return max(attended_s, last.resolved_at.timestamp())
@@ -169,7 +186,3 @@ def _answered_s(session: Session, camera_id: str, now: datetime) -> float:
 def _received_s(session: Session, camera_id: str) -> float:
     received_at = tracks.newest_received_at(session, camera_id)
     return 0.0 if received_at is None else received_at.timestamp()
-
-
-def _hours(seconds: float) -> str:
-    return f"{seconds / _HOUR_S:.1f} h"

@@ -7,21 +7,23 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import angle_between
+from models.reasons import Reason
 from service.job_queue import JobQueue
+from service.reasons import ServiceCode
 from service.recalibration.trainings import centre_of, queue_training
 from service.settings import Settings
 from service.store import trainings
+from service.store.tables import TrainingRecord
 
 _EDGE = 0.9  # of the training range: beyond, a regressor only knows "at least so much"
 _SAME_RAD = math.radians(5.0)
 _SAME_M = 1.0
-_ENDED = {"succeeded": "has ended", "failed": "has failed", "cancelled": "was cancelled"}
 
 
 def beyond_range(
     session: Session, camera_id: str, pose: CameraPose, told: tuple[str, ...]
-) -> str | None:
-    """In words, which told number is at the edge of what the model in use was trained for."""
+) -> Reason | None:
+    """Which told number is at the edge of what the model in use was trained for."""
     model = trainings.newest_model(session, camera_id)
     if model is None:
         return None
@@ -36,17 +38,17 @@ def beyond_range(
     }
     for name, (offset, reach) in offsets.items():
         if name in told and abs(offset) > _EDGE * reach:
-            return f"{name} is at the edge of the range that the model in use was trained for"
+            return Reason(code=ServiceCode.RANGE_EDGE, values={"number": name})
     return None
 
 
 def train_around(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, pose: CameraPose
-) -> str:
-    """Have a model trained around a pose, if none was; says in words what became of it."""
+) -> Reason:
+    """Have a model trained around a pose, if none was; says what became of it."""
     unfinished = trainings.unfinished(session, camera_id)
     if unfinished:
-        return f"is {unfinished[-1].state}"
+        return _around(unfinished[-1])
     newest = trainings.of_camera(session, camera_id, 1)
     if newest:
         centre = centre_of(session, newest[0])
@@ -54,5 +56,9 @@ def train_around(
         level = replace(pose, heading_rad=centre.heading_rad)
         apart = angle_between(centre.quaternion_wxyz, level.quaternion_wxyz)
         if apart <= _SAME_RAD and abs(centre.height_m - pose.height_m) <= _SAME_M:
-            return _ENDED[newest[0].state]
-    return f"is {queue_training(session, queue, settings, camera_id, around=pose).state}"
+            return _around(newest[0])
+    return _around(queue_training(session, queue, settings, camera_id, around=pose))
+
+
+def _around(training: TrainingRecord) -> Reason:
+    return Reason(code=ServiceCode.TRAINING_AROUND, values={"state": training.state})

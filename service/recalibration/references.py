@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from service.kinds import Answer, Origin
 from service.recalibration.attendance import Attendance, attendance_of
 from service.settings import Settings
 from service.store import cameras, estimates, references, tracks
@@ -18,7 +19,7 @@ FEWEST_WALKERS = 5
 def begin_reference(
     session: Session,
     camera_id: str,
-    origin: str,
+    origin: Origin,
     *,
     from_s: float | None,
     by: str | None = None,
@@ -42,7 +43,7 @@ def begin_reference(
         from_s=from_s,
         wanted=camera.reference_tracks,
         tracks=0,
-        doubt="",
+        doubts=(),
         created_at=datetime.now(UTC),
     )
     session.add(record)
@@ -79,7 +80,7 @@ def window_beside(
     )
 
 
-def keep_answer(session: Session, camera_id: str, answer: str, by: str | None) -> None:
+def keep_answer(session: Session, camera_id: str, answer: Answer, by: str | None) -> None:
     """Judge a camera by tracks that are yet to come: a person says that it is at its prior pose.
 
     Its reference holds, if there is one. One that is being learned begins anew once the camera was
@@ -87,8 +88,8 @@ def keep_answer(session: Session, camera_id: str, answer: str, by: str | None) -
     """
     reference = references.newest(session, camera_id)
     newest_s = tracks.newest_end_s(session, camera_id)
-    if answer == "put_back" and (reference.ready_at is None or reference.doubt):
-        begin_reference(session, camera_id, "put_back", from_s=newest_s, by=by)
+    if answer == Answer.PUT_BACK and (reference.ready_at is None or reference.doubts):
+        begin_reference(session, camera_id, Origin.PUT_BACK, from_s=newest_s, by=by)
     elif reference.ready_at is not None:
         if newest_s is not None:
             reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None

@@ -10,6 +10,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.drift.rhythm import Rhythm, delay_of, learn_rhythm
+from service.kinds import AlertKind, Outcome
 from service.settings import Settings
 from service.store import alerts, cameras, rhythms, tracks
 
@@ -60,8 +61,8 @@ def take_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals |
     rows = tracks.arrivals(session, camera_id, now - timedelta(days=_PAST_DAYS))
     outages = [
         ((record.changed_at or record.opened_at).timestamp(), record.resolved_at.timestamp())
-        for record in alerts.ended(session, camera_id, ("no_data",))
-        if record.resolved_at is not None and record.outcome != "false_alarm"
+        for record in alerts.ended(session, camera_id, (AlertKind.NO_DATA,))
+        if record.resolved_at is not None and record.outcome != Outcome.FALSE_ALARM
     ]
     return Arrivals(
         received_s=tuple(received_at.timestamp() for received_at, _ in rows),

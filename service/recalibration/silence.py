@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy.orm import Session
 
 from service.errors import FieldError, MalformedError
+from service.kinds import AlertAct
 from service.recalibration.alerts import note_act, require_firing
 from service.settings import Settings
 from service.store import alerts
@@ -37,7 +38,7 @@ def silence_alert(
     _check(until, datetime.now(UTC), settings.silence_max_days)
     record.silenced_until = until
     record.silence_reason, record.silenced_by = reason, by or "someone"
-    note_act(session, record, "silenced", record.silenced_by, until=until, note=reason)
+    note_act(session, record, AlertAct.SILENCED, record.silenced_by, until=until, note=reason)
     return record
 
 
@@ -49,7 +50,7 @@ def end_silences(session: Session) -> None:
 
 def _lift(session: Session, record: AlertRecord, by: str | None, reason: str | None) -> None:
     record.silenced_until = record.silence_reason = record.silenced_by = None
-    note_act(session, record, "silence_ended", by, note=reason)
+    note_act(session, record, AlertAct.SILENCE_ENDED, by, note=reason)
 
 
 def _check(until: datetime, now: datetime, most_days: float) -> None:

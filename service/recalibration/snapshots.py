@@ -7,6 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
 from service.formats.still import Still
+from service.kinds import Act
 from service.recalibration.activity import note
 from service.recalibration.cameras import require_camera
 from service.settings import Settings
@@ -57,7 +58,7 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
             stored_at=now,
         ),
     )
-    note(session, "snapshot.kept", by=None, camera_id=camera_id, details={"sha256": digest})
+    note(session, Act.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
     return SnapshotFacts(sha256=digest, width=still.width, height=still.height, stored_at=now)
 
 
@@ -85,7 +86,7 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     require_camera(session, camera_id)
     if not snapshots.remove(session, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
-    note(session, "snapshot.removed", by=None, camera_id=camera_id)
+    note(session, Act.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 
 def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:

@@ -10,8 +10,11 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.job_queue import JobQueue
+from service.kinds import Act, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
+from service.reasons import ServiceCode
 from service.recalibration.activity import note
 from service.recalibration.alerts import end_alert, open_alert
 from service.recalibration.attendance import attendance_of
@@ -128,7 +131,7 @@ def remove_source(session: Session, camera_id: str, name: str, by: str | None) -
     if references.newest(session, camera_id).source == name:
         raise ConflictError(f"source: {name!r} counts; say first which one is to count instead")
     sources.forget(session, record)
-    note(session, "source.removed", by=by, camera_id=camera_id, text=name)
+    note(session, Act.SOURCE_REMOVED, by=by, camera_id=camera_id, text=name)
 
 
 def watch_sources(
@@ -149,7 +152,9 @@ def watch_sources(
     silent_for = timedelta(hours=settings.source_silent_h)
     posting = [record for record in others if now - record.last_seen_at < silent_for]
     if not posting:
-        end_alert(session, camera_id, "tracker", "cleared", note="only one source posts")
+        end_alert(
+            session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note="only one source posts"
+        )
         return None
     if all(record.told_at is not None for record in posting):
         return None
@@ -157,12 +162,12 @@ def watch_sources(
         session,
         settings,
         camera_id,
-        "tracker",
-        "warning",
+        AlertKind.TRACKER,
+        Severity.WARNING,
         {},
         None,
-        reason=_reason(settings, reference, posting),
-        source="tracks",
+        reasons=(_reason(settings, reference, posting),),
+        source=AlertSource.TRACKS,
     )
     if opened is None:
         return None
@@ -205,13 +210,13 @@ def _count(
 ) -> None:
     """Have a source's tracks make the reference from now on."""
     camera_id, last = record.camera_id, references.newest(session, record.camera_id).source
-    begin_reference(session, camera_id, "source", from_s=from_s, by=by, source=record.name)
+    begin_reference(session, camera_id, Origin.SOURCE, from_s=from_s, by=by, source=record.name)
     former = None if last is None else sources.find(session, camera_id, last)
     if former is not None:
         former.told_at = None  # should it come back, it is new again
     words = f"{record.name} instead of {last}"
-    end_alert(session, camera_id, "tracker", "cleared", note=f"now counts: {words}")
-    note(session, "source.used", by=by, camera_id=camera_id, text=words)
+    end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=f"now counts: {words}")
+    note(session, Act.SOURCE_USED, by=by, camera_id=camera_id, text=words)
     request_estimate(session, queue, camera_id)
 
 
@@ -265,7 +270,7 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
     """Whether the source that counts has said last that the camera is where it should be."""
     camera_id = reference.camera_id
     last = estimates.newest(session, camera_id)
-    if last is None or not made_against(reference, last) or last.state != "ok":
+    if last is None or not made_against(reference, last) or last.state != PoseState.OK:
         return False
     if last.drift_streak > 0 or last.drifted or last.suspected:
         return False
@@ -276,12 +281,12 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
 
 def _reason(
     settings: Settings, reference: SiteReferenceRecord, posting: Sequence[SourceRecord]
-) -> str:
-    names = " and ".join(repr(record.name) for record in posting)
-    return (
-        f"tracks of {names} come beside those of {reference.source!r}, which count: they are kept "
-        f"and move nothing. Should {reference.source!r} fall silent for "
-        f"{settings.source_silent_h:g} h, they take over once "
-        f"{wanted_tracks(reference, settings)} of them were seen while the camera was where it "
-        "should be; a person can say so at once"
-    )
+) -> Reason:
+    values: dict[str, Value] = {
+        "sources": [record.name for record in posting],
+        "silent_s": settings.source_silent_h * _HOUR_S,
+        "wanted": wanted_tracks(reference, settings),
+    }
+    if reference.source is not None:
+        values["counting"] = reference.source
+    return Reason(code=ServiceCode.OTHER_SOURCES, values=values)

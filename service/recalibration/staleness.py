@@ -6,12 +6,14 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
+from service.kinds import AlertAct, AlertKind, AlertSource, Outcome, Severity
+from service.reasons import ServiceCode
 from service.recalibration.alerts import end_alert, open_alert
 from service.settings import Settings
 from service.store import alerts, cameras, unseen
 from service.store.tables import CameraRecord
 
-KIND = "stale"
 # Who closed the alert knows; if nothing is better by then, it is told again.
 _ANSWERED = timedelta(hours=1)
 
@@ -41,15 +43,21 @@ class StaleWatch:
         self._waiting = {
             camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
         }
-        firing = alerts.firing_cameras(session, KIND)
-        found = {}
+        firing = alerts.firing_cameras(session, AlertKind.STALE)
+        found: dict[str, str] = {}
         for camera in cameras.every(session):
             waiting = self._waiting.get(camera.id)
             waits_s = 0.0 if waiting is None else now_s - waiting.since_s
             reason = _why_stale(camera, settings, waits_s)
             if reason is None and camera.id in firing:
                 if camera.estimate_failing_since is None:
-                    end_alert(session, camera.id, KIND, "cleared", note="it is looked at again")
+                    end_alert(
+                        session,
+                        camera.id,
+                        AlertKind.STALE,
+                        Outcome.CLEARED,
+                        note="it is looked at again",
+                    )
                     found[camera.id] = "ended"
             elif reason is not None and camera.id not in firing and not _answered(session, camera):
                 since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(
@@ -59,14 +67,14 @@ class StaleWatch:
                     session,
                     settings,
                     camera.id,
-                    KIND,
-                    "critical",
+                    AlertKind.STALE,
+                    Severity.CRITICAL,
                     {},
                     since,
-                    reason=reason,
-                    source="upkeep",
+                    reasons=(reason,),
+                    source=AlertSource.UPKEEP,
                 )
-                found[camera.id] = "opened"
+                found[camera.id] = AlertAct.OPENED
         return found
 
     def _watched(self, camera_id: str, track_pk: int, now_s: float) -> _Waiting:
@@ -76,25 +84,24 @@ class StaleWatch:
         return _Waiting(track_pk=track_pk, since_s=now_s)
 
 
-def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> str | None:
+def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:
     """Why a camera's estimate is not what it should be; None where it is."""
     failed = camera.estimate_tries >= settings.stale_failures
     # While it is being looked at, it is not due: the last try may be the one that succeeds.
     if failed and camera.estimate_error is not None and camera.estimate_due_at is not None:
-        return (
-            f"its tracks cannot be looked at: {camera.estimate_tries} tries failed in a row, the "
-            f"last with {camera.estimate_error}"
-        )
+        values: dict[str, Value] = {
+            "tries": camera.estimate_tries,
+            "error": camera.estimate_error,
+        }
+        return Reason(code=ServiceCode.LOOKS_FAIL, values=values)
     if waits_s > settings.stale_after_s:
-        return (
-            f"its tracks have waited for {waits_s / 60:.0f} min; up to "
-            f"{settings.stale_after_s / 60:g} min are waited for"
-        )
+        waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
+        return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
     return None
 
 
 def _answered(session: Session, camera: CameraRecord) -> bool:
-    last = alerts.newest(session, camera.id, KIND)
-    if last is None or last.resolved_at is None or last.outcome == "cleared":
+    last = alerts.newest(session, camera.id, AlertKind.STALE)
+    if last is None or last.resolved_at is None or last.outcome == Outcome.CLEARED:
         return False
     return abs(datetime.now(UTC) - last.resolved_at) < _ANSWERED

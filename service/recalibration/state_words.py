@@ -1,10 +1,14 @@
-"""Why a camera's state is what it is, in words."""
+"""Why a camera's state is what it is."""
 
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.recalibration.camera_state import Cause, Standing
+from models.reasons import Reason, Value
+from service.kinds import PoseState
+from service.reasons import Reasons, ServiceCode
+from service.recalibration.camera_state import MOVED, Standing
+from service.recalibration.outbox import json_time
 from service.recalibration.presence import silence_of
 from service.recalibration.references import (
     FEWEST_WALKERS,
@@ -16,50 +20,57 @@ from service.settings import Settings
 from service.store import maintenance, tracks
 from service.store.alert_tables import MaintenanceRecord
 
-_SINCE: dict[Cause, str] = {
-    "reference": "since the reference",
-    "maintenance": "since the maintenance",
-    "put_back": "since the camera was put back",
-    "false_alarm": "since the alert was called a false alarm",
-}
 
-
-def reason_of(session: Session, settings: Settings, standing: Standing) -> str:
+def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reasons:
     """Why a camera's state is what it is: what is missing, what was told, who is there."""
     now = datetime.now(UTC)
-    parts = []
+    found: list[Reason] = []
     window = maintenance.under_way(session, standing.camera_id, now)
     if window is not None:
-        parts.append(_describe_window(window))
+        found.append(_window(window))
     estimate = standing.estimate
-    if standing.judged and estimate is not None and standing.state != "no_data":
-        parts.append(estimate.reason)
-    elif standing.state in ("drifting", "out_of_range"):
+    if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
+        found += estimate.reasons
+    elif standing.state in MOVED:
         if estimate is not None and estimate.told:
-            parts.append(f"when it was last told: {estimate.reason}")
+            found += [Reason(code=ServiceCode.LAST_TOLD), *estimate.reasons]
         else:
-            parts.append("; ".join(dict.fromkeys(alert.reason for alert in standing.alerts)))
+            found += _of_alerts(standing)
     if not standing.judged:
-        parts.append(_missing(session, settings, standing))
+        found += _missing(session, settings, standing)
     silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
-    if silence is not None and standing.state in ("no_data", "drifting", "out_of_range"):
-        parts.append(silence.reason)
-    return "; ".join(part for part in parts if part)
+    if silence is not None and standing.state in (PoseState.NO_DATA, *MOVED):
+        found += silence.reasons
+    return tuple(found)
 
 
-def _missing(session: Session, settings: Settings, standing: Standing) -> str:
+def _of_alerts(standing: Standing) -> list[Reason]:
+    """What the alerts say; once, where several say the same."""
+    different: list[Reasons] = []
+    for alert in standing.alerts:
+        if alert.reasons not in different:
+            different.append(alert.reasons)
+    return [reason for reasons in different for reason in reasons]
+
+
+def _missing(session: Session, settings: Settings, standing: Standing) -> list[Reason]:
     """How much is missing until the camera is judged anew."""
     reference = standing.reference
     if reference.ready_at is None:
         so_far = tracks_so_far(session, settings, reference)
-        return f"{so_far} of {wanted_tracks(reference, settings)} reference tracks"
+        values = {"tracks": so_far, "wanted": wanted_tracks(reference, settings)}
+        return [Reason(code=ServiceCode.REFERENCE_TRACKS, values=values)]
     bounds = window_beside(standing.attended, reference, settings)
-    since = tracks.count_window(session, bounds)
-    text = f"{since} tracks {_SINCE[standing.cause]}; at least {FEWEST_WALKERS} of people who walk"
-    text += " for a few seconds inside the image are needed"
-    return "; ".join(part for part in (text, reference.doubt) if part)
+    since: dict[str, Value] = {
+        "tracks": tracks.count_window(session, bounds),
+        "cause": standing.cause,
+        "least_walkers": FEWEST_WALKERS,
+    }
+    return [Reason(code=ServiceCode.TRACKS_SINCE, values=since), *reference.doubts]
 
 
-def _describe_window(window: MaintenanceRecord) -> str:
-    until = f"maintenance is under way until {window.to_at:%Y-%m-%d %H:%M}Z"
-    return f"{until} ({window.reason})" if window.reason else until
+def _window(window: MaintenanceRecord) -> Reason:
+    values = {"until": json_time(window.to_at)}
+    if window.reason:
+        values["note"] = window.reason
+    return Reason(code=ServiceCode.MAINTENANCE, values=values)

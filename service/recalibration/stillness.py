@@ -5,6 +5,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
+from service.kinds import Outcome
 from service.recalibration.attendance import Attendance
 from service.settings import Settings
 from service.store import alerts
@@ -79,6 +80,6 @@ def _doubt_of(record: AlertRecord, settings: Settings) -> Doubt | None:
         from_s=from_s,
         to_s=record.resolved_at.timestamp(),
         resolved_at=record.resolved_at,
-        excluded=record.outcome != "false_alarm",
-        by_person=record.outcome in ("put_back", "false_alarm"),
+        excluded=record.outcome != Outcome.FALSE_ALARM,
+        by_person=record.outcome in (Outcome.PUT_BACK, Outcome.FALSE_ALARM),
     )

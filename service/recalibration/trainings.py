@@ -14,6 +14,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
+from service.kinds import Act, EventType, TrainingState
 from service.recalibration.activity import note
 from service.recalibration.looking import may_look
 from service.settings import Settings
@@ -24,6 +25,11 @@ from service.store.tables import ModelRecord, PriorPoseRecord, TrainingRecord
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
+_KEPT_AS = {
+    TrainingState.SUCCEEDED: Act.TRAINING_SUCCEEDED,
+    TrainingState.FAILED: Act.TRAINING_FAILED,
+    TrainingState.CANCELLED: Act.TRAINING_CANCELLED,
+}
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -55,7 +61,7 @@ def queue_training(
         recipe=recipe or settings.recipe,
         around=None if around is None else {name: getattr(around, name) for name in _CENTRE},
         seed=settings.seed if seed is None else seed,
-        state="queued",
+        state=TrainingState.QUEUED,
         attempt=0,
         cancel_requested=False,
         step=0,
@@ -86,7 +92,7 @@ def request_training(
     if cameras.find(session, camera_id) is None:
         raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
     record = queue_training(session, queue, settings, camera_id, recipe, seed)
-    note(session, "training.requested", by=by, camera_id=camera_id, subject_id=record.id)
+    note(session, Act.TRAINING_REQUESTED, by=by, camera_id=camera_id, subject_id=record.id)
     return record
 
 
@@ -141,11 +147,11 @@ def begin_training(
     if record is None or record.state not in trainings.UNFINISHED:
         return None
     if record.cancel_requested:
-        finish(session, record, "cancelled")
+        finish(session, record, TrainingState.CANCELLED)
         return None
     camera = cameras.find(session, record.camera_id)
     assert camera is not None
-    record.state = "running"
+    record.state = TrainingState.RUNNING
     record.attempt += 1
     record.started_at = datetime.now(UTC)
     record.step, record.loss, record.eta_s = 0, None, None
@@ -218,10 +224,10 @@ def publish_model(
     Does nothing where the training was cancelled, taken over or deleted meanwhile.
     """
     record = trainings.find(session, attempt.training_id)
-    if record is None or record.attempt != attempt.attempt or record.state != "running":
+    if record is None or record.attempt != attempt.attempt or record.state != TrainingState.RUNNING:
         return
     if record.cancel_requested:
-        finish(session, record, "cancelled")
+        finish(session, record, TrainingState.CANCELLED)
         return
     session.add(
         ModelRecord(
@@ -239,16 +245,20 @@ def publish_model(
     )
     record.metrics = metrics
     record.step, record.eta_s = record.steps, 0.0
-    finish(session, record, "succeeded")
+    finish(session, record, TrainingState.SUCCEEDED)
     request_estimate(session, queue, record.camera_id)
 
 
 def end_training(
-    session: Session, attempt: TrainingAttempt, state: str, error: str | None = None
+    session: Session, attempt: TrainingAttempt, state: TrainingState, error: str | None = None
 ) -> None:
     """Mark this attempt as failed or cancelled; another attempt's record stays as it is."""
     record = trainings.find(session, attempt.training_id)
-    if record is not None and record.attempt == attempt.attempt and record.state == "running":
+    if (
+        record is not None
+        and record.attempt == attempt.attempt
+        and record.state == TrainingState.RUNNING
+    ):
         finish(session, record, state, error)
 
 
@@ -267,18 +277,20 @@ def request_estimate(session: Session, queue: JobQueue, camera_id: str) -> None:
 
 def _stop(session: Session, record: TrainingRecord) -> None:
     record.cancel_requested = True
-    if record.state == "queued":
-        finish(session, record, "cancelled")
+    if record.state == TrainingState.QUEUED:
+        finish(session, record, TrainingState.CANCELLED)
 
 
-def finish(session: Session, record: TrainingRecord, state: str, error: str | None = None) -> None:
+def finish(
+    session: Session, record: TrainingRecord, state: TrainingState, error: str | None = None
+) -> None:
     """End a training, and tell of it."""
     record.state = state
     record.error = error
     record.finished_at = datetime.now(UTC)
     note(
         session,
-        f"training.{state}",
+        _KEPT_AS[state],
         by=None,
         camera_id=record.camera_id,
         subject_id=record.id,
@@ -295,4 +307,4 @@ def _tell(session: Session, record: TrainingRecord) -> None:
         "progress": {"step": record.step, "steps": record.steps, "loss": record.loss},
         "error": record.error,
     }
-    events.add(session, "training", payload, datetime.now(UTC))
+    events.add(session, EventType.TRAINING, payload, datetime.now(UTC))

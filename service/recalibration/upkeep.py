@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
+from service.kinds import TrainingState
 from service.recalibration.alerts import end_empty_groups
 from service.recalibration.looking import may_look
 from service.recalibration.lost_trainings import requeue_lost
@@ -108,7 +109,7 @@ def _why_train(session: Session, camera: CameraRecord) -> str | None:
     if (
         newest
         and newest[0].prior_pose_id == prior.id
-        and newest[0].state in ("failed", "cancelled")
+        and newest[0].state in (TrainingState.FAILED, TrainingState.CANCELLED)
     ):
         return None  # trying the same again needs a person, or another prior pose
     model = trainings.newest_model(session, camera.id)

@@ -12,6 +12,7 @@ from service.delivery.addresses import AddressError, check_url
 from service.delivery.signing import new_secret
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
+from service.kinds import Act, AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.recalibration.activity import note
 from service.recalibration.keys import sealed_secret
 from service.recalibration.outbox import add_delivery, wake
@@ -29,8 +30,8 @@ class WebhookSpec:
 
     url: str
     name: str
-    kinds: tuple[str, ...] | None
-    format: str
+    kinds: tuple[AlertKind, ...] | None
+    format: WebhookFormat
     enabled: bool
 
 
@@ -75,7 +76,7 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
     """Store a webhook; its secret is shown this once."""
     now = datetime.now(UTC)
     webhook_id = secrets.token_hex(16)
-    secret = new_secret() if spec.format == "webhook" else None
+    secret = new_secret() if spec.format == WebhookFormat.WEBHOOK else None
     record = WebhookRecord(
         id=webhook_id,
         name=spec.name,
@@ -90,7 +91,7 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
     )
     session.add(record)
     session.flush()
-    _note(session, "added", record)
+    _note(session, Act.WEBHOOK_ADDED, record)
     return SecretMade(record=record, secret=secret)
 
 
@@ -126,7 +127,7 @@ def change_webhook(
     for name, value in changes.items():
         setattr(record, name, value)
     record.updated_at = now
-    _note(session, "changed", record, sorted(changes))
+    _note(session, Act.WEBHOOK_CHANGED, record, sorted(changes))
     if changes.get("enabled") is False:
         record.disabled_reason = _BY_A_PERSON
     elif changes.get("enabled") or "url" in changes:
@@ -153,7 +154,7 @@ def rotate_secret(session: Session, settings: Settings, webhook_id: str) -> Secr
     record.old_secret, record.old_secret_until = record.secret, now + OLD_SECRET_STAYS
     secret = new_secret()
     record.secret, record.updated_at = sealed_secret(settings, webhook_id, secret), now
-    _note(session, "secret_changed", record)
+    _note(session, Act.WEBHOOK_SECRET_CHANGED, record)
     return SecretMade(record=record, secret=secret)
 
 
@@ -164,7 +165,7 @@ def remove_webhook(session: Session, webhook_id: str) -> None:
         NotFoundError: there is none of that id.
     """
     record = _require(session, webhook_id)
-    _note(session, "removed", record)
+    _note(session, Act.WEBHOOK_REMOVED, record)
     session.delete(record)
 
 
@@ -178,14 +179,14 @@ def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
     record = _require_enabled(session, webhook_id)
     data = {"webhook_id": record.id, "name": record.name, "text": "This is a test of surefoot."}
     record.held_until = None
-    delivery = add_delivery(session, record, "test", data, datetime.now(UTC))
-    _note(session, "tested", record)
+    delivery = add_delivery(session, record, MessageType.TEST, data, datetime.now(UTC))
+    _note(session, Act.WEBHOOK_TESTED, record)
     session.flush()
     return DeliveryView(record=delivery, attempts=())
 
 
 def list_deliveries(
-    session: Session, webhook_id: str, state: str | None, limit: int
+    session: Session, webhook_id: str, state: DeliveryState | None, limit: int
 ) -> Sequence[DeliveryView]:
     """A webhook's deliveries, newest first.
 
@@ -224,18 +225,18 @@ def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> Deli
     webhook = _require_enabled(session, view.record.webhook_id)
     now = datetime.now(UTC)
     record = view.record
-    record.state, record.tries, record.finished_at = "pending", 0, None
+    record.state, record.tries, record.finished_at = DeliveryState.PENDING, 0, None
     record.next_attempt_at = record.queued_at = now
     webhook.held_until = None
-    _note(session, "replayed", webhook)
+    _note(session, Act.WEBHOOK_REPLAYED, webhook)
     wake(session, queue, webhook, now)
     return view
 
 
-def _note(session: Session, act: str, record: WebhookRecord, fields: Sequence[str] = ()) -> None:
+def _note(session: Session, act: Act, record: WebhookRecord, fields: Sequence[str] = ()) -> None:
     """Keep what was done with a webhook; its URL may be a secret, so its name says which."""
     details = {"name": record.name, **({"fields": list(fields)} if fields else {})}
-    note(session, f"webhook.{act}", by=None, subject_id=record.id, details=details)
+    note(session, act, by=None, subject_id=record.id, details=details)
 
 
 def _require(session: Session, webhook_id: str) -> WebhookRecord:

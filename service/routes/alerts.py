@@ -1,10 +1,11 @@
 """`/alerts`: list, show, acknowledge, silence, resolve."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
+from service.kinds import AlertState
 from service.recalibration import alerts, decisions, silence
 from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.alerts import (
@@ -24,7 +25,7 @@ router = APIRouter(prefix="/alerts", tags=["alerts"])
 @router.get("")
 def list_all(
     session: ReadDep,
-    state: Literal["firing", "resolved"] | None = None,
+    state: AlertState | None = None,
     camera_id: str | None = None,
     group_id: str | None = None,
     acknowledged: bool | None = None,

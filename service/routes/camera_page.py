@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Request
 from fastapi.responses import HTMLResponse, Response
 
+from service.kinds import AlertState
 from service.recalibration import camera_page
 from service.recalibration.camera_page import CameraPage
 from service.routes.pages import render
@@ -93,8 +94,8 @@ def _chart_facts(page: CameraPage) -> dict[str, Any]:
         "alerts": [
             {
                 "at": (story.record.changed_at or story.record.opened_at).isoformat(),
-                "words": camera_words.KINDS.get(story.record.kind, story.record.kind),
-                "firing": story.record.state == "firing",
+                "words": camera_words.KINDS[story.record.kind],
+                "firing": story.record.state == AlertState.FIRING,
             }
             for story in page.alerts
         ],

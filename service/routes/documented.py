@@ -71,7 +71,7 @@ def _correct(document: dict[str, Any]) -> None:
             for status in _statuses(path, method, operation):
                 answers.setdefault(str(status), _answer(status))
             need = need_of(method.upper(), path)[0]
-            operation["security"] = [] if need == "open" else [{_SCHEME: [need]}]
+            operation["security"] = [] if need is None else [{_SCHEME: [need]}]
 
 
 def _statuses(path: str, method: str, operation: dict[str, Any]) -> Iterator[int]:

@@ -16,12 +16,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
-from service.access.callers import SCOPES, Caller
+from service.access.callers import Caller
 from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
+from service.kinds import TokenScope
 from service.reach import auth_on
 from service.routes.lanes import LOOKUPS
 from service.routes.pages import STATIC_URL
-from service.routes.scopes import Need, need_of
+from service.routes.scopes import need_of
 from service.settings import Settings
 from service.store.database import Store
 
@@ -65,7 +66,7 @@ class GuardMiddleware:
         request.state.address = address_of(request, self._settings)
         request.state.attempts = self._attempts
         need, parameters = need_of(request.method, scope["path"])
-        if auth_on(self._settings) and need != "open" and not _is_static(request):
+        if auth_on(self._settings) and need is not None and not _is_static(request):
             try:
                 await self._let_in(request, need, parameters)
             except UnauthorizedError:
@@ -85,10 +86,10 @@ class GuardMiddleware:
         except (SQLAlchemyError, ServiceError) as error:
             log.warning("caller_unknown", extra={"error": str(error)})
             return
-        if caller is not None and caller.may("read"):
+        if caller is not None and caller.may(TokenScope.READ):
             request.state.caller, request.state.token_id = caller, caller.token_id
 
-    async def _let_in(self, request: Request, need: Need, parameters: dict[str, str]) -> None:
+    async def _let_in(self, request: Request, need: TokenScope, parameters: dict[str, str]) -> None:
         store: Store = request.state.app.store
         find = _finder(request, self._settings)
         caller = await run_sync(find, store, limiter=self._looking)
@@ -102,7 +103,7 @@ class GuardMiddleware:
             raise ForbiddenError(
                 f"scope: this needs {need}, {caller.name} has {', '.join(sorted(caller.scopes))}"
             )
-        if need == "ingest" and not caller.may_post(parameters["camera_id"]):
+        if need == TokenScope.INGEST and not caller.may_post(parameters["camera_id"]):
             raise ForbiddenError(f"camera_id: {caller.name} posts for other cameras")
 
         def holds() -> bool:
@@ -207,9 +208,9 @@ def _vouched_for(request: Request, settings: Settings) -> Caller | None:
     if not name:
         return None
     roles = request.headers.get(settings.proxy_role_header, "").replace(";", ",").split(",")
-    known = {role.strip().lower() for role in roles} & (set(SCOPES) - {"ingest"})
+    known = {role.strip().lower() for role in roles} & (set(TokenScope) - {TokenScope.INGEST})
     # Whoever it lets through may look; more has to be said.
-    return Caller(name=name[: tokens.MAX_NAME], scopes=frozenset(known or {"read"}))
+    return Caller(name=name[: tokens.MAX_NAME], scopes=frozenset(known or {TokenScope.READ}))
 
 
 def _is_static(request: Request) -> bool:

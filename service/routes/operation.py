@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter, Response
 
+from service.kinds import Health
 from service.reach import auth_on
 from service.recalibration import operation
 from service.routes.state import CallerDep, StateDep
@@ -13,7 +14,7 @@ router = APIRouter(tags=["operation"])
 @router.get("/healthz")
 async def health() -> HealthOut:
     """Whether the process answers; no thread and no connection is needed for it."""
-    return HealthOut(status="ok")
+    return HealthOut(status=Health.OK)
 
 
 @router.get("/readyz", responses={503: {"model": ReadyOut}})

@@ -1,18 +1,17 @@
 """What each route needs, in one place; a test fails for a route that is not here."""
 
-from typing import Literal
-
 from starlette.routing import compile_path
 
-from service.access.callers import Scope
+from service.kinds import TokenScope
 from service.routes.camera_page import CHARTS_URL
 
-Need = Scope | Literal["open"]
+# None: whoever asks.
+Need = TokenScope | None
 
 _GET: dict[Need, tuple[str, ...]] = {
     # `/readyz` tells an orchestrator whether to send work here; what is wrong, only who may read.
-    "open": ("/healthz", "/readyz", "/ui/login"),
-    "read": (
+    None: ("/healthz", "/readyz", "/ui/login"),
+    TokenScope.READ: (
         "/",
         "/activity",
         "/alerts",
@@ -40,7 +39,7 @@ _GET: dict[Need, tuple[str, ...]] = {
     ),
     # Addresses of webhooks often hold a secret; the form and the list of tokens are for who may
     # use them.
-    "admin": (
+    TokenScope.ADMIN: (
         "/deliveries/{delivery_id}",
         "/tokens",
         "/ui/register",
@@ -51,10 +50,10 @@ _GET: dict[Need, tuple[str, ...]] = {
     ),
 }
 _ACTS: dict[Need, tuple[str, ...]] = {
-    "open": ("POST /ui/login",),
-    "ingest": ("POST /cameras/{camera_id}/tracks",),
-    "read": ("POST /ui/logout",),
-    "operate": (
+    None: ("POST /ui/login",),
+    TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),
+    TokenScope.READ: ("POST /ui/logout",),
+    TokenScope.OPERATE: (
         "POST /alerts/{alert_id}/acknowledge",
         "POST /alerts/{alert_id}/resolve",
         "POST /alerts/{alert_id}/silence",
@@ -71,7 +70,7 @@ _ACTS: dict[Need, tuple[str, ...]] = {
         "POST /cameras/{camera_id}/trainings",
         "DELETE /trainings/{training_id}",
     ),
-    "admin": (
+    TokenScope.ADMIN: (
         "POST /cameras",
         "PATCH /cameras/{camera_id}",
         "DELETE /cameras/{camera_id}",
@@ -110,4 +109,4 @@ def need_of(method: str, path: str) -> tuple[Need, dict[str, str]]:
         match = pattern.match(path) if known == method else None
         if match is not None:
             return need, match.groupdict()
-    return ("read" if method == "GET" else "admin"), {}
+    return (TokenScope.READ if method == "GET" else TokenScope.ADMIN), {}

@@ -4,13 +4,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from service.kinds import DeliveryState
 from service.recalibration import webhooks
 from service.recalibration.webhooks import WebhookSpec
 from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.webhooks import (
     DeliveryList,
     DeliveryOut,
-    DeliveryState,
     SecretOut,
     WebhookBody,
     WebhookList,

@@ -5,6 +5,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from service.kinds import Act, AlertKind, Outcome
+
 
 class EntryOut(BaseModel):
     """What somebody did; without a name, the service by itself."""
@@ -13,14 +15,14 @@ class EntryOut(BaseModel):
 
     id: int
     at: datetime
-    what: str
+    what: Act
     by: str | None
     via: str | None
     camera_id: str | None
     subject_id: str | None
-    kind: str | None
+    kind: AlertKind | None
     until: datetime | None
-    outcome: str | None
+    outcome: Outcome | None
     note: str | None
     details: dict[str, Any]
 

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from service.formats.degrees import in_degrees
+from service.kinds import AlertAct, AlertKind, AlertState, Answer, Outcome, Severity
 from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Moment, Who
+from service.schemas.reasons import ReasonCode, ReasonValues
 from service.store.activity_tables import ActivityRecord
 from service.store.tables import AlertRecord
 
@@ -29,7 +32,7 @@ class SilenceBody(Body):
 class ResolveBody(Body):
     """How an alert ended."""
 
-    outcome: Literal["put_back", "accepted", "false_alarm"]
+    outcome: Answer
     note: str | None = Field(None, max_length=2000)
     by: Who | None = None
 
@@ -44,10 +47,12 @@ class AlertOut(BaseModel):
 
     id: str
     camera_id: str | None
-    kind: str
-    state: str
-    severity: str
+    kind: AlertKind
+    state: AlertState
+    severity: Severity
     reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
     drift: dict[str, Any]
     opened_at: datetime
     changed_at: datetime | None
@@ -61,11 +66,16 @@ class AlertOut(BaseModel):
     silenced_by: str | None
     resolved_at: datetime | None
     resolved_by: str | None
-    outcome: str | None
+    outcome: Outcome | None
     note: str | None
     track_source: str | None
     camera_ids: list[str] | None
     group_id: str | None
+
+    @field_validator("drift", mode="before")
+    @classmethod
+    def _degrees(cls, stored: dict[str, Any]) -> dict[str, Any]:
+        return in_degrees(stored)
 
     @classmethod
     def from_record(cls, record: AlertRecord) -> Self:
@@ -80,17 +90,17 @@ class ActOut(BaseModel):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: Literal["acknowledged", "silenced", "silence_ended", "escalated", "resolved"]
+    act: AlertAct
     by: str | None
     until: datetime | None
-    outcome: str | None
+    outcome: Outcome | None
     note: str | None
 
     @classmethod
     def from_record(cls, record: ActivityRecord) -> Self:
         """The body of an entry of the log."""
         values = {name: getattr(record, name) for name in cls.model_fields if name != "act"}
-        return cls.model_validate({**values, "act": record.what.removeprefix("alert.")})
+        return cls.model_validate({**values, "act": record.what.partition(".")[2]})
 
 
 class AlertDetail(AlertOut):

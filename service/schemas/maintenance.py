@@ -1,10 +1,11 @@
 """Bodies of `/cameras/{id}/maintenance`."""
 
 from datetime import UTC, datetime
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.kinds import WindowState
 from service.schemas.base import Body, Moment, Who
 from service.store.alert_tables import MaintenanceRecord
 
@@ -33,7 +34,7 @@ class WindowOut(BaseModel):
 
     id: str
     camera_id: str
-    state: Literal["planned", "under_way", "over"]
+    state: WindowState
     from_: datetime = Field(serialization_alias="from")
     to: datetime
     ended_at: datetime | None
@@ -46,11 +47,13 @@ class WindowOut(BaseModel):
     def from_record(cls, record: MaintenanceRecord) -> Self:
         """The body of a stored window."""
         now = datetime.now(UTC)
-        begun, over = record.from_at <= now, record.until <= now
+        state = WindowState.UNDER_WAY if record.from_at <= now else WindowState.PLANNED
+        if record.until <= now:
+            state = WindowState.OVER
         return cls(
             id=record.id,
             camera_id=record.camera_id,
-            state="over" if over else "under_way" if begun else "planned",
+            state=state,
             from_=record.from_at,
             to=record.to_at,
             ended_at=record.ended_at,

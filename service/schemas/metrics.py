@@ -8,18 +8,15 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from itertools import product
-from typing import Any, get_args
+from typing import Any
 
 from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
 from prometheus_client.registry import Collector
 
-from service.recalibration.camera_state import PoseState
+from models.estimation.numbers import ANGLES
+from service.kinds import AlertKind, PoseState, Severity, TrainingState
 from service.recalibration.figures import Figures
-from service.schemas.webhooks import AlertKind
-
-_SEVERITIES = ("warning", "critical")
-_TRAINING_STATES = ("queued", "running", "succeeded", "failed", "cancelled")
 
 
 class FiguresCollector(Collector):
@@ -42,16 +39,16 @@ class FiguresCollector(Collector):
 
 
 def _of_cameras(figures: Figures) -> Iterator[Metric]:
-    states = get_args(PoseState)
     count = Counter(camera.state for camera in figures.cameras)
+    drifts = [(c.camera_id, c.drift) for c in figures.cameras if c.drift is not None]
     yield _gauge(
-        "surefoot_cameras", "Cameras by state.", ["state"], {(s,): count[s] for s in states}
+        "surefoot_cameras", "Cameras by state.", ["state"], {(s,): count[s] for s in PoseState}
     )
     yield _gauge(
         "surefoot_camera_state",
         "1 for the state that a camera is in.",
         ["camera_id", "state"],
-        {(c.camera_id, state): c.state == state for c in figures.cameras for state in states},
+        {(c.camera_id, state): c.state == state for c in figures.cameras for state in PoseState},
     )
     yield _gauge(
         "surefoot_camera_last_track_timestamp_seconds",
@@ -63,13 +60,13 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
         "surefoot_camera_drift_radians",
         "Drift of tilt, roll or heading against the prior pose, where it is told.",
         ["camera_id", "number"],
-        {(c.camera_id, n): value for c in figures.cameras for n, value in c.drift_rad.items()},
+        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.told},
     )
     yield _gauge(
         "surefoot_camera_drift_height_meters",
         "Drift of the height against the prior pose, where it is told.",
         ["camera_id"],
-        {(c.camera_id,): c.drift_height_m for c in figures.cameras if c.drift_height_m is not None},
+        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.told},
     )
 
 
@@ -91,7 +88,7 @@ def _of_looks(figures: Figures) -> Iterator[Metric]:
 
 
 def _of_alerts(figures: Figures) -> Iterator[Metric]:
-    zeros = dict.fromkeys(product(get_args(AlertKind), _SEVERITIES), 0)
+    zeros = dict.fromkeys(product(AlertKind, Severity), 0)
     alone = [alert for alert in figures.alerts if not alert.grouped]
     count = Counter((alert.kind, alert.severity) for alert in alone)
     yield _gauge(
@@ -130,7 +127,7 @@ def _of_service(figures: Figures) -> Iterator[Metric]:
         "surefoot_trainings",
         "Trainings that are stored, by state.",
         ["state"],
-        {(state,): figures.trainings.get(state, 0) for state in _TRAINING_STATES},
+        {(state,): figures.trainings.get(state, 0) for state in TrainingState},
     )
     yield _gauge(
         "surefoot_worker_last_heartbeat_timestamp_seconds",

@@ -1,22 +1,23 @@
 """Answers of `/healthz` and `/readyz`."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import BaseModel
 
-from service.recalibration.operation import Readiness
+from service.kinds import Health, Readiness
+from service.recalibration import operation
 
 
 class HealthOut(BaseModel):
     """The process answers."""
 
-    status: Literal["ok"]
+    status: Health
 
 
 class ReadyOut(BaseModel):
     """Whether the service can do its work; some problems are named while it can."""
 
-    status: Literal["ready", "not_ready"]
+    status: Readiness
     store_writable: bool
     worker_alive: bool
     worker_silent_s: float | None
@@ -25,10 +26,10 @@ class ReadyOut(BaseModel):
     problems: list[str]
 
     @classmethod
-    def from_value(cls, value: Readiness) -> Self:
+    def from_value(cls, value: operation.Readiness) -> Self:
         """The body of a readiness check."""
         return cls(
-            status="ready" if value.ready else "not_ready",
+            status=Readiness.READY if value.ready else Readiness.NOT_READY,
             store_writable=value.store_writable,
             worker_alive=value.worker_alive,
             worker_silent_s=value.worker_silent_s,

@@ -2,15 +2,20 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from models.estimation.numbers import ANGLES
+from models.drift.verdict import Drift
+from service.formats.degrees import in_degrees
+from service.kinds import PoseState, ReferenceState
+from service.reasons import code_of, values_of
 from service.recalibration.poses import PoseView
 from service.recalibration.words import FIELDS
 from service.schemas.base import Body, Who
 from service.schemas.geometry import PoseOut
+from service.schemas.reasons import ReasonCode, ReasonValues
+from service.store.packing import told_drift, told_sd
 from service.store.tables import EstimateRecord
 
 
@@ -43,6 +48,11 @@ class SdOut(BaseModel):
     roll_deg: float | None
     heading_deg: float | None
 
+    @classmethod
+    def from_value(cls, drift: Drift) -> Self | None:
+        """The body of what is told; None where nothing is."""
+        return cls(**in_degrees(told_sd(drift))) if drift.told else None
+
 
 class DriftOut(BaseModel):
     """Estimate against prior pose; null where the tracks cannot tell.
@@ -56,11 +66,16 @@ class DriftOut(BaseModel):
     heading_deg: float | None
     angle_deg: float | None
 
+    @classmethod
+    def from_value(cls, drift: Drift) -> Self | None:
+        """The body of what is told; None where nothing is."""
+        return cls(**in_degrees(told_drift(drift))) if drift.told else None
+
 
 class ReferenceOut(BaseModel):
     """How much of the reference period has been seen."""
 
-    state: Literal["learning", "ready"]
+    state: ReferenceState
     tracks: int
     wanted: int
     walking_speed_mps: float | None
@@ -72,7 +87,7 @@ class ServedPoseOut(BaseModel):
     model_config = ConfigDict(serialize_by_alias=True)
 
     camera_id: str
-    state: Literal["learning", "ok", "drifting", "no_data", "out_of_range"]
+    state: PoseState
     pose: PoseOut
     estimated: list[str]
     sd: SdOut | None
@@ -85,6 +100,8 @@ class ServedPoseOut(BaseModel):
     model_id: str | None
     updated_at: datetime | None
     reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
 
     @classmethod
     def from_value(cls, view: PoseView) -> Self:
@@ -95,11 +112,11 @@ class ServedPoseOut(BaseModel):
             state=view.state,
             pose=PoseOut.from_value(view.pose),
             estimated=[field for name, field in FIELDS.items() if name in view.told],
-            sd=None if estimate is None else sd_out(estimate),
-            drift=None if estimate is None else drift_out(estimate),
-            estimates={} if estimate is None else estimate.raw,
+            sd=None if estimate is None else SdOut.from_value(estimate.drift),
+            drift=None if estimate is None else DriftOut.from_value(estimate.drift),
+            estimates={} if estimate is None else in_degrees(estimate.raw),
             reference=ReferenceOut(
-                state="ready" if view.reference.ready else "learning",
+                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
                 tracks=view.reference.tracks,
                 wanted=view.reference.wanted,
                 walking_speed_mps=view.reference.walking_speed_mps,
@@ -110,6 +127,8 @@ class ServedPoseOut(BaseModel):
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
             reason=view.reason,
+            reason_code=code_of(view.reasons),
+            reason_values=values_of(view.reasons),
         )
 
 
@@ -117,7 +136,7 @@ class HistoryPoint(BaseModel):
     """One estimate of the history."""
 
     at: datetime
-    state: str
+    state: PoseState
     height_m: float
     tilt_deg: float
     roll_deg: float
@@ -133,12 +152,12 @@ class HistoryPoint(BaseModel):
         return cls(
             at=record.created_at,
             state=record.state,
-            height_m=record.height_m,
-            tilt_deg=math.degrees(record.tilt_rad),
-            roll_deg=math.degrees(record.roll_rad),
-            heading_deg=math.degrees(record.heading_rad),
-            sd=sd_out(record),
-            drift=drift_out(record),
+            height_m=record.pose.height_m,
+            tilt_deg=math.degrees(record.pose.tilt_rad),
+            roll_deg=math.degrees(record.pose.roll_rad),
+            heading_deg=math.degrees(record.pose.heading_rad),
+            sd=SdOut.from_value(record.drift),
+            drift=DriftOut.from_value(record.drift),
             tracks=record.tracks,
             to=moment(record.to_s),
         )
@@ -150,36 +169,6 @@ class History(BaseModel):
     items: list[HistoryPoint]
 
 
-def sd_out(record: EstimateRecord) -> SdOut | None:
-    """Standard deviations of what a stored estimate tells; None where it tells nothing."""
-    if not record.told:
-        return None
-    return SdOut(
-        height_m=_if_told(record, "height", record.height_sd_m),
-        tilt_deg=_if_told(record, "tilt", math.degrees(record.tilt_sd_rad)),
-        roll_deg=_if_told(record, "roll", math.degrees(record.roll_sd_rad)),
-        heading_deg=_if_told(record, "heading", math.degrees(record.heading_sd_rad or 0.0)),
-    )
-
-
-def drift_out(record: EstimateRecord) -> DriftOut | None:
-    """Drift of what a stored estimate tells; None where it tells nothing."""
-    if not record.told:
-        return None
-    turned = set(ANGLES) & set(record.told)
-    return DriftOut(
-        height_m=_if_told(record, "height", record.drift_height_m),
-        tilt_deg=_if_told(record, "tilt", math.degrees(record.drift_tilt_rad)),
-        roll_deg=_if_told(record, "roll", math.degrees(record.drift_roll_rad)),
-        heading_deg=_if_told(record, "heading", math.degrees(record.drift_heading_rad)),
-        angle_deg=math.degrees(record.drift_angle_rad) if turned else None,
-    )
-
-
 def moment(seconds: float) -> datetime:
     """The aware UTC time of seconds since the epoch."""
     return datetime.fromtimestamp(seconds, UTC)
-
-
-def _if_told(record: EstimateRecord, name: str, value: float) -> float | None:
-    return value if name in record.told else None

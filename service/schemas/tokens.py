@@ -1,12 +1,12 @@
 """Bodies of `/tokens`."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field
 
-from service.access.callers import Scope
 from service.access.tokens import MAX_NAME, MadeToken, TokenSpec
+from service.kinds import TokenScope, TokenState
 from service.schemas.base import Body, Moment
 from service.schemas.cameras import CameraId
 from service.store.access_tables import TokenRecord
@@ -16,7 +16,7 @@ class TokenBody(Body):
     """A token to make; `cameras` are those that it posts tracks for, all if left out."""
 
     name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
-    scopes: Annotated[list[Scope], Field(min_length=1, max_length=4)]
+    scopes: Annotated[list[TokenScope], Field(min_length=1, max_length=4)]
     cameras: Annotated[list[CameraId], Field(min_length=1, max_length=1000)] | None = None
     expires_at: Moment | None = None
 
@@ -35,9 +35,9 @@ class TokenOut(BaseModel):
 
     id: str
     name: str
-    scopes: list[Scope]
+    scopes: list[TokenScope]
     cameras: list[str] | None
-    state: Literal["valid", "expired", "revoked"]
+    state: TokenState
     created_at: datetime
     created_by: str | None
     expires_at: datetime | None
@@ -70,5 +70,7 @@ class TokenList(BaseModel):
 def _fields(record: TokenRecord) -> dict[str, object]:
     names = TokenOut.model_fields.keys() - {"state"}
     over = record.expires_at is not None and record.expires_at <= datetime.now(UTC)
-    state = "revoked" if record.revoked_at else "expired" if over else "valid"
+    state = TokenState.EXPIRED if over else TokenState.VALID
+    if record.revoked_at:
+        state = TokenState.REVOKED
     return {**{name: getattr(record, name) for name in names}, "state": state}

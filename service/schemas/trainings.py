@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, Field
 
+from service.kinds import TrainingState
 from service.schemas.base import Body, Who
 from service.store.tables import TrainingRecord
 
@@ -40,7 +41,7 @@ class TrainingOut(BaseModel):
 
     id: str
     camera_id: str
-    state: str
+    state: TrainingState
     recipe: str
     seed: int
     around: CentreOut | None

@@ -1,17 +1,16 @@
 """Bodies of `/webhooks` and `/deliveries`."""
 
 from datetime import datetime
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Field, field_validator
 
+from service.kinds import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.recalibration.webhooks import DeliveryView, SecretMade, WebhookView
 from service.schemas.base import Body
 from service.store.delivery_tables import WebhookRecord
 
-AlertKind = Literal["drift", "no_data", "out_of_range", "clock", "stale", "tracker"]
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
-DeliveryState = Literal["pending", "delivered", "failed"]
 
 
 class WebhookBody(Body):
@@ -20,7 +19,7 @@ class WebhookBody(Body):
     url: str
     name: str = Field("", max_length=200)
     kinds: Kinds | None = None
-    format: Literal["webhook", "alertmanager"] = "webhook"
+    format: WebhookFormat = WebhookFormat.WEBHOOK
     enabled: bool = True
 
 
@@ -46,8 +45,8 @@ class WebhookOut(BaseModel):
     id: str
     name: str
     url: str
-    format: str
-    kinds: list[str] | None
+    format: WebhookFormat
+    kinds: list[AlertKind] | None
     enabled: bool
     disabled_reason: str | None
     pending: int
@@ -103,7 +102,7 @@ class DeliveryOut(BaseModel):
 
     id: str
     webhook_id: str
-    type: str
+    type: MessageType
     alert_id: str | None
     state: DeliveryState
     payload: dict[str, Any]

@@ -6,13 +6,14 @@ from typing import Any
 from sqlalchemy import Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.store.tables import Record
+from service.kinds import Act, AlertKind, Outcome
+from service.store.record import Record, one_of
 
 
 class ActivityRecord(Record):
     """What somebody, or the service where `by` is None, did.
 
-    `what` is a subject and a verb: `alert.resolved`, `pose.accepted`. `camera_id` refers to
+    `camera_id` refers to
     nothing, so that it stays when the camera goes; `subject_id` is the alert's, training's or
     window's, `via` the token's. `kind` and `outcome` are an alert's, `until` of a silence or of
     maintenance; `note` has the words that were given. Triggers refuse changes, and deletions of
@@ -23,18 +24,21 @@ class ActivityRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
-    what: Mapped[str]
+    what: Mapped[Act]
     by: Mapped[str | None]
     via: Mapped[str | None]
     camera_id: Mapped[str | None] = mapped_column(String(64))
     subject_id: Mapped[str | None] = mapped_column(String(64))
-    kind: Mapped[str | None]
+    kind: Mapped[AlertKind | None]
     until: Mapped[datetime | None]
-    outcome: Mapped[str | None]
+    outcome: Mapped[Outcome | None]
     note: Mapped[str | None]
     details: Mapped[dict[str, Any]]
 
     __table_args__ = (
+        one_of("what", Act),
+        one_of("kind", AlertKind),
+        one_of("outcome", Outcome),
         Index(None, "camera_id", "id"),
         Index(None, "subject_id", "id"),
         Index(None, "at"),

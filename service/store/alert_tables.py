@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import JSON, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.store.tables import Record
+from service.store.record import Record
 
 
 class MaintenanceRecord(Record):

@@ -7,17 +7,22 @@ from datetime import datetime
 from sqlalchemy import and_, delete, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
+from service.kinds import AlertKind, AlertState, Outcome
 from service.store.tables import AlertRecord
 
-POSE_KINDS = ("drift", "clock", "out_of_range")  # that hold a camera against its prior pose
-SERVICE_KINDS = ("stale",)  # about the service itself, whatever is done at the camera
+POSE_KINDS = (
+    AlertKind.DRIFT,
+    AlertKind.CLOCK,
+    AlertKind.OUT_OF_RANGE,
+)  # that hold a camera against its prior pose
+SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertFilter:
     """Which alerts are wanted; None is any."""
 
-    state: str | None = None
+    state: AlertState | None = None
     camera_id: str | None = None
     group_id: str | None = None
     acknowledged: bool | None = None
@@ -29,31 +34,31 @@ def find(session: Session, alert_id: str) -> AlertRecord | None:
     return session.get(AlertRecord, alert_id)
 
 
-def firing(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
+def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert of a camera and kind, or None."""
     return session.scalars(
         select(AlertRecord).where(
             AlertRecord.camera_id == camera_id,
             AlertRecord.kind == kind,
-            AlertRecord.state == "firing",
+            AlertRecord.state == AlertState.FIRING,
         )
     ).first()
 
 
-def firing_cameras(session: Session, kind: str) -> set[str]:
+def firing_cameras(session: Session, kind: AlertKind) -> set[str]:
     """The cameras about which an alert of a kind is open."""
     return set(
         session.scalars(
             select(AlertRecord.camera_id).where(
                 AlertRecord.kind == kind,
-                AlertRecord.state == "firing",
+                AlertRecord.state == AlertState.FIRING,
                 AlertRecord.camera_id.is_not(None),
             )
         )
     )
 
 
-def newest(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
+def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The alert of a camera and kind that was opened last, or None."""
     return session.scalars(
         select(AlertRecord)
@@ -64,7 +69,7 @@ def newest(session: Session, camera_id: str, kind: str) -> AlertRecord | None:
 
 
 def ended(
-    session: Session, camera_id: str, kinds: Sequence[str] = POSE_KINDS
+    session: Session, camera_id: str, kinds: Sequence[AlertKind] = POSE_KINDS
 ) -> Sequence[AlertRecord]:
     """The alerts of a camera and some kinds that have ended; those about its pose, if unsaid."""
     return session.scalars(
@@ -77,26 +82,26 @@ def ended(
 
 
 def firing_of_source(
-    session: Session, track_source: str, kinds: Sequence[str]
+    session: Session, track_source: str, kinds: Sequence[AlertKind]
 ) -> Sequence[AlertRecord]:
     """The open alerts of some kinds about the cameras of a source of tracks."""
     return session.scalars(
         select(AlertRecord).where(
             AlertRecord.track_source == track_source,
             AlertRecord.kind.in_(kinds),
-            AlertRecord.state == "firing",
+            AlertRecord.state == AlertState.FIRING,
             AlertRecord.camera_id.is_not(None),
         )
     ).all()
 
 
-def firing_group(session: Session, track_source: str, kind: str) -> AlertRecord | None:
+def firing_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert about all of a source of tracks, or None."""
     return session.scalars(
         select(AlertRecord).where(
             AlertRecord.track_source == track_source,
             AlertRecord.kind == kind,
-            AlertRecord.state == "firing",
+            AlertRecord.state == AlertState.FIRING,
             AlertRecord.camera_id.is_(None),
         )
     ).first()
@@ -106,7 +111,7 @@ def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
     """The open alerts that a group is made of."""
     return session.scalars(
         select(AlertRecord)
-        .where(AlertRecord.group_id == group_id, AlertRecord.state == "firing")
+        .where(AlertRecord.group_id == group_id, AlertRecord.state == AlertState.FIRING)
         .order_by(AlertRecord.camera_id)
     ).all()
 
@@ -117,8 +122,8 @@ def groups_without_members(session: Session) -> Sequence[AlertRecord]:
     return session.scalars(
         select(AlertRecord).where(
             AlertRecord.camera_id.is_(None),
-            AlertRecord.state == "firing",
-            ~exists().where(member.group_id == AlertRecord.id, member.state == "firing"),
+            AlertRecord.state == AlertState.FIRING,
+            ~exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING),
         )
     ).all()
 
@@ -126,7 +131,9 @@ def groups_without_members(session: Session) -> Sequence[AlertRecord]:
 def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     """Open alerts whose silence has come to its time."""
     return session.scalars(
-        select(AlertRecord).where(AlertRecord.state == "firing", AlertRecord.silenced_until <= now)
+        select(AlertRecord).where(
+            AlertRecord.state == AlertState.FIRING, AlertRecord.silenced_until <= now
+        )
     ).all()
 
 
@@ -137,7 +144,7 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
         .where(
             AlertRecord.camera_id == camera_id,
             AlertRecord.kind.in_(POSE_KINDS),
-            AlertRecord.outcome.in_(("put_back", "false_alarm")),
+            AlertRecord.outcome.in_((Outcome.PUT_BACK, Outcome.FALSE_ALARM)),
         )
         .order_by(AlertRecord.resolved_at.desc())
         .limit(1)
@@ -169,7 +176,7 @@ def forget(session: Session, before: datetime, limit: int) -> int:
     """Delete up to `limit` alerts that ended before a time. Returns how many."""
     bite = (
         select(AlertRecord.id)
-        .where(AlertRecord.state == "resolved", AlertRecord.resolved_at < before)
+        .where(AlertRecord.state == AlertState.RESOLVED, AlertRecord.resolved_at < before)
         .limit(limit)
     )
     result = session.execute(delete(AlertRecord).where(AlertRecord.id.in_(bite)))

@@ -6,7 +6,8 @@ from typing import Any
 from sqlalchemy import JSON, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.store.tables import Record
+from service.kinds import DeliveryState, MessageType, WebhookFormat
+from service.store.record import Record, one_of
 
 
 class WebhookRecord(Record):
@@ -22,7 +23,7 @@ class WebhookRecord(Record):
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str]
     url: Mapped[str]
-    format: Mapped[str]  # webhook, alertmanager
+    format: Mapped[WebhookFormat]
     kinds: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))  # None: all
     enabled: Mapped[bool]
     disabled_reason: Mapped[str | None]
@@ -38,6 +39,8 @@ class WebhookRecord(Record):
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
+    __table_args__ = (one_of("format", WebhookFormat),)
+
 
 class DeliveryRecord(Record):
     """A message for an endpoint, written with the change that it tells of; `id` is `webhook-id`.
@@ -52,9 +55,9 @@ class DeliveryRecord(Record):
     id: Mapped[str] = mapped_column(String(32), unique=True)
     webhook_id: Mapped[str] = mapped_column(ForeignKey("webhooks.id", ondelete="CASCADE"))
     alert_id: Mapped[str | None] = mapped_column(String(32))
-    type: Mapped[str]
+    type: Mapped[MessageType]
     payload: Mapped[dict[str, Any]]
-    state: Mapped[str]  # pending, delivered, failed
+    state: Mapped[DeliveryState]
     attempts: Mapped[int]
     tries: Mapped[int]
     next_attempt_at: Mapped[datetime | None]
@@ -65,6 +68,8 @@ class DeliveryRecord(Record):
     finished_at: Mapped[datetime | None]
 
     __table_args__ = (
+        one_of("type", MessageType),
+        one_of("state", DeliveryState),
         Index(None, "webhook_id", "state", "number"),
         Index(None, "state", "next_attempt_at"),
         {"sqlite_autoincrement": True},  # numbers are the order of what happened

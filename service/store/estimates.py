@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, String, delete, func, select, type_coerce
+from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables import EstimateRecord
@@ -14,17 +14,6 @@ def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     return session.scalars(
         select(EstimateRecord)
         .where(EstimateRecord.camera_id == camera_id)
-        .order_by(EstimateRecord.id.desc())
-        .limit(1)
-    ).first()
-
-
-def newest_told(session: Session, camera_id: str) -> EstimateRecord | None:
-    """The newest estimate that told anything, or None."""
-    return session.scalars(
-        select(EstimateRecord)
-        .where(EstimateRecord.camera_id == camera_id)
-        .where(type_coerce(EstimateRecord.told, String) != "[]")
         .order_by(EstimateRecord.id.desc())
         .limit(1)
     ).first()

@@ -7,10 +7,11 @@ from typing import Any
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
+from service.kinds import EventType
 from service.store.tables import EventRecord
 
 
-def add(session: Session, type_: str, payload: dict[str, Any], now: datetime) -> None:
+def add(session: Session, type_: EventType, payload: dict[str, Any], now: datetime) -> None:
     """Append an event in the transaction of what it tells of."""
     session.add(EventRecord(type=type_, payload=payload, created_at=now))
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select, true
+from sqlalchemy import ColumnElement, String, func, select, true, type_coerce
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
+from service.kinds import AlertState, DeliveryState, TrainingState
 from service.store.delivery_tables import DeliveryRecord
 from service.store.tables import (
     AlertRecord,
@@ -61,12 +62,28 @@ def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRec
     return {record.camera_id: record for record in session.scalars(query)}
 
 
+def newest_told_estimates(session: Session, ids: Collection[str]) -> dict[str, EstimateRecord]:
+    """The newest estimate of each of some cameras that told anything, without what is behind it."""
+    told = (
+        select(EstimateRecord.id)
+        .where(EstimateRecord.camera_id == CameraRecord.id)
+        .where(type_coerce(EstimateRecord.told, String) != "[]")
+        .order_by(EstimateRecord.id.desc())
+        .limit(1)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == told)
+    query = query.where(CameraRecord.id.in_(ids)).options(defer(EstimateRecord.raw))
+    return {record.camera_id: record for record in session.scalars(query)}
+
+
 def firing(session: Session) -> Sequence[AlertRecord]:
     """All alerts that fire, members of groups among them."""
-    return session.scalars(select(AlertRecord).where(AlertRecord.state == "firing")).all()
+    return session.scalars(select(AlertRecord).where(AlertRecord.state == AlertState.FIRING)).all()
 
 
-def trainings_by_state(session: Session) -> dict[str, int]:
+def trainings_by_state(session: Session) -> dict[TrainingState, int]:
     """How many trainings are stored in each state."""
     rows = session.execute(
         select(TrainingRecord.state, func.count()).group_by(TrainingRecord.state)
@@ -83,7 +100,7 @@ def backlogs(session: Session) -> dict[str, Backlog]:
     """What waits for each webhook that something waits for."""
     rows = session.execute(
         select(DeliveryRecord.webhook_id, func.count(), func.min(DeliveryRecord.created_at))
-        .where(DeliveryRecord.state == "pending")
+        .where(DeliveryRecord.state == DeliveryState.PENDING)
         .group_by(DeliveryRecord.webhook_id)
     )
     return {name: Backlog(count=count, oldest_at=oldest) for name, count, oldest in rows}

@@ -2,13 +2,24 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, String, case, func, select, type_coerce
+from sqlalchemy import (
+    ColumnElement,
+    Float,
+    String,
+    case,
+    column,
+    func,
+    select,
+    type_coerce,
+    values,
+)
 from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
+from service.kinds import AlertState
 from service.store.alert_tables import MaintenanceRecord, RhythmRecord
 from service.store.figures import Ids, among, newest_of
 from service.store.tables import (
@@ -19,6 +30,7 @@ from service.store.tables import (
     TrackRecord,
     TrainingRecord,
 )
+from service.store.tracks import Spans
 from service.store.trainings import UNFINISHED
 
 
@@ -67,16 +79,22 @@ def drift_history(
     return found
 
 
-def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
-    """How many tracks have come that the reference being learned of each camera may be made of."""
+def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) -> dict[str, int]:
+    """How many tracks have come that the reference being learned of each camera may be made of.
+
+    Of those of a camera that were seen at any time `without`, none.
+    """
     begun = func.coalesce(SiteReferenceRecord.from_s, -math.inf)
+    wanted = [
+        TrackRecord.camera_id == CameraRecord.id,
+        TrackRecord.started_s >= begun,
+        TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
+    ]
+    if any(without.values()):
+        wanted.append(~_seen_within(without))
     count = (
         select(func.count())
-        .where(
-            TrackRecord.camera_id == CameraRecord.id,
-            TrackRecord.started_s >= begun,
-            TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
-        )
+        .where(*wanted)
         .correlate(CameraRecord, SiteReferenceRecord)
         .scalar_subquery()
     )
@@ -93,7 +111,7 @@ def learning_counts(session: Session, ids: Ids) -> dict[str, int]:
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
     """The alerts of cameras that fire, those about one camera."""
     query = select(AlertRecord).where(
-        AlertRecord.state == "firing", AlertRecord.camera_id.is_not(None)
+        AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_not(None)
     )
     return session.scalars(query.where(among(AlertRecord.camera_id, ids))).all()
 
@@ -102,7 +120,7 @@ def firing_groups(session: Session) -> Sequence[AlertRecord]:
     """The alerts of groups that fire, the newest first."""
     return session.scalars(
         select(AlertRecord)
-        .where(AlertRecord.state == "firing", AlertRecord.camera_id.is_(None))
+        .where(AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_(None))
         .order_by(AlertRecord.opened_at.desc())
     ).all()
 
@@ -136,6 +154,19 @@ def rhythm_profiles(session: Session, ids: Ids) -> dict[str, dict[str, Any]]:
         among(RhythmRecord.camera_id, ids)
     )
     return {camera_id: profile for camera_id, profile in session.execute(query) if profile}
+
+
+def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
+    """Whether a track was seen at any of some times of its camera: what `outside` denies."""
+    rows = [(camera_id, *span) for camera_id, each in spans.items() for span in each]
+    columns = column("camera_id", String), column("from_s", Float), column("to_s", Float)
+    times = values(*columns, name="times").data(rows).cte("times")
+    within = select(times.c.camera_id).where(
+        times.c.camera_id == TrackRecord.camera_id,
+        TrackRecord.ended_s >= times.c.from_s,
+        TrackRecord.started_s <= times.c.to_s,
+    )
+    return within.correlate(TrackRecord).exists()
 
 
 def _ratio(

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.drift.verdict import Drift
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
@@ -59,3 +61,23 @@ def pose_of_prior(record: PriorPoseRecord) -> CameraPose:
         x_m=record.x_m,
         y_m=record.y_m,
     )
+
+
+def told_drift(drift: Drift) -> dict[str, float | None]:
+    """The told drift as an alert keeps it; None where the tracks cannot tell."""
+    angle_rad = drift.angle_rad if drift.turned else None
+    return {**_told(drift.by, drift.told), "angle_rad": angle_rad}
+
+
+def told_sd(drift: Drift) -> dict[str, float | None]:
+    """The standard deviations of what is told, likewise."""
+    return _told(drift.sd, drift.told)
+
+
+def _told(parameters: PoseParameters, told: tuple[str, ...]) -> dict[str, float | None]:
+    return {
+        "height_m": parameters.height_m if "height" in told else None,
+        "tilt_rad": parameters.tilt_rad if "tilt" in told else None,
+        "roll_rad": parameters.roll_rad if "roll" in told else None,
+        "heading_rad": parameters.heading_rad if "heading" in told else None,
+    }

@@ -5,7 +5,7 @@ from datetime import datetime
 from sqlalchemy import ForeignKey, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.store.tables import Record
+from service.store.record import Record
 
 
 class SourceRecord(Record):

@@ -1,61 +1,28 @@
 """Records of the store. Angles are radians, times aware UTC; track times seconds since epoch."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
-from sqlalchemy import (
-    JSON,
-    DateTime,
-    Dialect,
-    ForeignKey,
-    Index,
-    LargeBinary,
-    MetaData,
-    String,
-    TypeDecorator,
-    UniqueConstraint,
-    text,
+from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, String, UniqueConstraint, text
+from sqlalchemy.orm import Mapped, composite, mapped_column
+
+from models.drift.verdict import Drift
+from models.geometry.pose_parameters import PoseParameters
+from service.kinds import (
+    AlertKind,
+    AlertSource,
+    AlertState,
+    Answer,
+    EventType,
+    Origin,
+    Outcome,
+    PoseState,
+    Severity,
+    TrainingState,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
-
-NAMING = {
-    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-    "ck": "ck_%(table_name)s_%(constraint_name)s",
-    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
-    "pk": "pk_%(table_name)s",
-}
-
-
-class UtcDateTime(TypeDecorator[datetime]):
-    """Aware UTC times; SQLite keeps them without their zone."""
-
-    impl = DateTime
-    cache_ok = True
-
-    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Refuse naive times; store UTC."""
-        if value is None:
-            return None
-        if value.tzinfo is None:
-            raise ValueError(f"time: an aware time is needed, got {value}")
-        return value.astimezone(UTC).replace(tzinfo=None)
-
-    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """Give the zone back."""
-        return None if value is None else value.replace(tzinfo=UTC)
-
-
-class Record(DeclarativeBase):
-    """Base of all records."""
-
-    metadata = MetaData(naming_convention=NAMING)
-    type_annotation_map = {
-        datetime: UtcDateTime,
-        dict[str, Any]: JSON,
-        list[float]: JSON,
-        list[str]: JSON,
-    }
+from service.reason_words import in_words
+from service.reasons import Reasons, code_of, values_of
+from service.store.record import Record, one_of
 
 
 def _camera_key() -> Any:
@@ -64,6 +31,19 @@ def _camera_key() -> Any:
 
 def _key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
     return mapped_column(ForeignKey(target, ondelete=gone), **options)
+
+
+def _parameters(*columns: str) -> Any:
+    """Four columns as one value; a heading that was never known is 0 and not told."""
+    return composite(_as_parameters, *columns)
+
+
+def _as_parameters(
+    height_m: float, tilt_rad: float, roll_rad: float, heading_rad: float | None
+) -> PoseParameters:
+    return PoseParameters(
+        height_m=height_m, tilt_rad=tilt_rad, roll_rad=roll_rad, heading_rad=heading_rad or 0.0
+    )
 
 
 class CameraRecord(Record):
@@ -115,11 +95,14 @@ class PriorPoseRecord(Record):
     heading_rad: Mapped[float]
     x_m: Mapped[float]
     y_m: Mapped[float]
-    origin: Mapped[str]  # registered, changed, accepted
+    origin: Mapped[Origin]
     trusted_by: Mapped[str | None]
     created_at: Mapped[datetime]
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
+        Index(None, "camera_id", "id"),
+    )
 
 
 class SiteReferenceRecord(Record):
@@ -138,7 +121,7 @@ class SiteReferenceRecord(Record):
     id: Mapped[int] = mapped_column(primary_key=True)
     camera_id: Mapped[str] = _camera_key()
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
-    origin: Mapped[str]  # registered, changed, accepted, reset, put_back, source
+    origin: Mapped[Origin]
     source: Mapped[str | None]
     requested_by: Mapped[str | None]
     from_s: Mapped[float | None]
@@ -147,17 +130,20 @@ class SiteReferenceRecord(Record):
     tracks: Mapped[int]
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     walking_speed_mps: Mapped[float | None]
-    offsets: Mapped[dict[str, Any] | None]
-    doubt: Mapped[str]
+    doubts: Mapped[Reasons]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
-    answer: Mapped[str | None]  # put_back, false_alarm
+    answer: Mapped[Answer | None]
     answered_by: Mapped[str | None]
     answered_at: Mapped[datetime | None]
     created_at: Mapped[datetime]
     ready_at: Mapped[datetime | None]
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        one_of("origin", Origin),
+        one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
+        Index(None, "camera_id", "id"),
+    )
 
 
 class FlowMapRecord(Record):
@@ -217,7 +203,7 @@ class TrainingRecord(Record):
     recipe: Mapped[str]
     around: Mapped[dict[str, Any] | None]
     seed: Mapped[int]
-    state: Mapped[str]  # queued, running, succeeded, failed, cancelled
+    state: Mapped[TrainingState]
     attempt: Mapped[int]
     cancel_requested: Mapped[bool]
     step: Mapped[int]
@@ -230,7 +216,11 @@ class TrainingRecord(Record):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
 
-    __table_args__ = (Index(None, "camera_id", "queued_at"), Index(None, "state"))
+    __table_args__ = (
+        one_of("state", TrainingState),
+        Index(None, "camera_id", "queued_at"),
+        Index(None, "state"),
+    )
 
 
 class ModelRecord(Record):
@@ -272,8 +262,8 @@ class PredictionRecord(Record):
 class EstimateRecord(Record):
     """The served pose at one time, and what is behind it.
 
-    Height, tilt, roll and heading are the served ones: the prior's where the tracks cannot tell.
-    Drifts and standard deviations are the estimator's for all four; `told` names those that count.
+    `pose` is the served one: the prior's where the tracks cannot tell. `drift_by` and `pose_sd` are
+    the estimator's for all four parameters; `told` names those that count.
     `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
     one. Estimates of before there were flow maps have no `heading_sd_rad`.
     """
@@ -285,8 +275,8 @@ class EstimateRecord(Record):
     model_id: Mapped[str | None] = _key("models.id", "SET NULL", index=True)
     prior_pose_id: Mapped[int] = _key("prior_poses.id", index=True)
     reference_id: Mapped[int | None] = _key("site_references.id", index=True)
-    state: Mapped[str]  # learning, ok, drifting, out_of_range
-    reason: Mapped[str]
+    state: Mapped[PoseState]
+    reasons: Mapped[Reasons]
     told: Mapped[list[str]]  # of tilt, roll, height, heading
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
@@ -311,8 +301,32 @@ class EstimateRecord(Record):
     to_s: Mapped[float]
     newest_track_pk: Mapped[int]
     created_at: Mapped[datetime]
+    pose: Mapped[PoseParameters] = _parameters("height_m", "tilt_rad", "roll_rad", "heading_rad")
+    pose_sd: Mapped[PoseParameters] = _parameters(
+        "height_sd_m", "tilt_sd_rad", "roll_sd_rad", "heading_sd_rad"
+    )
+    drift_by: Mapped[PoseParameters] = _parameters(
+        "drift_height_m", "drift_tilt_rad", "drift_roll_rad", "drift_heading_rad"
+    )
 
-    __table_args__ = (Index(None, "camera_id", "id"),)
+    __table_args__ = (
+        # That nobody comes is no estimate's to say.
+        one_of("state", [state for state in PoseState if state != PoseState.NO_DATA]),
+        Index(None, "camera_id", "id"),
+    )
+
+    @property
+    def drift(self) -> Drift:
+        """The drift against the prior pose, and which of it is told."""
+        return Drift(
+            by=self.drift_by,
+            sd=self.pose_sd,
+            angle_rad=self.drift_angle_rad,
+            told=tuple(self.told),
+        )
+
+
+_FIRING = f"state = '{AlertState.FIRING}'"
 
 
 class AlertRecord(Record):
@@ -331,12 +345,12 @@ class AlertRecord(Record):
     camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
     group_id: Mapped[str | None] = _key("alerts.id", "SET NULL", index=True)
     track_source: Mapped[str | None]
-    kind: Mapped[str]  # drift, no_data, out_of_range, clock, stale, tracker
-    state: Mapped[str]  # firing, resolved
-    source: Mapped[str]  # estimate, reference, rhythm, upkeep, group, tracks
+    kind: Mapped[AlertKind]
+    state: Mapped[AlertState]
+    source: Mapped[AlertSource]
     told: Mapped[bool] = mapped_column(default=False)
-    severity: Mapped[str]  # warning, critical
-    reason: Mapped[str]
+    severity: Mapped[Severity]
+    reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]
     opened_at: Mapped[datetime]
     changed_at: Mapped[datetime | None]
@@ -348,29 +362,49 @@ class AlertRecord(Record):
     silenced_by: Mapped[str | None]
     resolved_at: Mapped[datetime | None]
     resolved_by: Mapped[str | None]
-    outcome: Mapped[str | None]  # put_back, accepted, false_alarm, cleared
+    outcome: Mapped[Outcome | None]
     note: Mapped[str | None]
 
     __table_args__ = (
+        one_of("kind", AlertKind),
+        one_of("state", AlertState),
+        one_of("source", AlertSource),
+        one_of("severity", Severity),
+        one_of("outcome", Outcome),
         Index(
             "uq_alerts_firing",
             "camera_id",
             "kind",
             unique=True,
-            sqlite_where=text("state = 'firing'"),
-            postgresql_where=text("state = 'firing'"),
+            sqlite_where=text(_FIRING),
+            postgresql_where=text(_FIRING),
         ),
         Index(
             "uq_alerts_firing_group",
             "track_source",
             "kind",
             unique=True,
-            sqlite_where=text("state = 'firing' AND camera_id IS NULL"),
-            postgresql_where=text("state = 'firing' AND camera_id IS NULL"),
+            sqlite_where=text(f"{_FIRING} AND camera_id IS NULL"),
+            postgresql_where=text(f"{_FIRING} AND camera_id IS NULL"),
         ),
         Index(None, "opened_at"),
         Index(None, "camera_id", "opened_at"),
     )
+
+    @property
+    def reason(self) -> str:
+        """Why it was opened, in words."""
+        return in_words(self.reasons)
+
+    @property
+    def reason_code(self) -> str | None:
+        """The code of the first reason; None of a group that is about to be told."""
+        return code_of(self.reasons)
+
+    @property
+    def reason_values(self) -> dict[str, Any]:
+        """The numbers and names of the first reason, angles in degrees."""
+        return values_of(self.reasons)
 
 
 class EventRecord(Record):
@@ -379,8 +413,11 @@ class EventRecord(Record):
     __tablename__ = "events"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    type: Mapped[str]  # pose, alert, training
+    type: Mapped[EventType]
     payload: Mapped[dict[str, Any]]
     created_at: Mapped[datetime]
 
-    __table_args__ = ({"sqlite_autoincrement": True},)  # an id is never given twice
+    __table_args__ = (
+        one_of("type", EventType),
+        {"sqlite_autoincrement": True},  # an id is never given twice
+    )

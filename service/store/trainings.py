@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
+from service.kinds import TrainingState
 from service.store.tables import ModelRecord, TrainingRecord
 
-UNFINISHED = ("queued", "running")
+UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 
 
 def find(session: Session, training_id: str) -> TrainingRecord | None:

@@ -6,6 +6,7 @@ from datetime import datetime
 from sqlalchemy import delete, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
+from service.kinds import AlertState, DeliveryState
 from service.store.delivery_tables import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 from service.store.tables import AlertRecord
 
@@ -30,7 +31,7 @@ def pending(session: Session) -> dict[str, int]:
     """How many deliveries of each webhook wait."""
     rows = session.execute(
         select(DeliveryRecord.webhook_id, func.count())
-        .where(DeliveryRecord.state == "pending")
+        .where(DeliveryRecord.state == DeliveryState.PENDING)
         .group_by(DeliveryRecord.webhook_id)
     )
     return {webhook_id: count for webhook_id, count in rows}
@@ -42,7 +43,7 @@ def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:
 
 
 def log(
-    session: Session, webhook_id: str, state: str | None, limit: int
+    session: Session, webhook_id: str, state: DeliveryState | None, limit: int
 ) -> Sequence[DeliveryRecord]:
     """A webhook's deliveries, newest first."""
     query = select(DeliveryRecord).where(DeliveryRecord.webhook_id == webhook_id)
@@ -68,7 +69,7 @@ def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord
     earlier = aliased(DeliveryRecord)
     waits = exists().where(
         earlier.webhook_id == webhook_id,
-        earlier.state == "pending",
+        earlier.state == DeliveryState.PENDING,
         earlier.alert_id == DeliveryRecord.alert_id,
         earlier.number < DeliveryRecord.number,
     )
@@ -76,7 +77,7 @@ def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord
         select(DeliveryRecord)
         .where(
             DeliveryRecord.webhook_id == webhook_id,
-            DeliveryRecord.state == "pending",
+            DeliveryRecord.state == DeliveryState.PENDING,
             DeliveryRecord.next_attempt_at <= now,
             ~waits,
         )
@@ -90,7 +91,9 @@ def due(session: Session, now: datetime) -> set[str]:
     return set(
         session.scalars(
             select(DeliveryRecord.webhook_id)
-            .where(DeliveryRecord.state == "pending", DeliveryRecord.next_attempt_at <= now)
+            .where(
+                DeliveryRecord.state == DeliveryState.PENDING, DeliveryRecord.next_attempt_at <= now
+            )
             .distinct()
         )
     )
@@ -100,7 +103,7 @@ def waiting(session: Session, now: datetime) -> Sequence[DeliveryRecord]:
     """Deliveries whose next attempt is yet to come."""
     return session.scalars(
         select(DeliveryRecord).where(
-            DeliveryRecord.state == "pending", DeliveryRecord.next_attempt_at > now
+            DeliveryRecord.state == DeliveryState.PENDING, DeliveryRecord.next_attempt_at > now
         )
     ).all()
 
@@ -111,7 +114,7 @@ def bring_forward(session: Session, webhook_id: str, now: datetime, refused: Seq
         update(DeliveryRecord)
         .where(
             DeliveryRecord.webhook_id == webhook_id,
-            DeliveryRecord.state == "pending",
+            DeliveryRecord.state == DeliveryState.PENDING,
             DeliveryRecord.next_attempt_at > now,
             or_(DeliveryRecord.status_code.is_(None), DeliveryRecord.status_code.not_in(refused)),
         )
@@ -123,13 +126,13 @@ def give_up(session: Session, before: datetime, now: datetime, limit: int) -> in
     """End up to `limit` that have waited since before a time, on a disabled webhook say."""
     bite = (
         select(DeliveryRecord.number)
-        .where(DeliveryRecord.state == "pending", DeliveryRecord.queued_at < before)
+        .where(DeliveryRecord.state == DeliveryState.PENDING, DeliveryRecord.queued_at < before)
         .limit(limit)
     )
     result = session.execute(
         update(DeliveryRecord)
         .where(DeliveryRecord.number.in_(bite))
-        .values(state="failed", finished_at=now, next_attempt_at=None)
+        .values(state=DeliveryState.FAILED, finished_at=now, next_attempt_at=None)
     )
     return int(result.rowcount)  # type: ignore[attr-defined]
 
@@ -157,7 +160,7 @@ def forget_old_secrets(session: Session, now: datetime, limit: int) -> int:
 def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Sequence[AlertRecord]:
     """Alerts that fire and are not silenced, of some kinds or all; a group for its members."""
     query = select(AlertRecord).where(
-        AlertRecord.state == "firing",
+        AlertRecord.state == AlertState.FIRING,
         AlertRecord.group_id.is_(None),
         or_(AlertRecord.silenced_until.is_(None), AlertRecord.silenced_until <= now),
     )

@@ -4,7 +4,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.store.tables import Record
+from service.store.record import Record
 
 
 class WorkerRecord(Record):

@@ -7,28 +7,30 @@ from datetime import datetime, tzinfo
 
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.quantiles import Z90
+from service.kinds import AlertKind, Outcome
 from service.recalibration.camera_page import CameraPage
 from service.recalibration.outbox import is_silenced
 from service.store.tables import EstimateRecord
 from service.web.moments import when
-from service.web.sentences import NAMES, signed
-from service.web.words import ago
+from service.web.sentences import signed
+from service.web.words import NAMES, ago
 
 KINDS = {
-    "drift": "The camera moved",
-    "clock": "The clock looks wrong",
-    "out_of_range": "Beyond the model's range",
-    "no_data": "No people come",
-    "stale": "Its estimate is not being made",
-    "tracker": "Another tracker posts",
+    AlertKind.DRIFT: "The camera moved",
+    AlertKind.CLOCK: "The clock looks wrong",
+    AlertKind.OUT_OF_RANGE: "Beyond the model's range",
+    AlertKind.NO_DATA: "No people come",
+    AlertKind.STALE: "Its estimate is not being made",
+    AlertKind.TRACKER: "Another tracker posts",
 }
 OUTCOMES = {
-    "put_back": "put back",
-    "accepted": "new pose accepted",
-    "false_alarm": "false alarm",
-    "cleared": "ended by itself",
-    "camera_removed": "camera removed",
+    Outcome.PUT_BACK: "put back",
+    Outcome.ACCEPTED: "new pose accepted",
+    Outcome.FALSE_ALARM: "false alarm",
+    Outcome.CLEARED: "ended by itself",
+    Outcome.CAMERA_REMOVED: "camera removed",
 }
 _UNCHANGED_M = 0.05
 
@@ -71,15 +73,12 @@ def number_rows(
     told = () if estimate is None else tuple(estimate.told)
     rows = []
     for name, words in NAMES.items():
-        before, after = (_number(pose, name) for pose in (prior, served))
+        poses = PoseParameters.of_pose(prior), PoseParameters.of_pose(served)
+        before, after = (_shown(pose.of(name), name) for pose in poses)
         unit, digits = (" m", 2) if name == "height" else ("°", 1)
         row = {"name": words.capitalize(), "prior": _text(before, digits) + unit}
         if estimate is not None and name in told:
-            suffix = "_m" if name == "height" else "_rad"
-            drift = float(getattr(estimate, f"drift_{name}{suffix}"))
-            sd = float(getattr(estimate, f"{name}_sd{suffix}") or 0.0)
-            if name != "height":
-                drift, sd = math.degrees(drift), math.degrees(sd)
+            drift, sd = (_shown(value, name) for value in estimate.drift.of(name))
             row |= {
                 "served": _text(after, digits) + unit,
                 "drift": f"{signed(drift, digits)}{unit}",
@@ -133,7 +132,5 @@ def _text(value: float, digits: int) -> str:
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
-def _number(pose: CameraPose, name: str) -> float:
-    if name == "height":
-        return pose.height_m
-    return math.degrees(float(getattr(pose, f"{name}_rad")))
+def _shown(value: float, name: str) -> float:
+    return value if name == "height" else math.degrees(value)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from enum import StrEnum
 
 import numpy as np
 
@@ -21,11 +21,20 @@ _LOW_M, _HIGH_M, _MILLIMETRES_M = 1.5, 60.0, 500.0
 _LEVEL = math.radians(45)
 
 
+class Tone(StrEnum):
+    """How a saying is meant, those first that somebody has to look at."""
+
+    CRITICAL = "critical"
+    WARNING = "warning"
+    GOOD = "good"
+    INFO = "info"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Saying:
     """Something about a pose; `field` and `value` may mend it."""
 
-    kind: Literal["good", "info", "warning", "critical"]
+    kind: Tone
     text: str
     field: str | None = None
     value: str | None = None
@@ -35,13 +44,13 @@ def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> lis
     """What is to say of a pose."""
     found = [*_looking(lens, pose, typed_angles=typed_angles), *_standing(pose)]
     if not typed_angles:
-        found.append(Saying(kind="info", text=f"R and t say: {pose_words(pose)}."))
+        found.append(Saying(kind=Tone.INFO, text=f"R and t say: {pose_words(pose)}."))
     return found
 
 
 def worst_first(sayings: Sequence[Saying]) -> list[Saying]:
     """The same, those first that somebody has to look at; then what is good to know."""
-    order = ("critical", "warning", "good", "info")
+    order = list(Tone)
     return sorted(sayings, key=lambda saying: order.index(saying.kind))
 
 
@@ -71,7 +80,7 @@ def judge_tracks(
     if floating:
         found.append(
             Saying(
-                kind="critical" if 2 * floating > len(tracks) else "warning",
+                kind=Tone.CRITICAL if 2 * floating > len(tracks) else Tone.WARNING,
                 text=f"{floating} of {len(tracks)} people walk in the sky: above the horizon, or "
                 "too close to it. The tilt, or its sign, is wrong.",
             )
@@ -79,14 +88,14 @@ def judge_tracks(
     if math.isfinite(speed):
         found.append(_pace(speed, pose, rate_hz))
     elif not floating:
-        found.append(Saying(kind="info", text="No track is long enough to tell how fast it is."))
+        found.append(Saying(kind=Tone.INFO, text="No track is long enough to tell how fast it is."))
     return found
 
 
 def _pace(speed: float, pose: CameraPose, rate_hz: float) -> Saying:
     said = f"People walk at {speed:.2f} m/s here"
     if _PLAUSIBLE_MPS[0] <= speed <= _PLAUSIBLE_MPS[1]:
-        return Saying(kind="good", text=f"{said}: plausible.")
+        return Saying(kind=Tone.GOOD, text=f"{said}: plausible.")
     share = _USUAL_MPS / max(speed, 1e-3)
     mends = (
         f"At a usual {_USUAL_MPS} m/s the camera would be {pose.height_m * share:.1f} m high, or "
@@ -94,9 +103,10 @@ def _pace(speed: float, pose: CameraPose, rate_hz: float) -> Saying:
     )
     pace = "slow" if speed < _USUAL_MPS else "fast"
     if _POSSIBLE_MPS[0] <= speed <= _POSSIBLE_MPS[1]:
-        return Saying(kind="warning", text=f"{said}, which is {pace}. {mends}")
+        return Saying(kind=Tone.WARNING, text=f"{said}, which is {pace}. {mends}")
     return Saying(
-        kind="critical", text=f"{said}: too {pace}. The height or the frame rate is wrong. {mends}"
+        kind=Tone.CRITICAL,
+        text=f"{said}: too {pace}. The height or the frame rate is wrong. {mends}",
     )
 
 
@@ -111,14 +121,14 @@ def _looking(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[
             how = "Is R really camera from world, with Z up and the picture's y down?"
         return [
             Saying(
-                kind="critical" if share < 0.3 else "warning",
+                kind=Tone.CRITICAL if share < 0.3 else Tone.WARNING,
                 text=f"The camera looks up by {-tilt_deg:.1f}°, so {ground}. {how}",
                 field="tilt_deg" if typed_angles else None,
                 value=f"{-tilt_deg:g}" if typed_angles else None,
             )
         ]
     if share == 0:
-        return [Saying(kind="critical", text="There is no ground in the picture.")]
+        return [Saying(kind=Tone.CRITICAL, text="There is no ground in the picture.")]
     uv, _ = horizon_pixels(lens, pose)
     seen = uv[lens.contains(uv)]
     if len(seen):
@@ -126,7 +136,7 @@ def _looking(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[
         where = f"The horizon runs {down:.0f} % down from the top of the picture"
     else:
         where = "The horizon is above the picture: it shows ground only"
-    return [Saying(kind="info", text=f"{where}. Compare it with what the camera shows.")]
+    return [Saying(kind=Tone.INFO, text=f"{where}. Compare it with what the camera shows.")]
 
 
 def _standing(pose: CameraPose) -> list[Saying]:
@@ -134,18 +144,20 @@ def _standing(pose: CameraPose) -> list[Saying]:
     if pose.height_m > _MILLIMETRES_M:
         found.append(
             Saying(
-                kind="critical",
+                kind=Tone.CRITICAL,
                 text=f"The camera would be {pose.height_m:,.0f} m high. Are these millimetres?",
             )
         )
     elif not _LOW_M <= pose.height_m <= _HIGH_M:
         found.append(
-            Saying(kind="warning", text=f"{pose.height_m:.2f} m is unusual for a camera's height.")
+            Saying(
+                kind=Tone.WARNING, text=f"{pose.height_m:.2f} m is unusual for a camera's height."
+            )
         )
     if abs(pose.roll_rad) > _LEVEL:
         found.append(
             Saying(
-                kind="warning",
+                kind=Tone.WARNING,
                 text=f"The camera is rolled by {math.degrees(pose.roll_rad):.0f}°: it lies on its "
                 "side or hangs upside down. Is the picture turned, too?",
             )

@@ -7,17 +7,20 @@ from datetime import datetime, tzinfo
 
 from markupsafe import Markup
 
+from service.kinds import AlertKind, PoseState, Severity
+from service.reason_words import group_in_words
+from service.recalibration.camera_state import MOVED
 from service.recalibration.fleet import FleetAlert, FleetCamera, FleetGroup
+from service.store.alerts import POSE_KINDS
 from service.web.camera_words import KINDS
 from service.web.sparkline import sparkline
 from service.web.words import STATES, ago, clock_time, duration, from_seconds, situation
 
-_URGENT = ("drifting", "out_of_range")
 # What a state says by itself; every other alert is named.
 _SAID = {
-    "drifting": ("drift", "clock"),
-    "out_of_range": ("out_of_range", "drift", "clock"),
-    "no_data": ("no_data",),
+    PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
+    PoseState.OUT_OF_RANGE: POSE_KINDS,
+    PoseState.NO_DATA: (AlertKind.NO_DATA,),
 }
 
 
@@ -30,7 +33,7 @@ class Row:
 
     id: str
     name: str
-    state: str
+    state: PoseState
     word: str
     words: str
     flags: tuple[str, ...]
@@ -54,7 +57,7 @@ class Banner:
 
     title: str
     words: str
-    severity: str
+    severity: Severity
     since: str
     since_clock: str
     since_words: str
@@ -72,7 +75,7 @@ def banners_of(groups: Sequence[FleetGroup], now: datetime, zone: tzinfo) -> lis
     return [
         Banner(
             title=f"Tracker {group.track_source}:",
-            words=group.alert.reason.replace(f" of the tracker {group.track_source!r}", ""),
+            words=group_in_words(group.alert.reasons),
             severity=group.alert.severity,
             since=group.alert.since.isoformat(),
             since_clock=clock_time(group.alert.since, zone),
@@ -84,7 +87,7 @@ def banners_of(groups: Sequence[FleetGroup], now: datetime, zone: tzinfo) -> lis
     ]
 
 
-def counts_of(cameras: Sequence[FleetCamera]) -> list[tuple[str, str, int]]:
+def counts_of(cameras: Sequence[FleetCamera]) -> list[tuple[PoseState, str, int]]:
     """Each state with its word and how many cameras are in it."""
     count = Counter(camera.state for camera in cameras)
     return [(state, word, count[state]) for state, word in STATES.items()]
@@ -92,7 +95,7 @@ def counts_of(cameras: Sequence[FleetCamera]) -> list[tuple[str, str, int]]:
 
 def urgent(cameras: Sequence[FleetCamera]) -> int:
     """How many have moved."""
-    return sum(camera.state in _URGENT for camera in cameras)
+    return sum(camera.state in MOVED for camera in cameras)
 
 
 def _row(camera: FleetCamera, now: datetime, zone: tzinfo) -> Row:
@@ -136,11 +139,11 @@ def _flags(camera: FleetCamera, now: datetime) -> tuple[str, ...]:
         flags.append(f"maintenance for {duration(left_s)} more")
     if camera.alert is not None:
         flags += _alert_flags(camera.alert, now)
-    elif camera.state in _URGENT and camera.attended_until is None:
+    elif camera.state in MOVED and camera.attended_until is None:
         flags.append("no alert is open")
     for alert in camera.alerts:
         if alert.kind not in _SAID.get(camera.state, ()):
-            flags.append(f"alert: {KINDS.get(alert.kind, alert.kind).lower()}")
+            flags.append(f"alert: {KINDS[alert.kind].lower()}")
     return tuple(flags)
 
 

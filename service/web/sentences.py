@@ -6,14 +6,15 @@ from datetime import UTC, datetime, tzinfo
 
 from models.estimation.numbers import ANGLES
 from models.quantiles import Z90
+from service.kinds import AlertKind, PoseState
+from service.reason_words import in_words
 from service.recalibration.camera_page import CameraPage
+from service.recalibration.camera_state import MOVED
 from service.store.alerts import POSE_KINDS
 from service.store.tables import AlertRecord, EstimateRecord
 from service.web.moments import when
-from service.web.words import duration
+from service.web.words import NAMES, duration
 
-# Operators say pan. Height is told apart.
-NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
 _SAYS_DEG = 0.1  # less is not worth a word
 
 
@@ -21,9 +22,9 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
     """The state of a camera in plain words."""
     standing, estimate = page.pose.standing, page.pose.estimate
     quiet = ""
-    if page.silence is not None and standing.silent and standing.state != "learning":
+    if page.silence is not None and standing.silent and standing.state != PoseState.LEARNING:
         since = when(datetime.fromtimestamp(page.silence.last_s, UTC), page.now, zone)
-        quiet = f"No people since {since}: {page.silence.reason}."
+        quiet = f"No people since {since}: {in_words(page.silence.reasons)}."
     return " ".join(part for part in (_how_it_stands(page, estimate, zone), quiet) if part)
 
 
@@ -31,21 +32,21 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
     standing = page.pose.standing
     state, told = standing.state, estimate is not None and bool(estimate.told)
     doubts = [alert for alert in standing.alerts if alert.kind in POSE_KINDS]
-    if state in ("drifting", "out_of_range") and not standing.judged:
+    if state in MOVED and not standing.judged:
         words = _moved(page, estimate, zone) if estimate is not None and told else _alarmed(doubts)
         return f"{words} That is what is known last: the next people will tell how it stands now."
     if estimate is not None and standing.judged and estimate.drifted:
         return _moved(page, estimate, zone)
     if doubts:  # of a reference, or about a move whose size is not told
         return _alarmed(doubts)
-    if state == "learning" or estimate is None or not standing.judged:
+    if state == PoseState.LEARNING or estimate is None or not standing.judged:
         return _waiting(page)
-    if state == "no_data":
+    if state == PoseState.NO_DATA:
         return "When it was last told, it stood where it should."
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
-    if state == "out_of_range":
+    if state == PoseState.OUT_OF_RANGE:
         how = moved_words(estimate)
         edge = "At the edge of what its model was trained for"
         return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
@@ -56,7 +57,7 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
 
 
 def _alarmed(doubts: Sequence[AlertRecord]) -> str:
-    return f"It may not stand where it should: {doubts[0].reason.rstrip('.')}."
+    return f"It may not stand where it should: {doubts[0].reason}."
 
 
 def turn_words(estimate: EstimateRecord) -> str:
@@ -78,10 +79,10 @@ def turn_words(estimate: EstimateRecord) -> str:
 
 def height_words(estimate: EstimateRecord) -> str:
     """How far a camera was raised or lowered: "0.24 m higher"; empty where that is not told."""
-    if "height" not in estimate.told or abs(estimate.drift_height_m) < _height_says_m(estimate):
+    if "height" not in estimate.told or abs(estimate.drift_by.height_m) < _height_says_m(estimate):
         return ""
-    way = "higher" if estimate.drift_height_m > 0 else "lower"
-    return f"{abs(estimate.drift_height_m):.2f} m {way}"
+    way = "higher" if estimate.drift_by.height_m > 0 else "lower"
+    return f"{abs(estimate.drift_by.height_m):.2f} m {way}"
 
 
 def moved_words(estimate: EstimateRecord, since: str = "") -> str:
@@ -105,7 +106,7 @@ def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
     if not told:
         return None
     drifts = [_degrees(estimate, name) for name in told]
-    sds = [math.degrees(_sd(estimate, name)) for name in told]
+    sds = [math.degrees(estimate.pose_sd.of(name)) for name in told]
     length = math.hypot(*drifts)
     if length < max(sds):  # without a direction, the widest
         return Z90 * max(sds)
@@ -117,7 +118,7 @@ def _moved(page: CameraPage, estimate: EstimateRecord, zone: tzinfo) -> str:
     since = ""
     if estimate.drift_since is not None:
         since = f" about {when(estimate.drift_since, page.now, zone)}"
-    if any(story.record.kind == "clock" for story in page.firing):
+    if any(story.record.kind == AlertKind.CLOCK for story in page.firing):
         how = moved_words(estimate)
         return (
             f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
@@ -135,15 +136,15 @@ def _sure(estimate: EstimateRecord) -> str:
     if half is not None:
         parts.append(f"±{max(half, 0.1):.1f}°")
     if "height" in estimate.told and (
-        half is None or abs(estimate.drift_height_m) >= _height_says_m(estimate)
+        half is None or abs(estimate.drift_by.height_m) >= _height_says_m(estimate)
     ):
-        parts.append(f"±{max(Z90 * estimate.height_sd_m, 0.01):.2f} m")
+        parts.append(f"±{max(Z90 * estimate.pose_sd.height_m, 0.01):.2f} m")
     return f"; sure to {' and '.join(parts)}" if parts else ""
 
 
 def _waiting(page: CameraPage) -> str:
     reference, standing = page.pose.reference, page.pose.standing
-    if standing.state in ("ok", "no_data"):
+    if standing.state in (PoseState.OK, PoseState.NO_DATA):
         who = standing.reference.answered_by or "somebody"
         return f"Where it should be, as {who} said. The next people will tell."
     if not reference.ready:
@@ -152,16 +153,12 @@ def _waiting(page: CameraPage) -> str:
 
 
 def _degrees(estimate: EstimateRecord, name: str) -> float:
-    return math.degrees(float(getattr(estimate, f"drift_{name}_rad")))
-
-
-def _sd(estimate: EstimateRecord, name: str) -> float:
-    return float(getattr(estimate, f"{name}_sd_rad") or 0.0)
+    return math.degrees(estimate.drift_by.of(name))
 
 
 def _says_deg(estimate: EstimateRecord, name: str) -> float:
-    return max(Z90 * math.degrees(_sd(estimate, name)), _SAYS_DEG)
+    return max(Z90 * math.degrees(estimate.pose_sd.of(name)), _SAYS_DEG)
 
 
 def _height_says_m(estimate: EstimateRecord) -> float:
-    return max(Z90 * estimate.height_sd_m, 0.05)
+    return max(Z90 * estimate.pose_sd.height_m, 0.05)

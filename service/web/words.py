@@ -5,54 +5,63 @@ from datetime import UTC, datetime, timedelta, tzinfo
 
 from babel.dates import format_timedelta
 
-from service.recalibration.camera_state import PoseState
-from service.recalibration.fleet import FleetCamera, FleetDrift
+from models.drift.verdict import Drift
+from models.estimation.numbers import ANGLES
+from service.kinds import AlertKind, PoseState
+from service.recalibration.fleet import FleetCamera
 
-STATES: dict[PoseState, str] = {
-    "drifting": "Moved",
-    "out_of_range": "Far off",
-    "no_data": "No people",
-    "learning": "Learning",
-    "ok": "Steady",
+STATES = {
+    PoseState.DRIFTING: "Moved",
+    PoseState.OUT_OF_RANGE: "Far off",
+    PoseState.NO_DATA: "No people",
+    PoseState.LEARNING: "Learning",
+    PoseState.OK: "Steady",
 }
 _AT_LEAST = 1.5  # of a unit, to say a length of time in it: "90 minutes", then "2 hours"
 _JUST_NOW = timedelta(seconds=10), timedelta(minutes=1)  # before and after now
+# Operators say pan. Height is told apart.
+NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
 
 
 def situation(camera: FleetCamera, now: datetime) -> str:
     """What a camera does, in one line."""
-    if camera.state == "drifting" and any(alert.kind == "clock" for alert in camera.alerts):
+    if camera.state == PoseState.DRIFTING and any(
+        alert.kind == AlertKind.CLOCK for alert in camera.alerts
+    ):
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
-    if camera.alert is not None and camera.alert.kind == "stale":
+    if camera.alert is not None and camera.alert.kind == AlertKind.STALE:
         return "its estimate is not being made: what was seen last may be long ago"
-    if camera.state == "learning":
+    if camera.state == PoseState.LEARNING:
         return _learning(camera)
-    if camera.state == "no_data":
+    if camera.state == PoseState.NO_DATA:
         silent_s = now.timestamp() - (camera.last_track_s or now.timestamp())
         return f"no people seen for {duration(silent_s)}, longer than is usual here"
     moved = drift_words(camera.drift)
-    if camera.state == "ok" and not camera.judged:
+    if camera.state == PoseState.OK and not camera.judged:
         return "where it should be, as somebody said; the next people will tell"
     if moved and not camera.judged:
         moved = f"{moved} when it was last told"
-    if camera.state == "out_of_range":
+    if camera.state == PoseState.OUT_OF_RANGE:
         return f"{moved or 'moved'}: further than it was trained for, so this is rough"
-    if camera.state == "drifting":
+    if camera.state == PoseState.DRIFTING:
         return moved or "moved, but by how much is not told yet"
     return "standing still"
 
 
-def drift_words(drift: FleetDrift | None) -> str:
+def drift_words(drift: Drift | None) -> str:
     """How far a camera has moved: "turned 2.1° (tilt +1.9°, pan −0.8°), 12 cm lower"."""
     if drift is None:
         return ""
     parts = []
-    turns = [("tilt", drift.tilt_rad), ("roll", drift.roll_rad), ("pan", drift.heading_rad)]
-    named = ", ".join(f"{name} {degrees(value, signed=True)}" for name, value in turns if value)
-    if drift.angle_rad is not None and named:
+    named = ", ".join(
+        f"{NAMES[name]} {degrees(drift.by.of(name), signed=True)}"
+        for name in ANGLES
+        if name in drift.told and drift.by.of(name)
+    )
+    if named:
         parts.append(f"turned {degrees(drift.angle_rad)} ({named})")
-    if drift.height_m is not None and abs(drift.height_m) >= 0.005:
-        parts.append(height_change(drift.height_m))
+    if "height" in drift.told and abs(drift.by.height_m) >= 0.005:
+        parts.append(height_change(drift.by.height_m))
     return ", ".join(parts)
 
 

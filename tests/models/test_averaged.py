@@ -24,9 +24,9 @@ def test_the_estimate_is_the_mean():
         height_m=np.array([4.0, 5.0, 6.0, 7.0, 8.0]), quaternion_wxyz=quaternions(tilts)
     )
     estimate = averaged_estimate(predictions, seed=0)
-    assert estimate.height_m == pytest.approx(6.0)
-    assert estimate.tilt_rad == pytest.approx(0.3)
-    assert estimate.roll_rad == pytest.approx(0.0, abs=1e-12)
+    assert estimate.value.height_m == pytest.approx(6.0)
+    assert estimate.value.tilt_rad == pytest.approx(0.3)
+    assert estimate.value.roll_rad == pytest.approx(0.0, abs=1e-12)
     assert estimate.tracks == 5
 
 
@@ -36,8 +36,8 @@ def test_signs_of_quaternions_do_not_matter():
     heights = np.full(6, 5.0)
     first = averaged_estimate(TrackPredictions(height_m=heights, quaternion_wxyz=q), 0)
     again = averaged_estimate(TrackPredictions(height_m=heights, quaternion_wxyz=flipped), 0)
-    assert again.tilt_rad == pytest.approx(first.tilt_rad)
-    assert again.tilt_sd_rad == pytest.approx(first.tilt_sd_rad)
+    assert again.value.tilt_rad == pytest.approx(first.value.tilt_rad)
+    assert again.sd.tilt_rad == pytest.approx(first.sd.tilt_rad)
 
 
 def test_the_bootstrap_finds_the_sd_of_the_mean():
@@ -48,9 +48,9 @@ def test_the_bootstrap_finds_the_sd_of_the_mean():
         quaternion_wxyz=quaternions(rng.normal(0.3, 0.05, count), rng.normal(0, 0.1, count)),
     )
     estimate = averaged_estimate(predictions, seed=1)
-    assert estimate.height_sd_m == pytest.approx(1.0 / math.sqrt(count), rel=0.15)
-    assert estimate.tilt_sd_rad == pytest.approx(0.05 / math.sqrt(count), rel=0.15)
-    assert estimate.roll_sd_rad == pytest.approx(0.1 / math.sqrt(count), rel=0.15)
+    assert estimate.sd.height_m == pytest.approx(1.0 / math.sqrt(count), rel=0.15)
+    assert estimate.sd.tilt_rad == pytest.approx(0.05 / math.sqrt(count), rel=0.15)
+    assert estimate.sd.roll_rad == pytest.approx(0.1 / math.sqrt(count), rel=0.15)
     assert averaged_estimate(predictions, seed=1) == estimate
     assert averaged_estimate(predictions, seed=2) != estimate
 
@@ -58,8 +58,8 @@ def test_the_bootstrap_finds_the_sd_of_the_mean():
 def test_tracks_that_agree_have_no_spread():
     predictions = TrackPredictions(height_m=np.full(9, 5.0), quaternion_wxyz=quaternions([0.2] * 9))
     estimate = averaged_estimate(predictions, seed=0)
-    assert estimate.height_sd_m == 0
-    assert estimate.tilt_sd_rad == pytest.approx(0, abs=1e-9)
+    assert estimate.sd.height_m == 0
+    assert estimate.sd.tilt_rad == pytest.approx(0, abs=1e-9)
 
 
 def test_too_few_tracks_are_counted():
@@ -83,7 +83,7 @@ def test_what_tracks_cannot_tell_is_the_priors():
         height_m=np.full(5, 6.0), quaternion_wxyz=quaternions([0.4] * 5, 0.1, 0.9)
     )
     estimate = averaged_estimate(predictions, seed=0)
-    assert estimate.heading_rad == pytest.approx(0.9)
+    assert estimate.value.heading_rad == pytest.approx(0.9)
     pose = pose_of(estimate, prior)
     assert (pose.heading_rad, pose.x_m, pose.y_m) == (1.0, 3.0, 4.0)
     assert (pose.height_m, pose.tilt_rad, pose.roll_rad) == pytest.approx((6.0, 0.4, 0.1))

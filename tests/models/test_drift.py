@@ -8,6 +8,8 @@ from models.drift.chart import Reading
 from models.drift.clock import clock_fault
 from models.drift.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
+from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
 LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7)
@@ -29,17 +31,18 @@ def drift(
     able=THREE,
 ):
     """An estimate that is so far from the prior pose; `weak` are left out of what it is able of."""
-    values = np.array(
-        [
-            PRIOR.tilt_rad + math.radians(tilt_deg),
-            PRIOR.roll_rad + math.radians(roll_deg),
-            math.log(height_m),
-            PRIOR.heading_rad + math.radians(heading_deg),
-        ]
+    found = PoseParameters(
+        height_m=height_m,
+        tilt_rad=PRIOR.tilt_rad + math.radians(tilt_deg),
+        roll_rad=PRIOR.roll_rad + math.radians(roll_deg),
+        heading_rad=PRIOR.heading_rad + math.radians(heading_deg),
     )
-    sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log, math.radians(sd_deg)])
+    sd_rad = math.radians(sd_deg)
+    sd = PoseParameters(
+        height_m=height_m * sd_log, tilt_rad=sd_rad, roll_rad=sd_rad, heading_rad=sd_rad
+    )
     told = tuple(name for name in able if name not in weak)
-    return drift_between(values, np.diag(sd**2), told, PRIOR)
+    return drift_between(found, sd, told, PRIOR)
 
 
 def drifting(now, earlier, drifted=()):
@@ -49,13 +52,13 @@ def drifting(now, earlier, drifted=()):
 
 def test_drift_is_signed_and_roll_goes_round():
     values = np.array([0.3, math.radians(-178), math.log(5.0), 1.0])
-    found = drift_between(values, np.eye(4) * 1e-6, THREE, PRIOR)
-    assert found.height_m == pytest.approx(-1.0)
-    assert found.log_height == pytest.approx(math.log(5 / 6))
-    assert found.tilt_rad == pytest.approx(-0.1)
-    assert found.roll_rad == pytest.approx(math.radians(3))
+    sd = PoseParameters.sd_of_array(np.eye(4) * 1e-6, 5.0)
+    found = drift_between(PoseParameters.of_array(values), sd, THREE, PRIOR)
+    assert found.by.height_m == pytest.approx(-1.0)
+    assert found.by.tilt_rad == pytest.approx(-0.1)
+    assert found.by.roll_rad == pytest.approx(math.radians(3))
     assert found.angle_rad == pytest.approx(math.hypot(0.1, math.radians(3)), rel=0.01)
-    assert found.height_sd_m == pytest.approx(5e-3)
+    assert found.sd.height_m == pytest.approx(5e-3)
 
 
 def test_what_is_not_told_stays_the_priors():
@@ -69,7 +72,7 @@ def test_what_is_not_told_stays_the_priors():
 
 def test_a_told_heading_is_a_drift_clockwise_positive():
     found = drift(heading_deg=5, able=FOUR)
-    assert math.degrees(found.heading_rad) == pytest.approx(5)
+    assert math.degrees(found.by.heading_rad) == pytest.approx(5)
     assert pose_after(found, PRIOR).heading_rad == pytest.approx(PRIOR.heading_rad + 0.0872665)
     assert math.degrees(found.angle_rad) == pytest.approx(5)
     verdict = judge(found, LIMITS, (), earlier=found)
@@ -85,8 +88,9 @@ def test_a_heading_goes_round(prior_deg, served_deg):
     prior = replace(PRIOR, heading_rad=math.radians(prior_deg))
     whole = round(prior_deg / 360) * 360  # as an estimator may see it
     values = np.array([0.4, prior.roll_rad, math.log(6), math.radians(prior_deg + 5 - whole)])
-    found = drift_between(values, np.eye(4) * 1e-6, FOUR, prior)
-    assert math.degrees(found.heading_rad) == pytest.approx(5)
+    sd = PoseParameters.sd_of_array(np.eye(4) * 1e-6, 6.0)
+    found = drift_between(PoseParameters.of_array(values), sd, FOUR, prior)
+    assert math.degrees(found.by.heading_rad) == pytest.approx(5)
     assert math.degrees(pose_after(found, prior).heading_rad) == pytest.approx(served_deg)
 
 
@@ -161,11 +165,14 @@ def test_what_drifted_has_to_be_told_to_end():
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():
-    words = clock_fault(drift(height_m=7.2), 25.0)
-    assert "+20 %" in words
-    assert "30 frames a second were taken for 25" in words
-    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), 25.0) == words
-    assert "lowered" in clock_fault(drift(height_m=5.0), None)
+    found = clock_fault(drift(height_m=7.2), PRIOR, 25.0)
+    assert found is not None
+    assert found.code is TracksCode.SCALE_CHANGED
+    assert found.values == {"factor": pytest.approx(1.2), "rate_hz": 25.0}
+    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), PRIOR, 25.0) == found
+    lowered = clock_fault(drift(height_m=5.0), PRIOR, None)
+    assert lowered is not None
+    assert lowered.values == {"factor": pytest.approx(5 / 6), "rate_hz": 25.0}
     for found in (
         drift(height_m=6.4),  # 7 %: under the least
         drift(height_m=7.2, sd_log=0.05),  # within its deviation
@@ -174,4 +181,4 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
         drift(height_m=7.2, weak=("roll",)),  # may have turned
         drift(height_m=7.2, heading_deg=1.1, able=FOUR),  # has panned
     ):
-        assert clock_fault(found, 25.0) is None
+        assert clock_fault(found, PRIOR, 25.0) is None

@@ -14,6 +14,7 @@ from models.flow.fit import UsualFit
 from models.flow.fusion import fused_estimate
 from models.flow.move import StillScores, learn_scores, moved_within
 from models.flow.reference import candidate_of, learn_flow
+from models.reasons import Reason, TracksCode
 from models.simulation.site import (
     Lane,
     SiteConfig,
@@ -96,7 +97,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
     fused = fused_estimate(changed, LENS, PRIOR, joint, flow)
-    assert "paths have changed" in fused.reason
+    assert fused.reason == Reason(code=TracksCode.PATHS_CHANGED)
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
     assert fused.values[3] == PRIOR.heading_rad
@@ -158,8 +159,10 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
     fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
     assert "heading" not in fused.told
-    assert "explain where people walk about as well" in fused.reason
+    assert fused.reason is not None
+    assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
     turns_deg = [math.degrees(heading - PRIOR.heading_rad) for heading in fused.rivals]
     turns_deg.append(math.degrees(fused.values[3] - PRIOR.heading_rad))
     assert min(abs(turn - 12) for turn in turns_deg) < 1.5
+    assert np.degrees(fused.reason.values["turns_rad"]) == pytest.approx(sorted(turns_deg))
     assert math.degrees(math.sqrt(fused.covariance[3, 3])) > 5

@@ -55,4 +55,4 @@ def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     windows = Windows(uv=walks.uv, lengths=walks.lengths, owner_idx=np.arange(300))
     height, q = predict_windows(network, windows, plan)
     estimate = averaged_estimate(average_windows(height, q, windows.owner_idx)[1], 0)
-    assert 3.5 < math.degrees(estimate.tilt_rad - pose.tilt_rad) < 7.5
+    assert 3.5 < math.degrees(estimate.value.tilt_rad - pose.tilt_rad) < 7.5

@@ -11,6 +11,7 @@ from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.job_queue import JobQueue
+from service.reasons import as_said
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import Evidence, Finding, asked_enough, gather
 from service.recalibration.trainings import begin_training, publish_model
@@ -112,7 +113,7 @@ def made_up(
         walkers=len(evidence.tracks),
         parties=len(evidence.tracks),
         weak=tuple(weak),
-        reason=f"the tracks cannot tell {' and '.join(weak)}" if weak else "",
+        reason=as_said(f"the tracks cannot tell {' and '.join(weak)}")[0] if weak else None,
     )
     fused = by_speeds_alone(joint, evidence.prior)
     if paths:
@@ -121,7 +122,7 @@ def made_up(
             values=np.append(values, pose.heading_rad),
             covariance=np.diag(sds**2),
             told=(*fused.told, "heading"),
-            reason="",
+            reason=None,
             raw=np.append(values, pose.heading_rad) + 0.01,
         )
     before = fused

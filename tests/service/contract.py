@@ -21,6 +21,7 @@ from PIL import Image
 from sqlalchemy import delete, select
 
 from service.formats.still import read_still
+from service.kinds import MessageType
 from service.recalibration import cameras, trainings, webhooks
 from service.recalibration.outbox import add_delivery
 from service.recalibration.webhooks import WebhookSpec
@@ -149,7 +150,7 @@ class Ground:
             if session.scalar(select(WebhookRecord).limit(1)) is None:
                 spec = WebhookSpec(url=URL, name="a", kinds=None, format="webhook", enabled=True)
                 made = webhooks.create_webhook(session, settings, spec).record
-                add_delivery(session, made, "test", {}, now)
+                add_delivery(session, made, MessageType.TEST, {}, now)
             for name, column, order in (
                 ("alert_id", AlertRecord.id, AlertRecord.opened_at),
                 ("training_id", TrainingRecord.id, TrainingRecord.queued_at),

@@ -2,6 +2,8 @@
 
 import math
 import random
+import secrets
+from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -9,6 +11,7 @@ import numpy as np
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.job_queue import JobQueue
+from service.reasons import as_said
 from service.recalibration.alerts import acknowledge_alert, open_alert
 from service.recalibration.cameras import CameraSpec, register_camera
 from service.settings import Settings
@@ -77,21 +80,30 @@ class Fleet:
             last = self._estimates(camera_id, reference, "drifting", 8, drift, still=0.0)
             session.add_all(last)
             alert = open_alert(
-                session, self.settings, camera_id, kind, severity, {"tilt_deg": tilt_deg},
-                self.now - timedelta(minutes=9), reason=f"tilt {tilt_deg:+.2f} deg",
+                session, self.settings, camera_id, kind, severity,
+                {"tilt_rad": math.radians(tilt_deg)}, self.now - timedelta(minutes=9),
+                reasons=as_said(f"tilt {tilt_deg:+.2f} deg"),
             )  # fmt: skip
             assert alert is not None
             if by is not None:
                 acknowledge_alert(session, alert.id, by)
             return alert.id
 
-    def attend(self, camera_id, hours=1.0):
+    def tell_nothing(self, camera_id):
+        """A newest estimate whose tracks cannot tell the pose."""
+        with self.store.write() as session:
+            reference = references.newest(session, camera_id)
+            (last,) = self._estimates(camera_id, reference, "learning", 1, {}, still=0.0)
+            last.told, last.created_at = [], self.now
+            session.add(last)
+
+    def attend(self, camera_id, hours=1.0, began_h=0.0):
         with self.store.write() as session:
             session.add(
                 MaintenanceRecord(
-                    id=f"window-{camera_id}"[:32],
+                    id=secrets.token_hex(16),
                     camera_id=camera_id,
-                    from_at=self.now,
+                    from_at=self.now - timedelta(hours=began_h),
                     to_at=self.now + timedelta(hours=hours),
                     reason="lens",
                     requested_by=None,
@@ -126,7 +138,9 @@ class Fleet:
             noise = self.random.gauss
             yield EstimateRecord(
                 camera_id=camera_id, model_id=None, prior_pose_id=reference.prior_pose_id,
-                reference_id=reference.id, state=state if share else "ok", reason="made up",
+                reference_id=reference.id,
+                state=state if share and state != "no_data" else "ok",
+                reasons=as_said("made up"),
                 told=["tilt", "roll", "height", "heading"],
                 height_m=6.0 + height * share, tilt_rad=POSE.tilt_rad + tilt * share,
                 roll_rad=POSE.roll_rad, heading_rad=pan * share,
@@ -161,3 +175,40 @@ def afternoon(fleet: Fleet, count: int) -> None:
             fleet.train(camera_id, fleet.random.random())
         if n % 97 == 13:
             fleet.attend(camera_id)
+
+
+def every_state(fleet: Fleet, numbers: Iterable[int]) -> None:
+    """Cameras of some numbers, ten of which are in all states; the first three cost the most."""
+    for n in numbers:
+        camera_id = f"cam-{n:03}"
+        turned = {"tilt_deg": 1.5 + 0.01 * n, "pan_deg": -0.5, "height_m": 0.2}
+        match n % 10:
+            case 0:  # moved, and the newest people cannot tell how far
+                fleet.add(camera_id, state="drifting", **turned)
+                fleet.knock(camera_id, tilt_deg=2.0)
+                fleet.tell_nothing(camera_id)
+            case 1:  # learning, with somebody there since a while
+                fleet.add(camera_id, state="learning", tracks=30)
+                fleet.attend(camera_id, hours=2.0, began_h=0.1)
+            case 2:
+                fleet.add(camera_id, state="out_of_range", **turned)
+                fleet.knock(camera_id, kind="out_of_range", severity="warning", by="Ines")
+            case 3:
+                fleet.add(camera_id)
+            case 4:
+                fleet.add(camera_id, state="no_data")
+            case 5:  # learning, and somebody was there
+                fleet.add(camera_id, state="learning", tracks=60)
+                fleet.attend(camera_id, hours=-0.2, began_h=0.4)
+            case 6:
+                fleet.add(camera_id, state="drifting", **turned)
+                fleet.knock(camera_id, kind="clock")
+            case 7:
+                fleet.add(camera_id)
+                fleet.attend(camera_id, hours=2.0)
+            case 8:
+                fleet.add(camera_id, state="learning", tracks=5)
+                fleet.train(camera_id)
+            case _:  # nothing told, no alert
+                fleet.add(camera_id)
+                fleet.tell_nothing(camera_id)

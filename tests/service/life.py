@@ -16,6 +16,7 @@ from models.estimation.joint.observations import observe
 from models.estimation.joint.reference import learn_reference
 from models.estimation.joint.site import SiteReference
 from models.geometry.pose import CameraPose
+from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
@@ -134,10 +135,12 @@ class Life:
             newest_pk = begin_look(session, camera_id)
             period = take_period(session, self.settings, camera_id)
             if period is not None:
-                learned = LearnedReference(site=some_site(), paths=None, offsets={})
+                learned = LearnedReference(site=some_site(), paths=None)
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
-                    doubted = replace(some_site(), doubt="the pose does not fit")
-                    learned = LearnedReference(site=doubted, paths=None, offsets={})
+                    values = {"tilt_rad": 0.1, "roll_rad": 0.0}
+                    doubt = Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
+                    doubted = replace(some_site(), doubt=doubt)
+                    learned = LearnedReference(site=doubted, paths=None)
                 keep_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:
             evidence = gather(session, self.settings, camera_id)

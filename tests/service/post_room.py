@@ -7,6 +7,7 @@ from sqlalchemy import text
 from service.job_queue import JobQueue
 from service.jobs.context import JobContext
 from service.jobs.deliver import run_deliver
+from service.reasons import as_said
 from service.recalibration import alerts, deliveries
 from service.store import webhooks
 from service.store.database import Store
@@ -40,7 +41,7 @@ class PostRoom:
                 severity,
                 drift,
                 None,
-                reason="tilt +5.00 deg",
+                reasons=as_said("tilt +5.00 deg"),
                 **more,
             )
         return record.id

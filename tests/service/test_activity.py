@@ -9,6 +9,7 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
+from service.kinds import Act
 from service.migrate import alembic_config, migrate
 from service.recalibration.activity import note
 from service.recalibration.retention import limits_of_all
@@ -69,7 +70,7 @@ def test_pages_by_cursor_come_to_all_of_it(http):
 def test_as_lines_it_can_be_taken_elsewhere(http, settings):
     with Store(settings).write() as session:
         for n in range(1203):
-            note(session, "token.used", by=f"n{n}")
+            note(session, Act.TOKEN_ADDED, by=f"n{n}")
     answer = http.get("/activity", headers={"Accept": "application/x-ndjson"})
     assert answer.headers["content-type"].startswith("application/x-ndjson")
     lines = [json.loads(line) for line in answer.text.splitlines()]
@@ -93,12 +94,14 @@ def test_only_age_ends_an_entry(settings):
     now = datetime.now(UTC)
     with store.write() as session:
         for days in (2000, 1826, 1824, 0):
-            session.add(ActivityRecord(what=f"{days}", at=now - timedelta(days=days), details={}))
+            at = now - timedelta(days=days)
+            what = Act.CAMERA_CHANGED
+            session.add(ActivityRecord(what=what, at=at, note=f"{days}", details={}))
     with store.write() as session:
         limits = {limit.name: limit for limit in limits_of_all(settings)}
         assert limits["activity"].bite(session) == 2
     with store.read() as session:
-        assert session.execute(text("SELECT what FROM activity")).all() == [("1824",), ("0",)]
+        assert session.execute(text("SELECT note FROM activity")).all() == [("1824",), ("0",)]
 
 
 def test_what_is_known_of_the_past_is_carried_over(tmp_path):

@@ -8,6 +8,8 @@ import pytest
 
 from service.delivery.alertmanager import alert_name, postable_alerts
 from service.jobs.housekeeping import run_reconcile
+from service.kinds import MessageType
+from service.reasons import as_said
 from service.recalibration import alerts
 from service.recalibration.outbox import alert_body
 from service.recalibration.staleness import StaleWatch
@@ -72,7 +74,7 @@ def test_an_alert_and_its_end(post_room, inbox, manager):
         alerts.open_alert(
             session, post_room.settings, "corner", "drift", "critical",
             {"tilt_deg": 5.25, "roll_deg": None}, moved,
-            reason="tilt +5.25 deg",
+            reasons=as_said("tilt +5.25 deg"),
         )  # fmt: skip
     post_room.send(manager)
     alert = checked(inbox.received[0])[0]
@@ -117,7 +119,14 @@ def test_a_change_that_the_camera_dates_after_its_alert_is_no_contradiction(post
     with post_room.store.write() as session:
         ahead = datetime.now(UTC) + timedelta(hours=2)
         alerts.open_alert(
-            session, post_room.settings, "corner", "clock", "warning", {}, ahead, reason="r"
+            session,
+            post_room.settings,
+            "corner",
+            "clock",
+            "warning",
+            {},
+            ahead,
+            reasons=as_said("r"),
         )
     post_room.end("clock")
     post_room.send(manager)
@@ -195,7 +204,7 @@ def test_what_is_silenced_here_or_gone_with_its_camera_has_ended_there(post_room
     with post_room.store.write() as session:
         record = alerts.show_alert(session, drift)
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
-        alerts._tell(session, record, "silenced")
+        alerts._tell(session, record, MessageType.ALERT_SILENCED)
     post_room.change(manager, refreshed_at=None)
     post_room.send(manager)
     assert standing(inbox) == [("SurefootCameraNoData", "warning")]

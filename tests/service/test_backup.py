@@ -102,7 +102,7 @@ def test_it_is_of_one_moment_however_much_is_written_meanwhile(settings, tmp_pat
         with sqlite3.connect(settings.database_path, timeout=30) as connection:
             while not stop.is_set():
                 put(connection, "tracks", camera_id="corner", track_id=f"new{len(written)}")
-                put(connection, "events", type="track", payload=json.dumps(len(written)))
+                put(connection, "events", type="pose", payload=json.dumps(len(written)))
                 connection.commit()
                 written.append(time.monotonic())
 

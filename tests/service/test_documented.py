@@ -1,5 +1,8 @@
 """What `/openapi.json` says of errors."""
 
+from service.kinds import AlertKind, PoseState
+from service.reasons import CODES
+
 
 def answers(http, path, method):
     operation = http.get("/openapi.json").json()["paths"][path][method]
@@ -37,3 +40,14 @@ def test_only_what_a_route_takes_can_be_wrong_about_it(http):
     assert answers(http, "/readyz", "get")[503] == ["application/json"]
     assert answers(http, "/cameras/{camera_id}/pose.yaml", "get")[200] == ["application/yaml"]
     assert answers(http, "/cameras/{camera_id}/pose", "get")[304] == []
+
+
+def test_a_code_stands_beside_every_reason(http):
+    schemas = http.get("/openapi.json").json()["components"]["schemas"]
+    for name in ("ServedPoseOut", "AlertOut", "AlertDetail"):
+        fields = schemas[name]["properties"]
+        assert {"reason", "reason_code", "reason_values"} <= set(schemas[name]["required"])
+        code, nothing = fields["reason_code"]["anyOf"]
+        assert (code["enum"], nothing) == (list(CODES), {"type": "null"})
+    for name, words in (("PoseState", PoseState), ("AlertKind", AlertKind)):
+        assert schemas[name]["enum"] == list(words)

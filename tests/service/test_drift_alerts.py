@@ -62,6 +62,8 @@ def test_out_of_range_queues_one_training_around_the_estimate(bench):
     body = bench.pose()
     assert body["state"] == "out_of_range"
     assert "a training around the new estimate is queued" in body["reason"]
+    (edge,) = (each for each in bench.alerts(state="firing") if each["kind"] == "out_of_range")
+    assert (edge["reason_code"], edge["reason_values"]) == ("range_edge", {"number": "tilt"})
     assert body["pose"]["tilt_deg"] == pytest.approx(36.0)
     assert {alert["kind"] for alert in bench.alerts(state="firing")} == {"out_of_range", "drift"}
     queued, first = bench.trainings()
@@ -84,6 +86,9 @@ def test_a_pan_alone_fires_and_clears_as_any_drift(bench):
     assert alert["drift"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
     assert alert["drift"]["angle_deg"] == pytest.approx(5.0, abs=0.5)
     assert "heading -5.00 deg" in alert["reason"]
+    assert alert["reason_code"] == "beyond_limits"
+    assert alert["reason_values"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
+    assert alert["reason_values"]["floor_deg"] == pytest.approx(1.0)
     for _ in range(4):
         bench.see(PRIOR)  # by speeds alone: they cannot tell that it was turned back
     assert len(bench.alerts(state="firing")) == 1

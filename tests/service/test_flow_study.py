@@ -8,6 +8,7 @@ from rich.console import Console
 
 from models.evaluation.flow_study import ChangedResult, KnockedResult, SiteResults
 from models.evaluation.scenes import Knock
+from models.reasons import Reason, TracksCode
 from service.flow_study import changed_table, knocked_table
 from tests.service.test_replay import surefoot
 
@@ -33,7 +34,7 @@ def site(number: int, error_deg: float, *, off_deg: float) -> SiteResults:
                 off_truth_log_height=0.0,
                 covered=(True, True, off_deg < 1, True),
                 registered=True,
-                reason="paths have changed" if off_deg > 1 else "",
+                reason=Reason(code=TracksCode.PATHS_CHANGED) if off_deg > 1 else None,
             ),
         ),
         simulated_s=1.0,

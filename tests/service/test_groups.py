@@ -7,6 +7,7 @@ import pytest
 from sqlalchemy import delete, select
 from sqlalchemy.exc import IntegrityError
 
+from service.reasons import as_said
 from service.recalibration import upkeep
 from service.recalibration.alerts import end_alert, open_alert
 from service.store import alerts, events, webhooks
@@ -37,7 +38,14 @@ class Town:
         with self.store.write() as session:
             camera_id = f"c{n}"
             open_alert(
-                session, self.settings, camera_id, kind, severity, DRIFT, changed_at, reason="far"
+                session,
+                self.settings,
+                camera_id,
+                kind,
+                severity,
+                DRIFT,
+                changed_at,
+                reasons=as_said("far"),
             )
 
     def stops(self, n, kind="drift"):
@@ -93,6 +101,8 @@ def test_whoever_comes_later_joins_without_a_word(town):
     group = town.group()
     assert group["camera_ids"] == ["c0", "c1", "c2", "c3"]
     assert "4 cameras" in group["reason"]
+    assert group["reason_code"] == "moved_together"
+    assert group["reason_values"] == {"cameras": 4, "track_source": "bytetrack"}
     assert town.told() == [("c0", "firing"), ("c1", "firing"), (None, "firing")]
 
 
@@ -198,7 +208,14 @@ def test_a_member_that_turns_from_drift_to_clock_stays_in_it(town):
     with town.store.write() as session:
         end_alert(session, "c2", "drift", "cleared", note="it is told as clock now")
         open_alert(
-            session, town.settings, "c2", "clock", "warning", DRIFT, town.now, reason="30 for 25"
+            session,
+            town.settings,
+            "c2",
+            "clock",
+            "warning",
+            DRIFT,
+            town.now,
+            reasons=as_said("30 for 25"),
         )
     assert town.group()["id"] == group_id
     firing = town.alerts(state="firing", camera_id="c2")

@@ -316,7 +316,7 @@ def put_back(changed_s):
         state="resolved",
         source="estimate",
         severity="warning",
-        reason="",
+        reasons=(),
         drift={},
         opened_at=now,
         changed_at=datetime.fromtimestamp(changed_s, UTC),

@@ -4,6 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from service.reasons import as_said
 from service.recalibration.alerts import open_alert
 from service.recalibration.growth import keep_growth, take_growth
 from service.recalibration.learning import take_period
@@ -109,8 +110,12 @@ def test_an_open_alert_is_told_neither_anew_nor_as_grown_until_it_is_over(bench)
     window = begin(bench.http, from_h=48)
     with bench.store.write() as session:
         # What was judged before the window was told of is stored while it lasts.
-        open_alert(session, bench.settings, "corner", "drift", "critical", {}, None, reason="far")
-        open_alert(session, bench.settings, "corner", "clock", "warning", {}, None, reason="far")
+        open_alert(
+            session, bench.settings, "corner", "drift", "critical", {}, None, reasons=as_said("far")
+        )
+        open_alert(
+            session, bench.settings, "corner", "clock", "warning", {}, None, reasons=as_said("far")
+        )
     (alert,) = bench.alerts()
     assert alert["severity"] == "warning"
     assert bench.events("alert") == told

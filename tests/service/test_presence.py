@@ -11,6 +11,7 @@ from sqlalchemy import delete
 
 from service.jobs.context import JobContext
 from service.jobs.rhythms import run_rhythms
+from service.reason_words import in_words
 from service.recalibration import upkeep
 from service.recalibration.presence import silence_of, watch_presence
 from service.recalibration.rhythms import keep_rhythm, learn, rhythm_of, take_arrivals
@@ -94,7 +95,7 @@ def test_a_night_ends_in_no_data_and_in_no_alert_by_morning(street):
     assert (evening.no_data, evening.severity) == (False, None)
     night = street.silence(3.92)
     assert (night.no_data, night.severity) == (True, None)
-    assert night.reason == "no track for 8.0 h, as is usual at this hour"
+    assert in_words(night.reasons) == "no track for 8.0 h, as is usual at this hour"
     for hours in np.arange(-3.9, 8.3, 0.1):
         found = street.silence(hours)
         assert found is None or found.severity is None
@@ -106,7 +107,7 @@ def test_an_outage_at_noon_is_an_alert_within_hours(street):
     assert street.silence(12.5).severity is None
     found = street.silence(15.5)
     assert (found.severity, found.no_data) == ("warning", True)
-    assert "no track for 3.6 h, where about 4" in found.reason
+    assert "no track for 3.6 h, where about 4" in in_words(found.reasons)
     later = street.silence(37)
     assert later.severity == "critical"
 
@@ -164,7 +165,7 @@ def test_tracks_that_are_posted_by_the_night_are_waited_for(street):
     assert rhythm.delay_s == pytest.approx(18 * HOUR_S + 2 * HOUR_S)
     for hours in (12, 20, 25):
         found = street.silence(hours)
-        assert (found.severity, "come up to 20.0 h late" in found.reason) == (None, True)
+        assert (found.severity, "come up to 20.0 h late" in in_words(found.reasons)) == (None, True)
     # Nothing was posted at two in the morning, nor later: then it is.
     assert [street.silence(hours).severity for hours in (27, 30)] == [None, None]
     assert street.silence(39).severity == "warning"
@@ -186,7 +187,7 @@ def test_without_a_rhythm_the_fixed_limit_counts(street):
     assert (quiet.no_data, quiet.severity) == (False, None)
     found = street.silence(0, day_s=MIDNIGHT_S - 10 * DAY_S + 21 * HOUR_S)
     assert (found.no_data, found.severity) == (True, "warning")
-    assert "up to 24 h are waited for" in found.reason
+    assert "up to 24 h are waited for" in in_words(found.reasons)
 
 
 def test_what_was_recorded_long_ago_and_posted_just_now_is_old_but_no_alarm(street):

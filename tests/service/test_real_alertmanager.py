@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 import httpx
 import pytest
 
+from service.reasons import as_said
 from service.recalibration import alerts
 from tests.conftest import free_port, wait_for
 
@@ -72,7 +73,14 @@ def test_alertmanager_holds_what_fires_and_nothing_else(post_room, alertmanager)
     with post_room.store.write() as session:
         ahead = datetime.now(UTC) + timedelta(hours=2)
         alerts.open_alert(
-            session, post_room.settings, "corner", "clock", "warning", {}, ahead, reason="r"
+            session,
+            post_room.settings,
+            "corner",
+            "clock",
+            "warning",
+            {},
+            ahead,
+            reasons=as_said("r"),
         )
     post_room.send(hook)
     assert held(alertmanager) == [

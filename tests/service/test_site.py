@@ -59,6 +59,8 @@ def test_a_reference_is_learned_of_the_first_tracks_without_any_model(street):
     body = street.look()
     assert body["state"] == "learning"
     assert body["reason"] == "40 of 60 reference tracks"
+    assert body["reason_code"] == "reference_tracks"
+    assert body["reason_values"] == {"tracks": 40, "wanted": 60}
     assert served(body) == pytest.approx(numbers(PRIOR))
     assert (body["estimated"], body["sd"], body["drift"]) == ([], None, None)
     assert body["estimates"]["joint"]["tracks"] == 40  # under an assumed walking speed
@@ -72,9 +74,9 @@ def test_a_reference_is_learned_of_the_first_tracks_without_any_model(street):
     assert body["state"] == "ok"
     assert body["model_id"] is None
     assert set(body["estimates"]) == {"joint", "registered"}
-    offset = reference_of(street).offsets["joint"]
-    assert abs(offset["tilt_deg"]) < 1
-    assert offset["sd"]["log_height"] > 0
+    learned = reference_from_bytes(reference_of(street).data)
+    assert abs(math.degrees(learned.offset[0])) < 1
+    assert learned.offset_covariance[2, 2] > 0
 
 
 def test_what_is_served_is_what_the_estimator_says_offline(street):

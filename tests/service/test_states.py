@@ -7,18 +7,17 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families as families
-from sqlalchemy import event
 
 from service.app import create_app
+from service.kinds import AlertSource
+from service.reasons import as_said
 from service.recalibration import upkeep
 from service.recalibration.alerts import open_alert
 from service.recalibration.estimates import store_estimate
 from service.recalibration.evidence import gather
-from service.recalibration.figures import take_figures
 from service.store import alerts, maintenance, references
 from tests.service.bench import PRIOR, made_up, moved
 from tests.service.conftest import problem
-from tests.service.fleet_bench import Fleet, afternoon
 
 KNOCKED = moved(tilt_deg=6.6)
 
@@ -193,10 +192,10 @@ def test_a_camera_put_back_while_it_is_learned_is_learned_of_people_who_come_the
 
 def test_a_camera_put_back_whose_reference_is_in_doubt_is_learned_anew(bench):
     with bench.store.write() as session:
-        references.newest(session, "corner").doubt = "people walk at 3 m/s"
+        references.newest(session, "corner").doubts = as_said("people walk at 3 m/s")
         open_alert(
             session, bench.settings, "corner", "drift", "warning", {}, None,
-            reason="people walk at 3 m/s", source="reference",
+            reasons=as_said("people walk at 3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     resolve(bench, "put_back")
     assert bench.pose()["reference"]["state"] == "learning"
@@ -207,7 +206,7 @@ def test_an_alert_of_a_reference_in_doubt_shows_on_a_camera_that_is_ok(bench):
     with bench.store.write() as session:
         open_alert(
             session, bench.settings, "corner", "clock", "warning", {}, None,
-            reason="people walk at 3 m/s", source="reference",
+            reasons=as_said("people walk at 3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     assert states(bench.http) == {"ok"}
     assert "alert: the clock looks wrong" in fleet_row(bench.http)
@@ -226,8 +225,8 @@ def test_accepting_by_resolving_accepts_the_pose(bench):
 def test_there_is_no_accepting_where_nothing_is_told(bench):
     with bench.store.write() as session:
         open_alert(
-            session, bench.settings, "corner", "clock", "warning", {}, None, reason="3 m/s",
-            source="reference",
+            session, bench.settings, "corner", "clock", "warning", {}, None,
+            reasons=as_said("3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
     problem(bench.http.post(url, json={"outcome": "accepted"}), 409, "conflict")
@@ -302,7 +301,14 @@ def test_an_alert_shows_on_its_page_however_many_came_after_it(bench):
     for _ in range(55):
         with bench.store.write() as session:
             alert = open_alert(
-                session, bench.settings, "corner", "no_data", "warning", {}, None, reason="none"
+                session,
+                bench.settings,
+                "corner",
+                "no_data",
+                "warning",
+                {},
+                None,
+                reasons=as_said("none"),
             )
             alert.state, alert.resolved_at, alert.outcome = "resolved", alert.opened_at, "cleared"
     (drift,) = bench.alerts(state="firing")
@@ -315,31 +321,9 @@ def test_a_member_of_a_group_is_in_the_metrics(bench):
     with bench.store.write() as session:
         alert = alerts.firing(session, "corner", "drift")
         group = open_alert(
-            session, bench.settings, "corner", "no_data", "warning", {}, None, reason="x"
+            session, bench.settings, "corner", "no_data", "warning", {}, None, reasons=as_said("x")
         )
         alert.group_id = group.id
     text = bench.http.get("/metrics").text
     assert 'surefoot_alert_firing{camera_id="corner",kind="drift"} 1.0' in text
     assert 'surefoot_alert_grouped{camera_id="corner",kind="drift"} 1.0' in text
-
-
-def test_the_figures_cost_as_many_statements_for_many_cameras_as_for_one(http, settings):
-    fleet = Fleet(settings)
-
-    def count():
-        seen = []
-
-        def note(_conn, _cursor, statement, *_):
-            seen.append(statement)
-
-        event.listen(fleet.store.engine, "before_cursor_execute", note)
-        with fleet.store.read() as session:
-            take_figures(session, settings)
-        event.remove(fleet.store.engine, "before_cursor_execute", note)
-        return len([text for text in seen if text.startswith("SELECT")])
-
-    fleet.add("one")
-    one = count()
-    afternoon(fleet, 12)
-    assert count() == one <= 14
-    fleet.close()

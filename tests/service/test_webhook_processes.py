@@ -5,6 +5,7 @@ import signal
 
 import pytest
 
+from service.reasons import as_said
 from service.recalibration import alerts
 from service.store.database import Store
 from tests.conftest import CAMERA, RunningService, free_port, wait_for
@@ -42,7 +43,14 @@ def open_alert(service, kind):
     store = Store(service.settings)
     with store.write() as session:
         alerts.open_alert(
-            session, service.settings, "corner", kind, "warning", {}, None, reason="a test"
+            session,
+            service.settings,
+            "corner",
+            kind,
+            "warning",
+            {},
+            None,
+            reasons=as_said("a test"),
         )
     store.close()
 

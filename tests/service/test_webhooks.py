@@ -5,6 +5,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
+from service.kinds import MessageType
+from service.reasons import as_said
 from service.recalibration import alerts
 from service.recalibration.outbox import ALERT_FIELDS, ALERT_FLAGS
 from service.schemas.alerts import AlertOut
@@ -67,7 +69,14 @@ def test_an_alert_and_its_message_are_one_transaction(post_room, inbox):
     hook = post_room.hook(inbox.url)
     with post_room.store.write() as session:
         alerts.open_alert(
-            session, post_room.settings, "corner", "drift", "warning", {}, None, reason="r"
+            session,
+            post_room.settings,
+            "corner",
+            "drift",
+            "warning",
+            {},
+            None,
+            reasons=as_said("r"),
         )
         session.flush()
         session.rollback()
@@ -126,7 +135,7 @@ def test_a_silenced_alert_is_quiet_until_it_ends(post_room, inbox):
     with post_room.store.write() as session:
         record = alerts.show_alert(session, alert_id)
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
-        alerts._tell(session, record, "silenced")
+        alerts._tell(session, record, MessageType.ALERT_SILENCED)
     post_room.open(severity="critical")
     post_room.http.post(f"/alerts/{alert_id}/acknowledge").raise_for_status()
     post_room.end()

@@ -12,7 +12,9 @@ from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
 from models.estimation.numbers import NUMBERS, TELLING_SD, numbers_of
 from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
+from models.reasons import Reason, TracksCode, Value
 
 _STARTS = 2
 _START_TRACKS = 80
@@ -25,7 +27,7 @@ class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
     `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
-    tell; `reason` says it in words and is empty where they tell all. `walkers` is the number of
+    tell; `reason` says why, and is None where they tell all. `walkers` is the number of
     tracks that were used, `parties` that of people or groups who walked independently. `bound`
     (3, 3) is the Cramer-Rao bound of the likelihood.
     """
@@ -37,7 +39,12 @@ class JointEstimate:
     walkers: int
     parties: int
     weak: tuple[str, ...]
-    reason: str
+    reason: Reason | None
+
+    @property
+    def raw_parameters(self) -> PoseParameters:
+        """What `raw` is, named; it knows no heading."""
+        return PoseParameters.of_array(self.raw)
 
 
 def joint_estimate(
@@ -58,13 +65,16 @@ def joint_estimate(
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
     weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
-    reason = _words(weak, sd, covariance)
+    reason = _reason(weak, sd, covariance)
     if parties < _FEWEST_PARTIES:
         weak = NUMBERS
-        reason = (
-            f"the {observations.walkers} tracks are of {parties} "
-            f"{'party' if parties == 1 else 'parties'} walking together, at least "
-            f"{_FEWEST_PARTIES} are needed to tell the camera's drift from theirs"
+        reason = Reason(
+            code=TracksCode.TOO_FEW_PARTIES,
+            values={
+                "tracks": observations.walkers,
+                "parties": int(parties),
+                "least_parties": _FEWEST_PARTIES,
+            },
         )
     return JointEstimate(
         values=best.candidate - reference.offset,
@@ -103,21 +113,15 @@ def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
     return np.asarray((apart * chances[:, None]).T @ apart)
 
 
-def _words(weak: tuple[str, ...], sd: Array, covariance: Array) -> str:
+def _reason(weak: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
+    """What the tracks cannot tell; `alike` names two numbers that make up for one another."""
     if not weak:
-        return ""
-    said = {
-        "tilt": f"tilt (sd {math.degrees(sd[0]):.1f} deg)",
-        "roll": f"roll (sd {math.degrees(sd[1]):.1f} deg)",
-        "height": f"height (sd {100 * sd[2]:.0f} %)",
-    }
-    text = "the tracks cannot tell " + " and ".join(said[name] for name in weak)
+        return None
+    said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
+    values: dict[str, Value] = {said[name]: float(sd[NUMBERS.index(name)]) for name in weak}
     together = covariance / np.outer(sd, sd)
     pairs = [(0, 2), (1, 2), (0, 1)]
     first, second = max(pairs, key=lambda pair: abs(together[pair]))
     if abs(together[first, second]) > 0.9:
-        text += (
-            f": people walk too much alike, one way or along one path, and {NUMBERS[first]} "
-            f"makes up for {NUMBERS[second]}"
-        )
-    return text
+        values["alike"] = [NUMBERS[first], NUMBERS[second]]
+    return Reason(code=TracksCode.NUMBERS_UNTOLD, values=values)

@@ -1,5 +1,7 @@
 """A site's reference as bytes."""
 
+from dataclasses import replace
+
 from models.estimation.joint.site import SiteReference
 from models.packing import Format, flattened, pack, restored, unpack
 
@@ -7,8 +9,8 @@ _FORMAT = Format(name="site", version=1)
 
 
 def reference_to_bytes(reference: SiteReference) -> bytes:
-    """A reference as it is stored."""
-    return pack(_FORMAT, flattened(reference))
+    """A reference as it is stored, but for its doubt, which is told once."""
+    return pack(_FORMAT, flattened(replace(reference, doubt=None)))
 
 
 def reference_from_bytes(data: bytes) -> SiteReference:
@@ -17,4 +19,4 @@ def reference_from_bytes(data: bytes) -> SiteReference:
     Raises:
         CheckpointError: the bytes are no reference of this format.
     """
-    return restored(SiteReference, unpack(_FORMAT, data))
+    return restored(SiteReference, unpack(_FORMAT, data), doubt=None)

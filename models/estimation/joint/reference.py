@@ -22,6 +22,7 @@ from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
+from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 
 FEWEST_WALKERS = 5
@@ -146,30 +147,28 @@ def relearned(observations: Observations, prior: CameraPose, site: SiteReference
 
 def _doubt(
     observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
-) -> str:
-    """What of a reference is too far off to be a bias, in words; empty where nothing is."""
+) -> Reason | None:
+    """What of a reference is too far off to be a bias; None where nothing is."""
     slow, fast = USUAL_SPEEDS_MPS
     if not slow <= site.walking_speed_mps <= fast:
-        return (
-            f"people walk at {site.walking_speed_mps:.2f} m/s at the prior pose, {slow:g} to "
-            f"{fast:g} m/s is usual: the prior height or the frame rate is wrong"
+        return Reason(
+            code=TracksCode.SPEED_UNUSUAL,
+            values={"speed_mps": site.walking_speed_mps, "slow_mps": slow, "fast_mps": fast},
         )
     short, tall = USUAL_STATURES_M
     if site.stature_m is not None and not short <= site.stature_m <= tall:
-        return (
-            f"boxes say that people are {site.stature_m:.2f} m tall at the prior pose, "
-            f"{short:g} to {tall:g} m is usual: the prior height is wrong"
+        return Reason(
+            code=TracksCode.STATURE_UNUSUAL,
+            values={"stature_m": site.stature_m, "short_m": short, "tall_m": tall},
         )
     free = joint_estimate(observations, prior, replace(blank, inflation=site.inflation))
     apart = (free.raw - numbers_of(prior))[:2]
     sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
     if ((np.abs(apart) > _DOUBT_RAD) & (sigmas > _DOUBT_SIGMAS)).any():
-        tilt, roll = np.degrees(apart)
-        return (
-            f"the reference tracks put the camera {tilt:+.1f} deg in tilt and {roll:+.1f} deg in "
-            "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
-        )
-    return ""
+        tilt, roll = (float(angle) for angle in apart)
+        values = {"tilt_rad": tilt, "roll_rad": roll}
+        return Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
+    return None
 
 
 def _suited(

@@ -1,7 +1,6 @@
 """The reference as a value: what is usual at a site, and how the joint estimator errs there."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from models.estimation.joint.observations import Observations
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.reasons import Reason
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
 USUAL_STATURES_M = (1.4, 2.2)  # of boxes
@@ -23,8 +23,8 @@ class SiteReference:
 
     `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth,
     with `offset_covariance` (3, 3); its variances are to be multiplied by `inflation`. `tracks`
-    is 0 where nothing was learned and the speed is assumed. `doubt` says in words what does not
-    fit the prior pose, `boxes` why boxes are used or not.
+    is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit the
+    prior pose, `boxes` says why boxes are used or not.
     """
 
     speeds: Learned
@@ -33,7 +33,7 @@ class SiteReference:
     offset_covariance: Array
     inflation: float
     tracks: int
-    doubt: str = ""
+    doubt: Reason | None = None
     boxes: str = ""
 
     @property
@@ -45,19 +45,6 @@ class SiteReference:
     def stature_m(self) -> float | None:
         """How tall the boxes say that people are; None where boxes are not used."""
         return None if self.statures is None else float(np.exp(self.statures.usual))
-
-    @property
-    def doubt_about(self) -> Literal["", "scale", "pose"]:
-        """What `doubt` is about: speeds or statures out of all proportion, or the prior pose."""
-        if not self.doubt:
-            return ""
-        slow, fast = USUAL_SPEEDS_MPS
-        short, tall = USUAL_STATURES_M
-        stature_m = self.stature_m
-        usual = slow <= self.walking_speed_mps <= fast and (
-            stature_m is None or short <= stature_m <= tall
-        )
-        return "pose" if usual else "scale"
 
 
 def channels_of(

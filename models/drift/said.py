@@ -1,0 +1,47 @@
+"""What a verdict and a chart are to be told with: codes and numbers."""
+
+from models.drift.chart import CLOCK, Reading
+from models.drift.verdict import Drift, DriftLimits, DriftVerdict
+from models.estimation.numbers import WITH_HEADING
+from models.reasons import Reason, TracksCode, Value
+
+
+def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
+    """The told numbers against the prior pose and the limits; None where none is told."""
+    values: dict[str, Value] = {
+        "sigmas": limits.sigmas,
+        "floor_rad": limits.floor_rad,
+        "floor_m": limits.floor_m,
+        "people": limits.people,
+        "clear_ratio": limits.clear_ratio,
+    }
+    if not drift.told:
+        last_told = TracksCode.BEYOND_LIMITS_LAST_TOLD
+        return Reason(code=last_told, values=values) if verdict.drifting else None
+    for name in drift.told:
+        unit = "m" if name == "height" else "rad"
+        values[f"{name}_{unit}"], values[f"{name}_sd_{unit}"] = drift.of(name)
+    beyond = verdict.excess >= 1
+    if verdict.drifting:
+        code = TracksCode.BEYOND_LIMITS if beyond else TracksCode.BEYOND_LIMITS_BEFORE
+    else:
+        code = TracksCode.BEYOND_LIMITS_UNCONFIRMED if beyond else TracksCode.WITHIN_LIMITS
+    return Reason(code=code, values=values)
+
+
+def reason_of_reading(reading: Reading) -> Reason | None:
+    """Which way the drift chart says that a camera has moved; None where it says nothing.
+
+    `number` is one of a pose, or `times` where all were too long (`sign` 1) or too short (-1).
+    """
+    if not reading.suspicious:
+        return None
+    number = "times" if reading.number == CLOCK else WITH_HEADING[reading.number]
+    values: dict[str, Value] = {
+        "number": number,
+        "sign": reading.sign,
+        "parties": reading.parties,
+        "statistic": reading.statistic,
+        "level": reading.level,
+    }
+    return Reason(code=TracksCode.CHART, values=values)

@@ -1,0 +1,234 @@
+"""The closed vocabularies: states, kinds, outcomes, severities, acts; each word is defined here.
+
+Their values are what HTTP, webhooks and the store say. The store refuses any other word by a CHECK
+constraint, so a new one needs a migration.
+"""
+
+from enum import StrEnum
+
+
+class PoseState(StrEnum):
+    """How a camera stands."""
+
+    LEARNING = "learning"
+    OK = "ok"
+    DRIFTING = "drifting"
+    NO_DATA = "no_data"
+    OUT_OF_RANGE = "out_of_range"
+
+
+class Cause(StrEnum):
+    """Since what a camera waits for people to tell how it stands."""
+
+    REFERENCE = "reference"
+    MAINTENANCE = "maintenance"
+    PUT_BACK = "put_back"
+    FALSE_ALARM = "false_alarm"
+
+
+class ReferenceState(StrEnum):
+    """Whether what is usual at a site is known."""
+
+    LEARNING = "learning"
+    READY = "ready"
+
+
+class Origin(StrEnum):
+    """What began a prior pose or a reference; prior poses know the first three."""
+
+    REGISTERED = "registered"
+    CHANGED = "changed"
+    ACCEPTED = "accepted"
+    RESET = "reset"
+    PUT_BACK = "put_back"
+    SOURCE = "source"
+
+
+class AlertKind(StrEnum):
+    """What an alert is about."""
+
+    DRIFT = "drift"
+    NO_DATA = "no_data"
+    OUT_OF_RANGE = "out_of_range"
+    CLOCK = "clock"
+    STALE = "stale"
+    TRACKER = "tracker"
+
+
+class AlertState(StrEnum):
+    """Whether an alert is open."""
+
+    FIRING = "firing"
+    RESOLVED = "resolved"
+
+
+class AlertSource(StrEnum):
+    """What stands behind an alert, and ends it."""
+
+    ESTIMATE = "estimate"
+    REFERENCE = "reference"
+    RHYTHM = "rhythm"
+    UPKEEP = "upkeep"
+    GROUP = "group"
+    TRACKS = "tracks"
+
+
+class Severity(StrEnum):
+    """How much an alert matters, the least first."""
+
+    WARNING = "warning"
+    CRITICAL = "critical"
+
+
+class Answer(StrEnum):
+    """What a person says of how a camera stands."""
+
+    PUT_BACK = "put_back"
+    ACCEPTED = "accepted"
+    FALSE_ALARM = "false_alarm"
+
+
+class Outcome(StrEnum):
+    """What came of an alert: a person's answer, or something by itself."""
+
+    PUT_BACK = Answer.PUT_BACK
+    ACCEPTED = Answer.ACCEPTED
+    FALSE_ALARM = Answer.FALSE_ALARM
+    CLEARED = "cleared"
+    CAMERA_REMOVED = "camera_removed"
+
+
+class AlertAct(StrEnum):
+    """What is done with an alert."""
+
+    OPENED = "opened"
+    ESCALATED = "escalated"
+    ACKNOWLEDGED = "acknowledged"
+    SILENCED = "silenced"
+    SILENCE_ENDED = "silence_ended"
+    RESOLVED = "resolved"
+
+
+class WindowState(StrEnum):
+    """Where in time a maintenance window is."""
+
+    PLANNED = "planned"
+    UNDER_WAY = "under_way"
+    OVER = "over"
+
+
+class TrainingState(StrEnum):
+    """How far a training is."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+class EventType(StrEnum):
+    """What `GET /events` tells of."""
+
+    POSE = "pose"
+    ALERT = "alert"
+    TRAINING = "training"
+
+
+class WebhookFormat(StrEnum):
+    """What an endpoint takes: signed messages, or what an Alertmanager does."""
+
+    WEBHOOK = "webhook"
+    ALERTMANAGER = "alertmanager"
+
+
+class MessageType(StrEnum):
+    """What a delivery tells."""
+
+    ALERT_OPENED = "alert.opened"
+    ALERT_UPDATED = "alert.updated"
+    ALERT_ACKNOWLEDGED = "alert.acknowledged"
+    ALERT_SILENCED = "alert.silenced"
+    ALERT_RESOLVED = "alert.resolved"
+    TEST = "test"
+
+
+class DeliveryState(StrEnum):
+    """What has become of a delivery."""
+
+    PENDING = "pending"
+    DELIVERED = "delivered"
+    FAILED = "failed"
+
+
+class TokenScope(StrEnum):
+    """What a token is for."""
+
+    INGEST = "ingest"
+    READ = "read"
+    OPERATE = "operate"
+    ADMIN = "admin"
+
+
+class TokenState(StrEnum):
+    """Whether a token is let in."""
+
+    VALID = "valid"
+    EXPIRED = "expired"
+    REVOKED = "revoked"
+
+
+class Health(StrEnum):
+    """What `/healthz` says."""
+
+    OK = "ok"
+
+
+class Readiness(StrEnum):
+    """What `/readyz` says."""
+
+    READY = "ready"
+    NOT_READY = "not_ready"
+
+
+class Act(StrEnum):
+    """What the log says was done: a subject and a verb."""
+
+    CAMERA_REGISTERED = "camera.registered"
+    CAMERA_CHANGED = "camera.changed"
+    CAMERA_REMOVED = "camera.removed"
+    POSE_ACCEPTED = "pose.accepted"
+    POSE_PUT_BACK = "pose.put_back"
+    POSE_FALSE_ALARM = "pose.false_alarm"
+    REFERENCE_RESET = "reference.reset"
+    REFERENCE_LEARNED = "reference.learned"
+    SOURCE_USED = "source.used"
+    SOURCE_REMOVED = "source.removed"
+    ALERT_OPENED = "alert.opened"
+    ALERT_ESCALATED = "alert.escalated"
+    ALERT_ACKNOWLEDGED = "alert.acknowledged"
+    ALERT_SILENCED = "alert.silenced"
+    ALERT_SILENCE_ENDED = "alert.silence_ended"
+    ALERT_RESOLVED = "alert.resolved"
+    MAINTENANCE_PLANNED = "maintenance.planned"
+    MAINTENANCE_CHANGED = "maintenance.changed"
+    MAINTENANCE_ENDED = "maintenance.ended"
+    MAINTENANCE_WITHDRAWN = "maintenance.withdrawn"
+    MAINTENANCE_OVER = "maintenance.over"
+    TRAINING_REQUESTED = "training.requested"
+    TRAINING_SUCCEEDED = "training.succeeded"
+    TRAINING_FAILED = "training.failed"
+    TRAINING_CANCELLED = "training.cancelled"
+    SNAPSHOT_KEPT = "snapshot.kept"
+    SNAPSHOT_REMOVED = "snapshot.removed"
+    WEBHOOK_ADDED = "webhook.added"
+    WEBHOOK_CHANGED = "webhook.changed"
+    WEBHOOK_SECRET_CHANGED = "webhook.secret_changed"
+    WEBHOOK_REMOVED = "webhook.removed"
+    WEBHOOK_TESTED = "webhook.tested"
+    WEBHOOK_REPLAYED = "webhook.replayed"
+    TOKEN_ADDED = "token.added"
+    TOKEN_REVOKED = "token.revoked"
+    SESSION_BEGAN = "session.began"
+    SESSION_ENDED = "session.ended"
+    LOGIN_REFUSED = "login.refused"

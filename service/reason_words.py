@@ -1,0 +1,272 @@
+"""Reasons in words: all that is said to people of why something is so is said here."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+from models.estimation.numbers import WITH_HEADING
+from models.reasons import Reason, TracksCode
+from service.kinds import Cause, TrainingState
+from service.reasons import ServiceCode
+
+_Values = Mapping[str, Any]
+_HOUR_S = 3600.0
+_SINCE = {
+    Cause.REFERENCE: "since the reference",
+    Cause.MAINTENANCE: "since the maintenance",
+    Cause.PUT_BACK: "since the camera was put back",
+    Cause.FALSE_ALARM: "since the alert was called a false alarm",
+}
+_TRAININGS = {
+    TrainingState.QUEUED: "is queued",
+    TrainingState.RUNNING: "is running",
+    TrainingState.SUCCEEDED: "has ended",
+    TrainingState.FAILED: "has failed",
+    TrainingState.CANCELLED: "was cancelled",
+}
+
+
+def in_words(reasons: Sequence[Reason]) -> str:
+    """Reasons as one sentence without its full stop; empty where there are none."""
+    said = ""
+    for number, reason in enumerate(reasons):
+        said += _WORDS[reason.code](reason.values)
+        if number + 1 < len(reasons):
+            said += " " if reason.code is ServiceCode.LAST_TOLD else "; "
+    return said
+
+
+def group_in_words(reasons: Sequence[Reason]) -> str:
+    """The same of a tracker's alert, beside the tracker's name."""
+    return in_words(
+        [
+            Reason(code=each.code, values={**each.values, "track_source": ""})
+            if each.code in _GROUPS
+            else each
+            for each in reasons
+        ]
+    )
+
+
+_GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)
+
+
+def _limit(v: _Values) -> str:
+    return f"{v['sigmas']:g} sd and {math.degrees(v['floor_rad']):g} deg or {v['floor_m']:g} m"
+
+
+def _numbers(v: _Values) -> str:
+    said = []
+    for name in WITH_HEADING:
+        if name == "height" and "height_m" in v:
+            said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
+        elif f"{name}_rad" in v:
+            value, sd = (math.degrees(v[f"{name}_{what}rad"]) for what in ("", "sd_"))
+            said.append(f"{name} {value:+.2f} deg (sd {sd:.2f})")
+    return ", ".join(said) + " against the prior pose"
+
+
+def _beyond_before(v: _Values) -> str:
+    share = f"{100 * v['clear_ratio']:g} % of that, and so without the newest {v['people']} people"
+    return f"{_numbers(v)}: was beyond {_limit(v)}; it ends once all is below {share}"
+
+
+def _unconfirmed(v: _Values) -> str:
+    hold = f"without the newest {v['people']} people"
+    return f"{_numbers(v)}: beyond {_limit(v)}, but not so {hold}"
+
+
+def _chart(v: _Values) -> str:
+    if v["number"] == "times":
+        what = f"all times were too {'long' if v['sign'] > 0 else 'short'}"
+    else:
+        what = f"the {v['number']} had gone {'up' if v['sign'] > 0 else 'down'}"
+    return (
+        f"the last {v['parties']} parties walk as they would if {what} "
+        f"(drift chart: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
+    )
+
+
+def _scale_changed(v: _Values) -> str:
+    factor, rate_hz = v["factor"], v["rate_hz"]
+    return (
+        f"the scale has changed by {100 * (factor - 1):+.0f} % and the angles have not: as if "
+        f"{rate_hz * factor:.3g} frames a second were taken for {rate_hz:.3g}, or the camera was "
+        f"{'raised' if factor > 1 else 'lowered'}"
+    )
+
+
+def _ambiguous(v: _Values) -> str:
+    said = " and ".join(f"{math.degrees(turn):+.1f} deg" for turn in v["turns_rad"])
+    return f"turns of {said} explain where people walk about as well"
+
+
+def _heading_untold(v: _Values) -> str:
+    sd_deg = math.degrees(v["heading_sd_rad"])
+    return f"where people walk does not tell the heading (sd {sd_deg:.1f} deg)"
+
+
+def _numbers_untold(v: _Values) -> str:
+    said = [
+        f"{name} (sd {math.degrees(v[f'{name}_sd_rad']):.1f} deg)"
+        for name in ("tilt", "roll")
+        if f"{name}_sd_rad" in v
+    ]
+    if "log_height_sd" in v:
+        said.append(f"height (sd {100 * v['log_height_sd']:.0f} %)")
+    text = "the tracks cannot tell " + " and ".join(said)
+    if "alike" in v:
+        first, second = v["alike"]
+        text += (
+            f": people walk too much alike, one way or along one path, and {first} makes up for "
+            f"{second}"
+        )
+    return text
+
+
+def _few_parties(v: _Values) -> str:
+    return (
+        f"the {v['tracks']} tracks are of {v['parties']} "
+        f"{'party' if v['parties'] == 1 else 'parties'} walking together, at least "
+        f"{v['least_parties']} are needed to tell the camera's drift from theirs"
+    )
+
+
+def _speed(v: _Values) -> str:
+    return (
+        f"people walk at {v['speed_mps']:.2f} m/s at the prior pose, {v['slow_mps']:g} to "
+        f"{v['fast_mps']:g} m/s is usual: the prior height or the frame rate is wrong"
+    )
+
+
+def _stature(v: _Values) -> str:
+    return (
+        f"boxes say that people are {v['stature_m']:.2f} m tall at the prior pose, "
+        f"{v['short_m']:g} to {v['tall_m']:g} m is usual: the prior height is wrong"
+    )
+
+
+def _prior_doubted(v: _Values) -> str:
+    tilt, roll = math.degrees(v["tilt_rad"]), math.degrees(v["roll_rad"])
+    return (
+        f"the reference tracks put the camera {tilt:+.1f} deg in tilt and {roll:+.1f} deg in "
+        "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
+    )
+
+
+def _since(v: _Values) -> str:
+    return (
+        f"{v['tracks']} tracks {_SINCE[Cause(v['cause'])]}; at least {v['least_walkers']} of "
+        "people who walk for a few seconds inside the image are needed"
+    )
+
+
+def _maintenance(v: _Values) -> str:
+    until = f"maintenance is under way until {datetime.fromisoformat(v['until']):%Y-%m-%d %H:%M}Z"
+    return f"{until} ({v['note']})" if v.get("note") else until
+
+
+def _silent(v: _Values) -> str:
+    words = f"no track for {_hours(v['silent_s'])}"
+    if "missed_tracks" in v:
+        words += f", where about {v['missed_tracks']:.0f} are usual by now"
+    else:
+        words += ", as is usual at this hour"
+    return f"{words}; its tracks come up to {_hours(v['late_s'])} late" if "late_s" in v else words
+
+
+def _silent_unknown(v: _Values) -> str:
+    return (
+        f"the newest track ended {_hours(v['silent_s'])} ago; "
+        f"up to {v['limit_s'] / _HOUR_S:g} h are waited for"
+    )
+
+
+def _of_tracker(v: _Values) -> str:
+    return f" of the tracker {v['track_source']!r}" if v["track_source"] else ""
+
+
+def _moved_together(v: _Values) -> str:
+    return (
+        f"{v['cameras']} cameras{_of_tracker(v)} moved together: the tracker or its clock is "
+        "the likely cause, rather than each camera by itself; cameras that hang on one mast or "
+        "building would look the same"
+    )
+
+
+def _silent_together(v: _Values) -> str:
+    return (
+        f"{v['cameras']} cameras{_of_tracker(v)} fell silent together: the tracker, its "
+        "network or its clock is the likely cause, rather than each camera by itself"
+    )
+
+
+def _other_sources(v: _Values) -> str:
+    names, counting = " and ".join(repr(name) for name in v["sources"]), v.get("counting")
+    return (
+        f"tracks of {names} come beside those of {counting!r}, which count: they are kept "
+        f"and move nothing. Should {counting!r} fall silent for "
+        f"{v['silent_s'] / _HOUR_S:g} h, they take over once "
+        f"{v['wanted']} of them were seen while the camera was where it "
+        "should be; a person can say so at once"
+    )
+
+
+def _looks_fail(v: _Values) -> str:
+    return (
+        f"its tracks cannot be looked at: {v['tries']} tries failed in a row, the last with "
+        f"{v['error']}"
+    )
+
+
+def _tracks_wait(v: _Values) -> str:
+    return (
+        f"its tracks have waited for {v['waits_s'] / 60:.0f} min; up to {v['limit_s'] / 60:g} min "
+        "are waited for"
+    )
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / _HOUR_S:.1f} h"
+
+
+_WORDS: dict[StrEnum, Callable[[_Values], str]] = {
+    TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}: beyond {_limit(v)}",
+    TracksCode.BEYOND_LIMITS_UNCONFIRMED: _unconfirmed,
+    TracksCode.BEYOND_LIMITS_BEFORE: _beyond_before,
+    TracksCode.BEYOND_LIMITS_LAST_TOLD: lambda v: f"beyond {_limit(v)} when it was last told",
+    TracksCode.WITHIN_LIMITS: lambda v: f"{_numbers(v)}: not beyond {_limit(v)}",
+    TracksCode.CHART: _chart,
+    TracksCode.SCALE_CHANGED: _scale_changed,
+    TracksCode.PATHS_CHANGED: lambda v: "the paths have changed: the flow map is left out",
+    TracksCode.HEADING_AMBIGUOUS: _ambiguous,
+    TracksCode.HEADING_UNTOLD: _heading_untold,
+    TracksCode.NUMBERS_UNTOLD: _numbers_untold,
+    TracksCode.TOO_FEW_PARTIES: _few_parties,
+    TracksCode.SPEED_UNUSUAL: _speed,
+    TracksCode.STATURE_UNUSUAL: _stature,
+    TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,
+    ServiceCode.AS_SAID: lambda v: str(v["text"]),
+    ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
+    ServiceCode.REFERENCE_TRACKS: lambda v: f"{v['tracks']} of {v['wanted']} reference tracks",
+    ServiceCode.TRACKS_SINCE: _since,
+    ServiceCode.LAST_TOLD: lambda v: "when it was last told:",
+    ServiceCode.MAINTENANCE: _maintenance,
+    ServiceCode.RANGE_EDGE: lambda v: (
+        f"{v['number']} is at the edge of the range that the model in use was trained for"
+    ),
+    ServiceCode.TRAINING_AROUND: lambda v: (
+        f"a training around the new estimate {_TRAININGS[TrainingState(v['state'])]}"
+    ),
+    ServiceCode.WITHOUT_PART: lambda v: f"without the {v['part'].replace('_', ' ')}: {v['why']}",
+    ServiceCode.SILENT_USUAL: _silent,
+    ServiceCode.SILENT_UNUSUAL: _silent,
+    ServiceCode.SILENT_UNKNOWN: _silent_unknown,
+    ServiceCode.MOVED_TOGETHER: _moved_together,
+    ServiceCode.FELL_SILENT_TOGETHER: _silent_together,
+    ServiceCode.OTHER_SOURCES: _other_sources,
+    ServiceCode.LOOKS_FAIL: _looks_fail,
+    ServiceCode.TRACKS_WAIT: _tracks_wait,
+}

@@ -1,0 +1,85 @@
+"""The service's own reasons, beside those of the tracks, and all of them as JSON."""
+
+import math
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import Any
+
+from models.reasons import Reason, TracksCode
+
+# Of one thing, in the order in which they are said.
+Reasons = tuple[Reason, ...]
+
+
+class ServiceCode(StrEnum):
+    """What the service gives as a reason. Codes are kept by clients and in stores: they stay."""
+
+    AS_SAID = "as_said"
+    LEARNING_REFERENCE = "learning_reference"
+    REFERENCE_TRACKS = "reference_tracks"
+    TRACKS_SINCE = "tracks_since"
+    LAST_TOLD = "last_told"
+    MAINTENANCE = "maintenance"
+    RANGE_EDGE = "range_edge"
+    TRAINING_AROUND = "training_around"
+    WITHOUT_PART = "without_part"
+    SILENT_USUAL = "silent_usual"
+    SILENT_UNUSUAL = "silent_unusual"
+    SILENT_UNKNOWN = "silent_unknown"
+    MOVED_TOGETHER = "moved_together"
+    FELL_SILENT_TOGETHER = "fell_silent_together"
+    OTHER_SOURCES = "other_sources"
+    LOOKS_FAIL = "looks_fail"
+    TRACKS_WAIT = "tracks_wait"
+
+
+_CODES: dict[str, StrEnum] = {
+    str(code): code for each in (TracksCode, ServiceCode) for code in each
+}
+CODES = tuple(_CODES)
+
+
+def as_said(text: str) -> Reasons:
+    """A sentence of before there were codes."""
+    return (Reason(code=ServiceCode.AS_SAID, values={"text": text}),)
+
+
+def some(*reasons: Reason | None) -> Reasons:
+    """Those that there are."""
+    return tuple(reason for reason in reasons if reason is not None)
+
+
+def code_of(reasons: Sequence[Reason]) -> str | None:
+    """The code of the first; None where there is none."""
+    return str(reasons[0].code) if reasons else None
+
+
+def values_of(reasons: Sequence[Reason]) -> dict[str, Any]:
+    """The numbers and names of the first for clients, who take angles in degrees."""
+    return _in_degrees(reasons[0].values) if reasons else {}
+
+
+def to_json(reasons: Sequence[Reason]) -> list[dict[str, Any]]:
+    """Reasons as a store keeps them."""
+    return [{"code": str(each.code), "values": dict(each.values)} for each in reasons]
+
+
+def from_json(kept: Sequence[Mapping[str, Any]]) -> Reasons:
+    """The reasons of `to_json`.
+
+    Raises:
+        KeyError: a code that is none.
+    """
+    return tuple(Reason(code=_CODES[each["code"]], values=each["values"]) for each in kept)
+
+
+def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
+    found = {}
+    for name, value in values.items():
+        if name.endswith("_rad"):
+            many = isinstance(value, list | tuple)
+            turn = [math.degrees(each) for each in value] if many else math.degrees(value)
+            found[f"{name.removesuffix('_rad')}_deg"] = turn
+        else:
+            found[name] = value
+    return found

@@ -1,0 +1,109 @@
+"""What all records share: naming, aware times, words of the closed vocabularies."""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any, ClassVar
+
+from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, MetaData, String, TypeDecorator
+from sqlalchemy.orm import DeclarativeBase
+
+from service import kinds
+from service.reasons import Reasons, from_json, to_json
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+_STORED: tuple[type[StrEnum], ...] = (
+    kinds.Act,
+    kinds.AlertKind,
+    kinds.AlertSource,
+    kinds.AlertState,
+    kinds.Answer,
+    kinds.DeliveryState,
+    kinds.EventType,
+    kinds.MessageType,
+    kinds.Origin,
+    kinds.Outcome,
+    kinds.PoseState,
+    kinds.Severity,
+    kinds.TrainingState,
+    kinds.WebhookFormat,
+)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """Aware UTC times; SQLite keeps them without their zone."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Refuse naive times; store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"time: an aware time is needed, got {value}")
+        return value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Give the zone back."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Word(TypeDecorator[StrEnum]):
+    """A word of a closed vocabulary; `one_of` has the store check it."""
+
+    impl = String
+    cache_ok = True
+
+    def __init__(self, words: type[StrEnum]) -> None:
+        super().__init__()
+        self.words = words
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """The plain word."""
+        return None if value is None else str(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> StrEnum | None:
+        """The member of the vocabulary."""
+        return None if value is None else self.words(value)
+
+
+class ReasonsJson(TypeDecorator[Reasons]):
+    """Reasons, as JSON."""
+
+    impl = JSON
+    cache_ok = True
+
+    def process_bind_param(self, value: Reasons | None, dialect: Dialect) -> Any:
+        """A list of codes with their values."""
+        return None if value is None else to_json(value)
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Reasons | None:
+        """The reasons."""
+        return None if value is None else from_json(value)
+
+
+def one_of(column: str, words: Iterable[StrEnum]) -> CheckConstraint:
+    """The constraint that a column has one of some words, or nothing."""
+    said = ", ".join(f"'{word}'" for word in words)
+    return CheckConstraint(f"{column} IN ({said})", name=column)
+
+
+class Record(DeclarativeBase):
+    """Base of all records."""
+
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: UtcDateTime,
+        dict[str, Any]: JSON,
+        list[float]: JSON,
+        list[str]: JSON,
+        Reasons: ReasonsJson(),
+    }
+    type_annotation_map |= {words: Word(words) for words in _STORED}

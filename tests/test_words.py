@@ -1,0 +1,129 @@
+"""The closed vocabularies: each word stands where it is defined, and the store knows them all."""
+
+import ast
+import sqlite3
+from enum import StrEnum
+from pathlib import Path
+
+import pytest
+from sqlalchemy import CheckConstraint
+
+from service import kinds
+from service.store.record import Record, Word
+from tests.test_architecture import ROOT, sources
+
+VOCABULARIES = [
+    each
+    for each in vars(kinds).values()
+    if isinstance(each, type) and issubclass(each, StrEnum) and each is not StrEnum
+]
+WORDS = {str(word) for words in VOCABULARIES for word in words}
+# Names of fields in JSON bodies, too: as a key, or to look one up, such a word is no member of a
+# vocabulary. (`"alert"` is a field of a log line, `"drift"` one of an alert's body.)
+FIELDS = {
+    "accepted", "alert", "drift", "firing", "pending", "pose", "reference", "registered", "rhythm",
+    "source", "tracks",
+}  # fmt: skip
+# Values that are spelled like a word of a vocabulary, and mean something else.
+OTHERS = {
+    ("backup/checking.py", "ok"): "a verdict, defined there",
+    ("centred.py", "tracks"): "a column of a table",
+    ("flow_study.py", "tracks"): "a column of a table",
+    ("formats/batch.py", "source"): "the name of a field",
+    ("formats/batch.py", "tracks"): "the name of a field",
+    ("formats/json_body.py", "tracks"): "the name of a field",
+    ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
+    ("jobs/housekeeping.py", "stale"): "the name of a log line",
+    ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
+    ("jobs/rounds.py", "clock"): "the name of a round",
+    ("reasons.py", "maintenance"): "the code of a reason, defined there",
+    ("recalibration/growth.py", "registered"): "the key of an estimator's answer",
+    ("recalibration/outbox.py", "acknowledged"): "the name of a flag",
+    ("recalibration/outbox.py", "drift"): "the name of a field",
+    ("recalibration/outbox.py", "silenced"): "the name of a flag",
+    ("recalibration/retention.py", "tracks"): "the name of a limit, for the log",
+    ("replay_protocol.py", "estimate"): "what a bar of progress is called",
+    ("replay_protocol.py", "reference"): "what a bar of progress is called",
+    ("routes/maintenance.py", "maintenance"): "a tag of the API's description",
+    ("routes/poses.py", "pose"): "a tag of the API's description",
+    ("routes/sources.py", "tracks"): "a tag of the API's description",
+    ("routes/tracks.py", "tracks"): "a tag and a field of the API's description",
+    ("schemas/metrics.py", "firing"): "part of a metric's name",
+    ("schemas/metrics.py", "pending"): "the name of a field",
+    ("schemas/metrics.py", "silenced"): "part of a metric's name",
+    ("schemas/webhooks.py", "pending"): "the name of a field",
+    ("serve.py", "warning"): "uvicorn's log level",
+    ("store/files.py", "ok"): "what SQLite's quick_check answers",
+    ("store/tables.py", "source"): "the name of a column",
+    ("store/tables.py", "tracks"): "the name of a table",
+    ("web/judgement.py", "critical"): "a tone, defined there",
+    ("web/judgement.py", "warning"): "a tone, defined there",
+}
+
+
+def found_words(path: Path) -> list[tuple[str, int]]:
+    """The words of a vocabulary that stand as strings in a module, with their lines."""
+    tree = ast.parse(path.read_text())
+    keys = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Dict):
+            keys |= {id(key) for key in node.keys}
+        elif isinstance(node, ast.Subscript):
+            keys.add(id(node.slice))
+    return [
+        (node.value, node.lineno)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant)
+        and node.value in WORDS
+        and not (id(node) in keys and node.value in FIELDS)
+    ]
+
+
+def test_no_word_of_a_vocabulary_stands_outside_its_definition():
+    service = ROOT / "service"
+    found = {
+        (str(path.relative_to(service)), word, line)
+        for path in sources("service")
+        if path.name != "kinds.py"
+        for word, line in found_words(path)
+    }
+    assert not [each for each in found if each[:2] not in OTHERS]
+    # What is let through is still there.
+    assert {each[:2] for each in found} == set(OTHERS)
+
+
+def test_a_stray_word_is_found(tmp_path):
+    path = tmp_path / "stray.py"
+    path.write_text(
+        'def f(a):\n    return a == "firing" or {"drift": 1} or {"no_data": a["pose"]}\n'
+    )
+    assert found_words(path) == [("firing", 2), ("no_data", 2)]
+
+
+def test_every_column_of_a_vocabulary_is_checked_in_the_store(settings):
+    with sqlite3.connect(settings.database_path) as connection:
+        rows = connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
+        made = dict(rows.fetchall())
+    columns = [
+        (table, column)
+        for table in Record.metadata.sorted_tables
+        for column in table.columns
+        if isinstance(column.type, Word)
+    ]
+    assert len(columns) >= 17
+    for table, column in columns:
+        name = f"ck_{table.name}_{column.name}"
+        (check,) = [
+            each
+            for each in table.constraints
+            if isinstance(each, CheckConstraint) and each.name == name
+        ]
+        assert f"CONSTRAINT {name} CHECK ({check.sqltext})" in made[table.name]
+
+
+def test_the_store_refuses_a_word_that_is_none(settings):
+    insert = "INSERT INTO events (type, payload, created_at) VALUES (?, '{}', '2026-11-20')"
+    with sqlite3.connect(settings.database_path) as connection:
+        connection.execute(insert, ("alert",))
+        with pytest.raises(sqlite3.IntegrityError, match="ck_events_type"):
+            connection.execute(insert, ("gossip",))
