@@ -79,7 +79,7 @@ def duration(seconds: float) -> str:
 
 
 def ago(at: datetime, now: datetime) -> str:
-    """How long ago a time was; `live.js` says it the same way as time goes on."""
+    """How long ago a time was; `times.js` says it the same way as time goes on."""
     seconds = (now - at).total_seconds()
     if seconds < -_MINUTE_S:
         return f"in {duration(-seconds)}"
