@@ -1,14 +1,15 @@
-# Two stages: what builds stays behind. On machines without a GPU, pass
-# --build-arg PIP_EXTRA_INDEX_URL=<the index of torch's CPU builds> for a much smaller image.
+# Two stages: what builds stays behind. Everything is installed by its hash, torch in its CPU build;
+# --build-arg TORCH=cuda takes PyPI's, which is several GB larger and needs no second index.
 FROM python:3.11-slim AS build
-ARG PIP_EXTRA_INDEX_URL=""
+ARG TORCH=cpu
 WORKDIR /src
-COPY pyproject.toml .constraints.txt README.md LICENSE ./
+COPY .lock .lock
+COPY .ci/install .ci/install
+COPY pyproject.toml README.md LICENSE ./
 COPY models models
 COPY service service
 COPY migrations migrations
-RUN python -m venv /opt/surefoot \
-    && /opt/surefoot/bin/pip install --no-cache-dir -c .constraints.txt .
+RUN VENV=/opt/surefoot PIP_NO_CACHE_DIR=1 .ci/install runtime "$TORCH"
 
 FROM python:3.11-slim
 RUN useradd --system --uid 10001 --home-dir /data --create-home surefoot

@@ -13,6 +13,7 @@ from service.recalibration.quota import Quota
 from service.routes import (
     activity,
     alerts,
+    api_docs,
     camera_page,
     cameras,
     documented,
@@ -80,6 +81,8 @@ def create_app(settings: Settings) -> FastAPI:
         version="0.1.0",
         summary="Tells when a fixed camera has moved, from the paths of people walking.",
         lifespan=lifespan,
+        docs_url=None,  # FastAPI's own fetch their viewers from a public host
+        redoc_url=None,
     )
     for module in (
         cameras,
@@ -95,6 +98,7 @@ def create_app(settings: Settings) -> FastAPI:
         activity,
         operation,
         metrics,
+        api_docs,
         fleet,
         login,
         camera_page,

@@ -1,66 +1,155 @@
-"""What the README says is so."""
+"""What the README and the pages behind it say is so."""
 
 import json
 import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
-from fastapi.testclient import TestClient
+import httpx
+import pytest
+from packaging.requirements import Requirement
 from typer.testing import CliRunner
 
-from service.app import create_app
 from service.cli import app
+from service.schemas.alerts import AlertOut
+from service.settings import Settings
+from tests.conftest import free_port, wait_for
+from tests.settings_table import settings_table, written_table
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
+HOST = "http://127.0.0.1:8080"
+COMMANDS = (
+    "serve", "worker", "migrate", "replay", "demo", "evaluate", "centred", "alarm-study",
+    "flow-study", "backup", "restore", "check", "rotate-key", "token",
+)  # fmt: skip
 
 
-def commands() -> list[str]:
-    section = README.split("## Try it")[1].split("\n## ")[0]
-    return [line.strip() for line in section.splitlines() if line.startswith("    ")]
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-def bodies() -> list[dict]:
-    return [json.loads(text) for text in re.findall(r"-d '(\{.*?\})'", README, re.DOTALL)]
+def samples() -> list[dict]:
+    return [json.loads(text) for text in blocks("json")]
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Iterator[str]:
+    """The address of a real `surefoot serve`."""
+    port = free_port()
+    settings = Settings(data_dir=tmp_path / "data", workers=0, port=port)
+    with (tmp_path / "serve.log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "service.cli", "serve"],
+            env=settings.as_environment(), stdout=log, stderr=log, cwd=ROOT,
+        )  # fmt: skip
+    url = f"http://127.0.0.1:{port}"
+
+    def answers() -> bool:
+        assert process.poll() is None, (tmp_path / "serve.log").read_text()
+        try:
+            return httpx.get(f"{url}/healthz").status_code == 200
+        except httpx.TransportError:
+            return False
+
+    try:
+        wait_for(answers)
+        yield url
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def curl(command: str, url: str) -> str:
+    """What a command of the README prints, asked of another address; an error of HTTP fails."""
+    limit_s = 5 if "/events" in command else 60
+    told = command.replace(HOST, url).replace("curl ", f"curl --fail-with-body -m {limit_s} ", 1)
+    asked = subprocess.run(["bash", "-c", told], capture_output=True, text=True, check=False)
+    # A stream ends by our limit of time alone.
+    assert asked.returncode == (28 if "/events" in command else 0), (told, asked)
+    return asked.stdout
+
+
+def test_the_readme_is_short():
+    assert len(README.encode()) <= 7 * 1024
 
 
 def test_two_commands_do_all_the_set_up():
-    demo, tests = commands()
-    for command in (demo, tests):
-        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -q -c ")
-    assert demo.endswith("surefoot demo")
-    assert tests.endswith(".venv/bin/pytest")
+    section = README.split("## Try it")[1].split("\n## ")[0]
+    demo, tests = [line.strip() for line in section.splitlines() if line.startswith("    ")]
+    assert demo == ".ci/install && .venv/bin/surefoot demo"
+    assert tests == ".ci/install test && .venv/bin/pytest"
 
 
-def test_what_it_posts_is_taken(settings):
-    camera, batch = bodies()
-    with TestClient(create_app(settings)) as http:
-        assert http.post("/cameras", json=camera).status_code == 201
-        answer = http.post("/cameras/town-centre/tracks", json=batch)
-        assert answer.json() == {"accepted": 1, "duplicates": 0, "rejected": []}
-        for path in re.findall(r"http://127\.0\.0\.1:8080(/[^\s'>]*)", README):
-            if path != "/events" and not path.startswith("/cameras/town-centre/tracks"):
-                assert http.get(path).status_code == 200, path
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("curl") is None, reason="no curl here")
+def test_its_requests_are_answered_as_it_says(service):
+    requests = [
+        command
+        for block in blocks("sh")
+        for command in re.split(r"\n(?=curl )", block.strip())
+        if command.startswith("curl ")
+    ]
+    register, post, pose, alerts, events = requests
+    assert json.loads(curl(register, service))["id"] == "town-centre"
+    posted, served, alert = samples()
+    assert json.loads(curl(post, service)) == posted
+    assert_like(served, json.loads(curl(pose, service)))
+    assert json.loads(curl(alerts, service))["items"] == []
+    assert set(alert) <= set(AlertOut.model_fields)
+    assert ": connected" in curl(events, service)
+
+
+def assert_like(sample: dict, answer: dict) -> None:
+    """Whatever a sample has is in the answer, too."""
+    for name, value in sample.items():
+        assert name in answer
+        if isinstance(value, dict) and isinstance(answer[name], dict):
+            assert_like(value, answer[name])
 
 
 def test_its_commands_exist():
     described = CliRunner().invoke(app, ["--help"]).output
-    for name in set(
-        re.findall(r"surefoot (serve|worker|migrate|replay|demo|evaluate|centred)", README)
-    ):
+    pages = README + (ROOT / "service" / "README.md").read_text()
+    for name in COMMANDS:
         assert name in described
-    for name in ("serve", "worker", "migrate", "replay", "demo", "evaluate", "centred"):
-        assert f"surefoot {name}" in README
+        assert f"surefoot {name}" in pages
+    for name in re.findall(r"(?:bin/|surefoot |`)surefoot ([a-z][a-z-]+)", pages):
+        assert name in COMMANDS
 
 
-def test_its_files_exist():
-    for link in re.findall(r"\]\(([^)#]+)\)", README):
-        assert link.startswith("http") or (ROOT / link).is_file(), link
-    for path in re.findall(r"`((?:service|models|tests)/[\w/.]*)`", README):
-        assert (ROOT / path).exists(), path
+def test_the_table_of_settings_is_what_the_settings_say():
+    assert written_table() == settings_table(), "python -m tests.settings_table --write"
 
 
-def test_constraints_pin_what_the_project_asks_for():
-    pinned = (ROOT / ".constraints.txt").read_text().lower()
-    project = (ROOT / "pyproject.toml").read_text()
-    for name, version in re.findall(r'^    "([\w-]+)==([\w.]+)"', project, re.MULTILINE):
-        assert f"{name.lower()}=={version}" in pinned.replace("_", "-"), name
+def locked(name: str) -> dict[str, list[str]]:
+    """Releases that a file of `.lock/` has of each package, after checking that each has hashes."""
+    found: dict[str, list[str]] = {}
+    for block in re.split(r"\n(?=[a-z])", (ROOT / ".lock" / name).read_text()):
+        if block.startswith(("#", "-")):
+            continue
+        package, version = re.match(r"([a-z0-9.-]+)==([^ ]+)", block).groups()
+        found.setdefault(package, []).append(version)
+        assert "--hash=sha256:" in block, package
+    return found
+
+
+def test_the_lock_fits_what_the_project_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    torch = {name: locked(f"torch-{name}.txt")["torch"] for name in ("cpu", "cuda")}
+    runtime, everything = locked("runtime.txt"), locked("test.txt")
+    assert torch["cpu"] == torch["cuda"]
+    assert runtime.items() <= everything.items()
+    for asked, there in (
+        (project["dependencies"], runtime),
+        (extras["plots"] + extras["test"], everything),
+    ):
+        for text in asked:
+            wanted = Requirement(text)
+            releases = (there | {"torch": torch["cpu"]})[wanted.name.lower()]
+            assert all(wanted.specifier.contains(release) for release in releases), text

@@ -5,8 +5,8 @@ roll and log height: sharp, but who walks far too slowly counts as someone who s
 says little after a large move. Three more are the same without that: how far off a pace is, held
 within bounds. Eight are how much likelier their places and ways were a little further on than a
 little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
-these tells a move, and how well, is learned of the site (`chart_learning`). Source: `estimation.md`
-3.4 and 3.6.
+these tells a move, and how well, is learned of the site (`chart_learning`). The method: "The alarm"
+in `models/README.md`.
 """
 
 from dataclasses import dataclass, replace

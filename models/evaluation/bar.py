@@ -1,6 +1,6 @@
 """The floor and the bar of the protocol: crude joint estimators, and what a served pose must reach.
 
-Source: `estimation.md`, section 5: medians over 12 knocks of +-8 deg, angle and height.
+Medians over 12 knocks of +-8 deg, angle and height; the table of `models/README.md` has them.
 """
 
 from dataclasses import dataclass

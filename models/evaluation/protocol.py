@@ -109,8 +109,8 @@ class Outcome:
 def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
     """Split a scene's people in halves and knock the camera before the second.
 
-    Source: `estimation.md`, section 4. The same scene and seed give the same halves and, up to
-    the range, the same direction of the knock.
+    The protocol of "Results" in `models/README.md`. The same scene and seed give the same halves
+    and, up to the range, the same direction of the knock.
     """
     rng = np.random.default_rng(seed)
     people = sorted({track.person_id for track in scene.tracks})

@@ -3,7 +3,7 @@
 At the pose where a camera is taken to be, each person's places and directions have a signed score
 along tilt, roll, log height and heading: how much likelier they were from a little further on. Of
 a still camera the scores are on average what they were in the reference; of one that has moved
-they are not, by as much as it has. Source: `estimation.md`, 3.4.
+they are not, by as much as it has.
 """
 
 from dataclasses import dataclass

@@ -1,10 +1,5 @@
 """`/ui/cameras/{id}`: the page of a camera, and the script that draws its charts."""
 
-import gzip
-from functools import lru_cache
-from importlib.metadata import version
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
@@ -13,6 +8,7 @@ from fastapi.responses import HTMLResponse, Response
 from service.kinds import AlertState
 from service.recalibration import camera_page
 from service.recalibration.camera_page import CameraPage
+from service.routes.packaged import packaged_file, versioned_url
 from service.routes.pages import render
 from service.routes.state import ReadDep, StateDep
 from service.web import camera_words
@@ -25,8 +21,8 @@ from service.web.words import STATES
 
 router = APIRouter(include_in_schema=False)
 
-# The page asks for the version that is installed, so browsers may keep it for ever.
-CHARTS_URL = f"/ui/plotly-{version('plotly')}.js"
+_CHARTS = "package_data/plotly.min.js"
+CHARTS_URL = versioned_url("plotly", _CHARTS)
 # The one style that plotly 7.1.0 writes into a page by itself, of maps, which are not used here.
 # The hash lets in that and no other; a browser test tells when another version needs another one.
 _CHARTS_STYLE = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
@@ -65,16 +61,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
 @router.get(CHARTS_URL)
 def charts(accept_encoding: Annotated[str, Header()] = "") -> Response:
     """The chart library's script, out of its installed package."""
-    headers = {
-        "Cache-Control": "public, max-age=31536000, immutable",
-        "X-Content-Type-Options": "nosniff",
-        "Vary": "Accept-Encoding",
-    }
-    packed = "gzip" in accept_encoding
-    if packed:
-        headers["Content-Encoding"] = "gzip"
-    body = _packed_script() if packed else _script_path().read_bytes()
-    return Response(body, media_type="text/javascript", headers=headers)
+    return packaged_file("plotly", _CHARTS, accept_encoding)
 
 
 def _chart_facts(page: CameraPage) -> dict[str, Any]:
@@ -100,16 +87,3 @@ def _chart_facts(page: CameraPage) -> dict[str, Any]:
             for story in page.alerts
         ],
     }
-
-
-def _script_path() -> Path:
-    # Found without importing the package, which is large.
-    spec = find_spec("plotly")
-    assert spec is not None
-    assert spec.submodule_search_locations
-    return Path(spec.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
-
-
-@lru_cache(maxsize=1)
-def _packed_script() -> bytes:
-    return gzip.compress(_script_path().read_bytes(), 6, mtime=0)

@@ -3,6 +3,7 @@
 from starlette.routing import compile_path
 
 from service.kinds import TokenScope
+from service.routes.api_docs import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
 from service.routes.camera_page import CHARTS_URL
 
 # None: whoever asks.
@@ -26,16 +27,16 @@ _GET: dict[Need, tuple[str, ...]] = {
         "/cameras/{camera_id}/sources",
         "/cameras/{camera_id}/trainings",
         "/docs",
-        "/docs/oauth2-redirect",
         "/events",
         "/metrics",
         "/openapi.json",
-        "/redoc",
         "/trainings/{training_id}",
         "/ui/cameras/{camera_id}",
         "/ui/fleet/banners",
         "/ui/fleet/rows",
         CHARTS_URL,
+        VIEWER_SCRIPT_URL,
+        VIEWER_STYLE_URL,
     ),
     # Addresses of webhooks often hold a secret; the form and the list of tokens are for who may
     # use them.

@@ -13,7 +13,7 @@ from models.geometry.pose import CameraPose
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 
-# The Town Centre camera of conventions.md, in both forms.
+# The Town Centre camera of `tests/models/test_conventions.py`, in both forms.
 LENS = {
     "width": "1920", "height": "1080", "fx": "2696.36", "cx": "959.5", "cy": "539.5",
     "distortion": "-0.60, 4.70, -0.0005, -0.0078, 0",
