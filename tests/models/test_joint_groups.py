@@ -79,6 +79,13 @@ def test_two_parties_stay_two():
     assert parties(labels_of(*walks)) == [[0, 2, 4], [1, 3]]
 
 
+def test_two_pairs_that_draw_near_are_one():
+    near = np.where(np.arange(10) < 3, 6.0, 0.0)[:, None] * [0.0, 1.0]
+    others = [walk((0, y)) for y in (4.5, 5.5)]
+    joined = [(time_s, place + near, way) for time_s, place, way in others]
+    assert parties(labels_of(walk((0, 0)), walk((0, 1)), *joined)) == [[0, 1, 2, 3]]
+
+
 def test_how_often_a_tracker_reports_does_not_matter():
     # Three steps a bin of 3 s count once, and so does the other's one.
     often = walk((0, 0), steps=30, every_s=1.0)
