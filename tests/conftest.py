@@ -1,5 +1,6 @@
 """What several tests need: a migrated data directory, a service under test, a camera to post to."""
 
+import fcntl
 import math
 import os
 import shutil
@@ -50,12 +51,56 @@ def pose() -> CameraPose:
     )
 
 
+Once = Callable[[str, Callable[[Path], None]], Path]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave slow tests out of the coverage; where two processes run, begin with them in both.
+
+    Each process is given one half of the list, and steals from the other's end: what takes long
+    must not be what is left. Tests of a file stay together, with what they share.
+    """
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    for item in slow:
+        item.add_marker("no_cover")
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return
+    fast = [item for item in items if not item.get_closest_marker("slow")]
+    files = list(dict.fromkeys(item.path for item in slow))
+    first = [item for item in slow if files.index(item.path) % 2 == 0]
+    second = [item for item in slow if files.index(item.path) % 2 == 1]
+    cut = min(max(len(items) // 2 - len(first), 0), len(fast))
+    items[:] = [*first, *fast[:cut], *second, *fast[cut:]]
+
+
 @pytest.fixture(scope="session")
-def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
+    """A folder by its name, which is made once a run, by the first process that asks for it."""
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent  # of all processes of this run
+    root = root / "once"
+    root.mkdir(exist_ok=True)
+
+    def find(name: str, make: Callable[[Path], None]) -> Path:
+        folder, unfinished = root / name, root / f"{name}.unfinished"
+        with (root / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not folder.exists():
+                shutil.rmtree(unfinished, ignore_errors=True)
+                unfinished.mkdir()
+                make(unfinished)
+                unfinished.rename(folder)
+        return folder
+
+    return find
+
+
+@pytest.fixture(scope="session")
+def migrated(once: Once) -> Path:
     """A data directory that was just migrated; migrating takes a second, a copy none."""
-    made = Settings(data_dir=tmp_path_factory.mktemp("migrated") / "data")
-    migrate(made)
-    return made.data_dir
+    made = once("migrated", lambda folder: migrate(Settings(data_dir=folder / "data")))
+    return made / "data"
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from service.migrate import migrate
 from service.settings import Settings
 from tests.conftest import free_port, wait_for
 
@@ -54,14 +53,19 @@ class Server:
         self.process.wait(20)
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    made = Settings(data_dir=tmp_path / "data", workers=0, port=free_port())
-    migrate(made)
-    running = Server(made)
+def served(folder: Path, migrated: Path) -> Iterator[Server]:
+    """A server over an empty data directory, as long as the iteration lasts."""
+    shutil.copytree(migrated, folder / "data")
+    running = Server(Settings(data_dir=folder / "data", workers=0, port=free_port()))
     running.start()
     yield running
     running.stop()
+
+
+@pytest.fixture
+def server(tmp_path: Path, migrated: Path) -> Iterator[Server]:
+    """A server of one test; files whose tests leave nothing behind have one of their own."""
+    yield from served(tmp_path, migrated)
 
 
 @pytest.fixture(scope="package")

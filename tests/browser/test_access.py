@@ -2,13 +2,13 @@
 
 import io
 import re
+import shutil
 
 import pytest
 from PIL import Image
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
-from service.migrate import migrate
 from service.settings import Settings
 from service.store.database import Store
 from tests.browser.conftest import CHROMIUM, Server, axe, shoot, too_wide
@@ -26,7 +26,7 @@ def make_token(settings, *scopes, name="ada"):
         return tokens.make_token(session, TokenSpec(name=name, scopes=scopes), None).text
 
 
-def started(folder, **changes):
+def started(folder, migrated, **changes):
     made = Settings(
         data_dir=folder / "data",
         workers=0,
@@ -36,15 +36,14 @@ def started(folder, **changes):
         caller_rate=0,
         **changes,
     )
-    migrate(made)
-    running = Server(made)
-    return running
+    shutil.copytree(migrated, made.data_dir)
+    return Server(made)
 
 
 @pytest.fixture(scope="module")
-def closed(tmp_path_factory):
+def closed(tmp_path_factory, migrated):
     """A service with access on, asked by an administrator's token."""
-    running = started(tmp_path_factory.mktemp("closed"), auth="on")
+    running = started(tmp_path_factory.mktemp("closed"), migrated, auth="on")
     running.token = make_token(running.settings, "admin", "ingest")
     running.http.headers["Authorization"] = f"Bearer {running.token}"
     running.start()
@@ -53,9 +52,9 @@ def closed(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def open_(tmp_path_factory):
+def open_(tmp_path_factory, migrated):
     """A service with access off, as it is on loopback."""
-    running = started(tmp_path_factory.mktemp("open"))
+    running = started(tmp_path_factory.mktemp("open"), migrated)
     running.start()
     yield running
     running.stop()

@@ -2,9 +2,14 @@
 
 import pytest
 
-from tests.browser.conftest import axe, too_wide
+from tests.browser.conftest import axe, served, too_wide
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, migrated):
+    yield from served(tmp_path_factory.mktemp("base"), migrated)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -2,12 +2,12 @@
 
 import math
 import re
+import shutil
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from PIL import Image
 
-from service.migrate import migrate
 from service.settings import Settings
 from tests.browser.conftest import Server, axe, shoot, too_wide
 from tests.conftest import CAMERA, free_port
@@ -220,12 +220,12 @@ def test_the_page_is_sound(page, knocked, scheme):
         assert axe(page) == [], width
 
 
-def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path):
+def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path, migrated):
     expect = pytest.importorskip("playwright.sync_api").expect
     settings = Settings(
         data_dir=tmp_path / "data", workers=0, port=free_port(), snapshots=True, window_tracks=20
     )
-    migrate(settings)
+    shutil.copytree(migrated, settings.data_dir)
     Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
     Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
     server = Server(settings)

@@ -6,17 +6,26 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.web.words import ago
-from tests.browser.conftest import axe, shoot, too_wide
+from tests.browser.conftest import axe, served, shoot, too_wide
 from tests.service.fleet_bench import Fleet, afternoon
 
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, migrated):
+    yield from served(tmp_path_factory.mktemp("fleet"), migrated)
+
+
 @pytest.fixture
 def fleet(server):
+    """A fleet that is empty, whatever tests before this one had in theirs."""
     made = Fleet(server.settings)
     yield made
     made.close()
+    for camera in server.http.get("/cameras", params={"limit": 1000}).json()["items"]:
+        url = f"/cameras/{camera['id']}"
+        server.http.delete(url, headers={"If-Match": "*"}).raise_for_status()
 
 
 def shown(page):

@@ -4,10 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.browser.conftest import axe, shoot, too_wide
+from tests.browser.conftest import axe, served, shoot, too_wide
 from tests.service.test_registration import ANGLES, LENS, POSE, walks
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, migrated):
+    yield from served(tmp_path_factory.mktemp("registration"), migrated)
 
 
 def fill(page, **fields):

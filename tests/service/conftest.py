@@ -1,4 +1,7 @@
-from collections.abc import Iterator
+import pickle
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -7,9 +10,12 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.settings import Settings
-from tests.conftest import CAMERA
+from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
 from tests.service.post_room import PostRoom
+from tests.service.street import Street
+
+MakeStreet = Callable[[TestClient, Settings], Street]
 
 
 @pytest.fixture
@@ -30,6 +36,40 @@ def corner(http: TestClient) -> TestClient:
 def bench(corner: TestClient, settings: Settings) -> Bench:
     """The camera `corner` with a reference, and estimates that a test makes up."""
     return Bench(corner, settings.model_copy(update={"window_tracks": 20}))
+
+
+@pytest.fixture
+def learned(settings: Settings, once: Once) -> Iterator[Callable[[str, MakeStreet], Street]]:
+    """A street by its name that goes on where `make` left it; learning is done once a run.
+
+    Tests of one name share its data directory and its people, each with a copy of its own.
+    """
+    opened: list[tuple[Street, TestClient]] = []
+
+    def begin(name: str, make: MakeStreet) -> Street:
+        def build(folder: Path) -> None:
+            first = settings.model_copy(update={"data_dir": folder / "data"})
+            shutil.copytree(settings.data_dir, first.data_dir)
+            with TestClient(create_app(first)) as http:
+                made = make(http, first)
+                made.close()
+            (folder / "street").write_bytes(pickle.dumps(made))
+
+        kept = once(name, build)
+        shutil.rmtree(settings.data_dir)
+        shutil.copytree(kept / "data", settings.data_dir)
+        street: Street = pickle.loads((kept / "street").read_bytes())
+        http = TestClient(create_app(settings)).__enter__()
+        opened.append((street, http))
+        # The job may have settings of its own, beside those of the application.
+        changed = vars(street).pop("settings")
+        street.go_on(http, changed.model_copy(update={"data_dir": settings.data_dir}))
+        return street
+
+    yield begin
+    for street, http in opened:
+        street.close()
+        http.__exit__(None, None, None)
 
 
 def problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:

@@ -35,14 +35,27 @@ class Street:
     """People who walk past a camera one after the other, and the camera's service."""
 
     def __init__(self, http: Any, settings: Any) -> None:
-        self.http = http
-        store = Store(settings)
-        self.context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
+        self.go_on(http, settings)
         self.clock_s = math.floor(time.time()) - 20_000.0
         self.seed = 0
         self.seen: list[Trajectory] = []
         self._bodies: list[dict[str, Any]] = []
         self._lanes: list[Lane] = []
+
+    def go_on(self, http: Any, settings: Any) -> None:
+        """Be watched by a service, over its store."""
+        self.http = http
+        store = Store(settings)
+        self.context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
+
+    def close(self) -> None:
+        """Let go of the store."""
+        self.context.queue.close()
+        self.context.store.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The people and the settings, without the service: to be kept beside its data."""
+        return {**vars(self), "http": None, "context": None, "settings": self.context.settings}
 
     def walk(
         self,

@@ -38,13 +38,17 @@ def settings(settings):
 
 
 @pytest.fixture(params=[20_000.0])
-def known(request, http, settings):
+def known(request, learned):
     """A street whose reference is learned, and its map with it, so many seconds ago."""
-    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-    street = make_street(http, settings, request.param)
-    street.keep_to_lanes(PRIOR, WANTED)
-    assert street.look()["reference"]["state"] == "ready"
-    return street
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = make_street(http, settings, request.param)
+        street.keep_to_lanes(PRIOR, WANTED)
+        assert street.look()["reference"]["state"] == "ready"
+        return street
+
+    return learned(f"growth-{request.param:.0f}", make)
 
 
 def map_of(street):

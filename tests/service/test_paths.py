@@ -16,13 +16,17 @@ WANTED = 120
 
 
 @pytest.fixture
-def street(http, settings):
+def street(learned):
     """A street of lanes whose reference and map are learned."""
-    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-    street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
-    street.keep_to_lanes(PRIOR, WANTED)
-    assert street.look()["reference"]["state"] == "ready"
-    return street
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
+        street.keep_to_lanes(PRIOR, WANTED)
+        assert street.look()["reference"]["state"] == "ready"
+        return street
+
+    return learned("paths", make)
 
 
 def turned(degrees: float):

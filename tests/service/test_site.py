@@ -29,11 +29,17 @@ def street(http, settings):
 
 
 @pytest.fixture
-def known(street):
+def known(learned):
     """A street whose reference is learned."""
-    street.walk(PRIOR, WANTED)
-    assert street.look()["reference"]["state"] == "ready"
-    return street
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = Street(http, settings)
+        street.walk(PRIOR, WANTED)
+        assert street.look()["reference"]["state"] == "ready"
+        return street
+
+    return learned("site", make)
 
 
 def reference_of(street):

@@ -44,14 +44,18 @@ class Trackers(Street):
 
 
 @pytest.fixture
-def known(http, settings):
+def known(learned):
     """A camera that has been learned of the first source's people, and is well."""
-    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-    street = Trackers(http, settings)
-    street.clock_s -= 40_000
-    street.walk(PRIOR, WANTED + 10)
-    assert street.look()["state"] == "ok"
-    return street
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = Trackers(http, settings)
+        street.clock_s -= 40_000
+        street.walk(PRIOR, WANTED + 10)
+        assert street.look()["state"] == "ok"
+        return street
+
+    return learned("sources", make)
 
 
 def test_the_first_source_to_post_counts(known):
