@@ -83,7 +83,6 @@ def _rewrite(made_of: Callable[[str, bytes], bytes]) -> None:
 def _packed(form: str, data: bytes) -> bytes:
     values = _read_archive(data)
     if form == "site":
-        values.pop("doubt", None)  # told once, by the row
         values = {_SITE.get(name, name): part for name, part in values.items()}
     if form == "chart":
         paces = _read_archive(values.pop("paces").tobytes())
@@ -108,7 +107,9 @@ def _archived(form: str, data: bytes) -> bytes:
     if form == "chart":
         names = [name for name in values if name.startswith("paces.")]
         paces = {name.removeprefix("paces."): values.pop(name) for name in names}
-        nested = _write_archive({old.get(name, name): part for name, part in paces.items()})
+        nested = _write_archive(
+            {old.get(name, name): part for name, part in paces.items()} | {"doubt": ""}
+        )
         values["paces"] = np.frombuffer(nested, dtype=np.uint8)
     return _write_archive(values)
 
@@ -118,6 +119,7 @@ def _read_archive(data: bytes) -> dict[str, np.ndarray]:
         values = {name: file[name] for name in file.files}
     if int(values.pop("format")) != 1:
         raise ValueError("format: 1 is needed")
+    values.pop("doubt", None)  # of a site: its row tells it
     return values
 
 

@@ -199,8 +199,10 @@ def test_no_tracks_tell_nothing(site):
     ],
 )
 def test_a_wrong_prior_pose_is_doubted(site, wrong, code, value):
-    doubt = learn_reference(site[1], wrong, WalkConfig(), 0).doubt
+    reference = learn_reference(site[1], wrong, WalkConfig(), 0)
+    doubt = reference.doubt
     assert doubt is not None
+    assert reference_from_bytes(reference_to_bytes(reference)).doubt is None  # told once
     name, expected, tolerance = value
     assert doubt.code is code
     assert doubt.values[name] == pytest.approx(expected, abs=tolerance)

@@ -77,7 +77,7 @@ def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
     still = seen(tracks[1])
     found = estimate_pose(still, site)
     assert (found.change_idx, found.first) == (None, 0)
-    assert abs(found.drift.tilt_rad) < np.radians(1)
+    assert abs(found.drift.by.tilt_rad) < np.radians(1)
     assert not read_alarm_chart(still, site, ONE_A_YEAR).moved
 
 

@@ -134,9 +134,13 @@ def learn_reference(
 
 
 def relearned(observations: Observations, prior: CameraPose, site: SiteReference) -> SiteReference:
-    """A site whose fields are learned of other tracks at the prior pose, by the spread it has."""
+    """A site whose fields are learned of other tracks at the prior pose, by the spread it has.
+
+    What was doubted of the first tracks is not said of these.
+    """
     blank = replace(
         site,
+        doubt=None,
         speeds=assumed(site.speeds.field, site.speeds.spread),
         statures=None
         if site.statures is None
