@@ -26,6 +26,8 @@ from service.store.revisions import alembic_config, known_revisions, require_kno
 
 log = logging.getLogger("surefoot.migrate")
 
+_LOOK_S = 10.0  # reads a gigabyte or more
+
 
 def migrate(settings: Settings) -> None:
     """Create or upgrade all tables, seal secrets, make old files shrinkable; one process at a time.
@@ -44,10 +46,21 @@ def migrate(settings: Settings) -> None:
         finish_restore(folder)
         make_private(folder)
         with telling_of_database(settings.database_path):
+            _require_sound(settings.database_path)
             _migrate_tables(settings)
             migrate_engine_tables(settings)
             _settle_key(settings)
             _make_shrinkable(settings.database_path)
+
+
+def _require_sound(path: Path) -> None:
+    """Refuse a damaged database before anything is made of it; a large one is looked at in part."""
+    found = files.first_fault(path, _LOOK_S) if path.exists() and path.stat().st_size else None
+    if found is not None:
+        raise StartError(
+            f"database: {path} is damaged ({' '.join(found.split())[:200]}); put a backup in its "
+            "place by `surefoot restore`, `surefoot check` says more"
+        )
 
 
 def _migrate_tables(settings: Settings) -> None:

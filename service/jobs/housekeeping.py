@@ -4,9 +4,12 @@ import logging
 import time
 from datetime import timedelta
 
+from sqlalchemy.orm import Session
+
 from service.jobs.context import JobContext
 from service.recalibration import deliveries, upkeep
 from service.recalibration.staleness import StaleWatch
+from service.recalibration.workforce import take_setback
 
 log = logging.getLogger("surefoot.jobs")
 _JUMP_S = 2.0
@@ -22,11 +25,22 @@ class ClockWatch:
         """Compare the clock with the monotonic one, that nobody sets."""
         ahead_s = time.time() - time.monotonic()
         back_s, self._ahead_s = self._ahead_s - ahead_s, ahead_s
-        if back_s < _JUMP_S:
-            return
-        with context.store.write() as session:
-            moved = deliveries.follow_clock(session, timedelta(seconds=back_s))
-        log.warning("clock_set_back", extra={"by_s": round(back_s), "deliveries": moved})
+        if back_s >= _JUMP_S:
+            with context.store.write() as session:
+                _follow(session, timedelta(seconds=back_s))
+
+
+def follow_clock_since_last_run(context: JobContext) -> None:
+    """The same of a clock that was set back while no worker watched; before a worker registers."""
+    with context.store.write() as session:
+        back = take_setback(session)
+        if back.total_seconds() >= _JUMP_S:
+            _follow(session, back)
+
+
+def _follow(session: Session, back: timedelta) -> None:
+    moved = deliveries.follow_clock(session, back)
+    log.warning("clock_set_back", extra={"by_s": round(back.total_seconds()), "deliveries": moved})
 
 
 def run_sweep(context: JobContext) -> None:

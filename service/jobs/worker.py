@@ -14,6 +14,7 @@ from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.jobs import engine, exits
 from service.jobs.context import JobContext
+from service.jobs.housekeeping import follow_clock_since_last_run
 from service.jobs.in_hand import UPKEEP, InHand
 from service.jobs.niceness import yield_to_others
 from service.jobs.pulse import BEAT_S, start_pulse
@@ -61,6 +62,7 @@ def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
     if follow_stdin:
         threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
     start_pulse(context, tells=follow_stdin)
+    follow_clock_since_last_run(context)
     with store.write() as session:
         register_worker(session, name, os.getpid())
     engine.launch(context, name)

@@ -20,6 +20,19 @@ def register_worker(session: Session, name: str, pid: int) -> None:
     record.lost = False
 
 
+def take_setback(session: Session) -> timedelta:
+    """How far the clock was set back at least since any worker was last heard of; told once.
+
+    None of them saw that happen: each was ended before, or is only just being started.
+    """
+    now = datetime.now(UTC)
+    ahead = workers.after(session, now)
+    back = max((record.heartbeat_at - now for record in ahead), default=timedelta())
+    for record in ahead:
+        record.heartbeat_at = now
+    return back
+
+
 def heartbeat(session: Session, name: str, pid: int) -> bool:
     """Record that a worker is alive; False where its jobs were given to others meanwhile."""
     record = workers.find(session, name)

@@ -2,6 +2,7 @@
 
 import contextlib
 import sqlite3
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from service.data_dir import make_file
 
 _PAGES_AT_ONCE = 2048
 _BUSY_MS = 30_000
+_STEPS_A_LOOK = 10_000  # of SQLite, between two looks at the clock
 Progress = Callable[[int, int], None]  # done, total
 
 
@@ -65,6 +67,24 @@ def faults(path: Path, most: int = 20) -> list[str]:
     with connected(path) as connection:
         rows = [str(row[0]) for row in connection.execute(f"PRAGMA integrity_check({most})")]
     return [] if rows == ["ok"] else rows
+
+
+def first_fault(path: Path, within_s: float) -> str | None:
+    """What a quick look finds wrong in a file, if anything within a time.
+
+    Raises:
+        sqlite3.DatabaseError: it cannot be looked through at all.
+    """
+    end_s = time.monotonic() + within_s
+    with connected(path) as connection:
+        connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS_A_LOOK)
+        try:
+            found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+                return None
+            raise
+    return None if found == "ok" else str(found)
 
 
 def broken_references(path: Path) -> dict[str, int]:

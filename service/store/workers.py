@@ -33,6 +33,11 @@ def newest_heartbeat(session: Session) -> datetime | None:
     return session.scalar(select(func.max(WorkerRecord.heartbeat_at)).where(~WorkerRecord.lost))
 
 
+def after(session: Session, now: datetime) -> Sequence[WorkerRecord]:
+    """Workers, lost ones too, that were heard of after a time."""
+    return session.scalars(select(WorkerRecord).where(WorkerRecord.heartbeat_at > now)).all()
+
+
 def troubles(session: Session) -> dict[str, str]:
     """What `serve` has to say of workers that it cannot keep alive, by their names."""
     rows = session.execute(

@@ -20,6 +20,7 @@ _FULL_S, _LONGEST_FULL_S, _READ_ONLY_S, _CLOCK_S = 4.0, 24.0, 2.0, 6.0
 _WEIGHTS_S = 90.0
 _REFUSAL_S = 30.0
 _REFUSAL_LINES = 3
+_STARTING_S = 120.0
 _HOUR_S = 3600
 
 
@@ -126,7 +127,8 @@ def hang(stand: Stand, ledger: Ledger, random_: random.Random) -> None:
         return
     worker = random_.choice(workers)
     worker.suspend()
-    end = time.monotonic() + 3 * stand.settings.worker_lost_s
+    # One that has not said yet that it lives is still being started: that may take a while.
+    end = time.monotonic() + 3 * stand.settings.worker_lost_s + _STARTING_S
     while time.monotonic() < end:
         if not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE:
             return

@@ -4,9 +4,10 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.jobs.housekeeping import ClockWatch
+from service.jobs.housekeeping import ClockWatch, follow_clock_since_last_run
 from service.recalibration.waiting import lies_ahead
-from service.store import webhooks
+from service.recalibration.workforce import register_worker
+from service.store import webhooks, workers
 from tests.conftest import free_port
 
 
@@ -35,6 +36,26 @@ def test_what_waits_to_be_delivered_follows_the_clock(post_room):
     clock.look(post_room.context)
     assert 0 < next_in_s(post_room) < 60
     clock.look(post_room.context)
+    assert 0 < next_in_s(post_room) < 60
+
+
+def test_a_clock_that_was_set_back_while_no_worker_watched_is_seen_by_the_next(post_room):
+    """The delivery waits by the clock of before; the worker that kept it was killed meanwhile."""
+    hook = post_room.hook(f"http://127.0.0.1:{free_port()}/")
+    post_room.open()
+    post_room.send(hook)
+    with post_room.store.write() as session:
+        register_worker(session, "local-0", 1)
+        hour = timedelta(hours=1)
+        workers.find(session, "local-0").heartbeat_at += hour
+        for record in webhooks.waiting(session, datetime.now(UTC)):
+            record.next_attempt_at += hour
+        for record in webhooks.every(session):
+            record.held_until += hour
+    assert next_in_s(post_room) > 3600
+    follow_clock_since_last_run(post_room.context)
+    assert 0 < next_in_s(post_room) < 60
+    follow_clock_since_last_run(post_room.context)
     assert 0 < next_in_s(post_room) < 60
 
 

@@ -98,6 +98,20 @@ def test_a_database_that_is_none_or_damaged(settings):
     assert "surefoot.sqlite is damaged" in start("migrate", settings.data_dir)
 
 
+@pytest.mark.parametrize("table", ["tracks", "deliveries", "workflow_status"])
+def test_a_table_that_is_damaged_is_not_served(settings, table):
+    with contextlib.closing(sqlite3.connect(settings.database_path)) as connection:
+        (size,) = connection.execute("PRAGMA page_size").fetchone()
+        asked = "SELECT rootpage FROM sqlite_master WHERE name = ?"
+        (page,) = connection.execute(asked, (table,)).fetchone()
+    with settings.database_path.open("r+b") as file:
+        file.seek((page - 1) * size)
+        file.write(b"\xa5" * size)
+    line = start("serve", settings.data_dir)
+    assert "surefoot.sqlite is damaged" in line
+    assert "surefoot restore" in line
+
+
 @pytest.fixture
 def small_disk(tmp_path):
     """A disk of two megabytes; where it cannot be made, the test is skipped."""
