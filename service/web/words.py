@@ -81,15 +81,16 @@ def degrees(radians: float, *, signed: bool = False) -> str:
 
 def duration(seconds: float) -> str:
     """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
-    delta = timedelta(seconds=max(seconds, 0.0))
-    return format_timedelta(delta, threshold=_AT_LEAST, locale="en")
+    return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale="en")
 
 
 def ago(at: datetime, now: datetime) -> str:
     """How long ago a time was, or in how long it is; `times.js` says the same as time goes on."""
     if now - _JUST_NOW[0] < at <= now + _JUST_NOW[1]:
         return "just now"
-    return format_timedelta(at - now, threshold=_AT_LEAST, add_direction=True, locale="en")
+    # A whole number, since of a timedelta it would take the second before.
+    seconds = round((at - now).total_seconds())
+    return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale="en")
 
 
 def clock_time(at: datetime, zone: tzinfo) -> str:
