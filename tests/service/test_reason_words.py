@@ -9,6 +9,7 @@ import pytest
 from models.drift.chart import CLOCK, Reading
 from models.drift.said import reason_of_drift, reason_of_reading
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
+from models.geometry.pose_parameters import PoseParameters
 from models.reasons import Reason, TracksCode
 from service.reason_words import group_in_words, in_words
 from service.reasons import (
@@ -164,9 +165,9 @@ def test_clients_get_the_first_code_and_its_angles_in_degrees():
 
 
 DRIFT = Drift(
-    tilt_rad=0.1, roll_rad=0.0, height_m=0.3, log_height=0.05, heading_rad=0.2, angle_rad=0.1,
-    tilt_sd_rad=0.01, roll_sd_rad=0.01, height_sd_m=0.1, log_height_sd=0.02, heading_sd_rad=0.01,
-    told=("tilt", "heading"),
+    by=PoseParameters(height_m=0.3, tilt_rad=0.1, roll_rad=0.0, heading_rad=0.2),
+    sd=PoseParameters(height_m=0.1, tilt_rad=0.01, roll_rad=0.01, heading_rad=0.01),
+    angle_rad=0.1, told=("tilt", "heading"),
 )  # fmt: skip
 
 
