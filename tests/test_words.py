@@ -48,6 +48,7 @@ OTHERS = {
     ("routes/poses.py", "pose"): "a tag of the API's description",
     ("routes/sources.py", "tracks"): "a tag of the API's description",
     ("routes/tracks.py", "tracks"): "a tag and a field of the API's description",
+    ("schemas/alerts.py", "drift"): "the name of a field",
     ("schemas/metrics.py", "firing"): "part of a metric's name",
     ("schemas/metrics.py", "pending"): "the name of a field",
     ("schemas/metrics.py", "silenced"): "part of a metric's name",

@@ -54,13 +54,13 @@ def test_fields_that_are_wrong_say_so(page, server):
     page.goto("/ui/register")
     fill(page, **LENS, id="Not An Id")
     page.get_by_role("button", name="Add this camera").click()
-    page.locator("#height_m:focus").wait_for()
+    page.locator("#id:focus").wait_for()  # the first of them
+    assert "small letters" in page.locator("#id-error").inner_text()
     assert page.locator("#height_m-error").inner_text().endswith("is needed")
     assert page.locator("#height_m").get_attribute("aria-invalid") == "true"
-    fill(page, **ANGLES)
+    fill(page, id="corner")
     page.get_by_role("button", name="Add this camera").click()
-    page.locator("#id:focus").wait_for()
-    assert "small letters" in page.locator("#id-error").inner_text()
+    page.locator("#height_m:focus").wait_for()
 
 
 def test_recorded_tracks_are_tried(page, tmp_path):

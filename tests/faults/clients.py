@@ -1,5 +1,6 @@
 """Clients of the service under test: trackers that post, and a person who acts on alerts."""
 
+import math
 import random
 import threading
 import time
@@ -7,6 +8,8 @@ from typing import Any
 
 import httpx
 
+from service.kinds import AlertKind, Severity
+from service.reasons import as_said
 from service.recalibration import alerts
 from service.store.database import Store
 from tests.conftest import CAMERA
@@ -126,11 +129,11 @@ class Operator(Client):
                     session,
                     self.stand.settings,
                     self.camera_id,
-                    "drift",
-                    "warning",
-                    {"tilt_deg": 5.0, "told": True},
+                    AlertKind.DRIFT,
+                    Severity.WARNING,
+                    {"tilt_rad": math.radians(5.0)},
                     None,
-                    reason="a fault run",
+                    reasons=as_said("a fault run"),
                 )
                 found = None if record is None else record.id
         except Exception as error:

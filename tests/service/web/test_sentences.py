@@ -58,9 +58,9 @@ def test_a_raised_camera():
 
 
 def test_how_sure_is_along_the_turn():
-    # Of 3 and 4 deg each known to 0.2: the length of 5 is, too; 90 of 100 is 1.645 sd.
-    assert angle_half_width_deg(estimate(tilt=3.0, roll=4.0)) == pytest.approx(0.329)
-    assert angle_half_width_deg(estimate(tilt=0.01)) == pytest.approx(0.329)
+    # Of 3 and 4 deg each known to 0.2: the length of 5 is, too; 90 of 100 is 1.644854 sd.
+    assert angle_half_width_deg(estimate(tilt=3.0, roll=4.0)) == pytest.approx(0.3289707)
+    assert angle_half_width_deg(estimate(tilt=0.01)) == pytest.approx(0.3289707)
     assert angle_half_width_deg(estimate(told=["height"])) is None
 
 
