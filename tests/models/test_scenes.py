@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from models.errors import ShapeError
-from models.evaluation import centred_run
 from models.evaluation.centred_run import run_averaged
 from models.evaluation.scenes import Knock, knock_trajectory, load_scene
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
-from tests.models.test_regressors import tiny_plan
 
 
 def write_scene(folder, lens, pose, count=40):
@@ -105,8 +103,7 @@ def test_only_the_longest_run_inside_the_image_is_seen(lens, pose):
     assert knock_trajectory(track, lens, pose, sky) is None
 
 
-def test_an_evaluation_reports_its_errors(tmp_path, lens, pose, monkeypatch):
-    monkeypatch.setattr(centred_run, "plan_training", tiny_plan)
+def test_an_evaluation_reports_its_errors(tmp_path, lens, pose):
     scene = load_scene(write_scene(tmp_path / "s", lens, pose))
     run = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=1)
     assert run.scene == "made-up"
