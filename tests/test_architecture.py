@@ -15,6 +15,7 @@ SERVICE_ROOMS = [
     {"settings", "errors", "logs"},
     {"formats", "store", "delivery", "reach"},
     {"job_queue"},
+    {"studies"},
     {"recalibration"},
     {"access"},
     {"backup", "schemas", "jobs", "web"},
