@@ -18,6 +18,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.synchronize import Event
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -96,12 +97,14 @@ class Load:
 def probe_health(port: int, stop: Event, pipe: Pipe) -> None:
     """Ask for /healthz ten times a second, from a process of its own."""
 
-    async def probe() -> list[float]:
+    async def probe() -> list[tuple[float, float]]:
         taken, connection = [], Connection("127.0.0.1", port)
+        first = time.perf_counter()
         while not stop.is_set():
             begun = time.perf_counter()
             answer = await connection.ask("GET", "/healthz")
-            taken.append(time.perf_counter() - begun if answer.status == 200 else 60.0)
+            seconds = time.perf_counter() - begun if answer.status == 200 else 60.0
+            taken.append((begun - first, seconds))
             await asyncio.sleep(0.1)
         return taken
 
@@ -146,14 +149,26 @@ def quantiles(seconds: list[float]) -> dict[str, float]:
     return {"p50_ms": round(p50, 1), "p99_ms": round(p99, 1), "worst_ms": round(ms.max(), 1)}
 
 
-def growth(samples: list[tuple[float, float]], warm_s: float) -> dict[str, float]:
-    """Memory right after the warm time, at the end (medians of a tenth each) and at its most."""
+def growth(samples: list[tuple[float, float]], warm_s: float) -> dict[str, Any]:
+    """Memory right after the warm time, at the end (medians of a tenth each) and at its most.
+
+    `by_minute_mb` has the least of every minute: what is held, without what a job needs for itself.
+    """
     mb = np.array([rss for at_s, rss in samples if at_s >= warm_s] or [samples[-1][1]])
     tenth = max(1, len(mb) // 10)
     first, last = float(np.median(mb[:tenth])), float(np.median(mb[-tenth:]))
     ratio = round(last / first - 1, 4)
-    return {"warm_mb": round(first), "end_mb": round(last), "most_mb": round(mb.max()),
-            "growth": ratio}  # fmt: skip
+    least: dict[int, float] = {}
+    for at_s, rss in samples:
+        minute = int(at_s // 60)
+        least[minute] = min(least.get(minute, rss), rss)
+    return {
+        "warm_mb": round(first),
+        "end_mb": round(last),
+        "most_mb": round(mb.max()),
+        "growth": ratio,
+        "by_minute_mb": " ".join(str(round(rss)) for rss in least.values()),
+    }
 
 
 def main() -> int:
@@ -203,7 +218,9 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     asyncio.run(load.run(wanted.clients, wanted.rate, wanted.reads, time.monotonic() + lasts_s))
     after = _seconds_until(lambda: service.http.get("/readyz").json()["store_writable"])
     stop.set()
-    health = mine.recv()
+    probes = mine.recv()
+    health = [seconds for _, seconds in probes]
+    slowest = sorted(probes, key=lambda probe: probe[1])[-8:]
     prober.join()
     watch.stop()
     warm_s = min(_WARM_S, lasts_s / 2)
@@ -230,6 +247,7 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
         "counts": {kind: dict(found) for kind, found in load.counts.items()},
         "latency": {kind: quantiles(found) for kind, found in load.seconds.items()},
         "health": quantiles(health),
+        "health_slowest": [f"{1000 * took:.0f} ms at {at:.0f} s" for at, took in slowest],
         "well_again_after_s": round(after, 2),
         "memory": memory,
         "largest_wal_mb": round(watch.largest_wal_mb, 1),
