@@ -1,18 +1,14 @@
 """`surefoot alarm-study` and the alarms of `surefoot evaluate`: in parallel; tables and JSON."""
 
-import json
-import multiprocessing
-import platform
+import math
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import track
 
 from models.errors import DegenerateGeometryError
 from models.evaluation.alarms import AlarmResults
@@ -22,6 +18,7 @@ from models.evaluation.scenes import load_scene
 from service.alarm_tables import BARS, delay_table, still_table
 from service.recalibration.limits import drift_limits
 from service.settings import Settings
+from service.studies.runs import process_pool, with_bar, write_results
 
 _TABLE_WIDTH = 130
 
@@ -70,12 +67,8 @@ def _run(
     started = time.monotonic()
     found: list[AlarmResults] = []
     without = 0
-    # Spawned, not forked, as for every other pool here.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        waiting = [pool.submit(task) for task in tasks]
-        for done in track(as_completed(waiting), "cases", total=len(tasks), console=console):
-            result = done.result()
+    with process_pool(processes) as pool:
+        for result in with_bar(pool, tasks, console):
             if result is None:
                 without += 1
                 continue
@@ -119,14 +112,14 @@ def _judge(folder: Path, seed: int, plan: AlarmPlan) -> AlarmResults | None:
 
 
 def _write(output: Path, plan: AlarmPlan, results: Sequence[AlarmResults]) -> None:
-    document: dict[str, Any] = {
-        "machine": {
-            "processor": platform.processor() or platform.machine(),
-            "cores": multiprocessing.cpu_count(),
-        },
-        "plan": asdict(plan),
-        "results": [asdict(result) for result in results],
-    }
-    # JSON has no infinity: never is null.
-    text = json.dumps(document, indent=1).replace("Infinity", "null")
-    output.write_text(text)
+    found = [_never_as_null(asdict(result)) for result in results]
+    write_results(output, plan=asdict(plan), results=found)
+
+
+def _never_as_null(value: Any) -> Any:
+    """A value as JSON can hold it, which has no infinity."""
+    if isinstance(value, dict):
+        return {name: _never_as_null(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_never_as_null(each) for each in value]
+    return None if isinstance(value, float) and math.isinf(value) else value

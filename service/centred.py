@@ -1,11 +1,8 @@
 """`surefoot centred`: offline, the averaged estimate on recorded scenes, as a table and JSON."""
 
-import json
-import multiprocessing
-import platform
 from collections.abc import MutableMapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from statistics import mean
@@ -18,6 +15,7 @@ from rich.table import Table
 from models.evaluation.centred_run import AveragedRun, run_averaged
 from models.evaluation.scenes import load_scene
 from models.regression.training import TrainingProgress
+from service.studies.runs import as_they_end, process_pool, spawning, write_results
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,30 +52,26 @@ def run_centred(
     for folder in folders:
         load_scene(folder)  # a wrong path fails before the first hour of training, not after
     runs: list[AveragedRun] = []
-    # Spawned, not forked: torch's threads do not survive a fork.
-    context = multiprocessing.get_context("spawn")
     with (
-        context.Manager() as manager,
-        ProcessPoolExecutor(processes, mp_context=context) as pool,
+        spawning().Manager() as manager,
+        process_pool(processes) as pool,
         Progress(console=console) as bar,
     ):
         steps: MutableMapping[int, tuple[int, int]] = manager.dict()
-        rows = {
-            pool.submit(_run, task, steps, number): bar.add_task(_name(task), total=None)
-            for number, task in enumerate(tasks)
-        }
-        waiting = set(rows)
-        while waiting:
-            try:
-                for done in as_completed(waiting, timeout=1.0):
-                    waiting.discard(done)
-                    runs.append(done.result())
-                    _write(output, runs)
-                    bar.update(rows[done], total=1, completed=1)
-            except TimeoutError:
-                for number, row in enumerate(rows.values()):
-                    if number in steps:
-                        bar.update(row, completed=steps[number][0], total=steps[number][1])
+        rows = [bar.add_task(_name(task), total=None) for task in tasks]
+        under_way = set(range(len(tasks)))
+
+        def show_steps() -> None:
+            for number in under_way:
+                if number in steps:
+                    bar.update(rows[number], completed=steps[number][0], total=steps[number][1])
+
+        calls = [partial(_run, task, steps, number) for number, task in enumerate(tasks)]
+        for number, run in as_they_end(pool, calls, show_steps):
+            under_way.discard(number)
+            runs.append(run)
+            _write(output, runs)
+            bar.update(rows[number], total=1, completed=1)
     runs.sort(key=lambda run: (run.scene, run.training_speed_mps, run.seed))
     _write(output, runs)
     console.print(_table(runs))
@@ -111,15 +105,8 @@ def _name(task: _Task) -> str:
 
 
 def _write(output: Path, runs: Sequence[AveragedRun]) -> None:
-    document = {
-        "machine": {
-            "processor": platform.processor() or platform.machine(),
-            "cores": multiprocessing.cpu_count(),
-            "torch": torch.__version__,
-        },
-        "runs": [asdict(run) for run in runs],
-    }
-    output.write_text(json.dumps(document, indent=1))
+    versions = {"torch": str(torch.__version__)}
+    write_results(output, versions=versions, runs=[asdict(run) for run in runs])
 
 
 def _table(runs: Sequence[AveragedRun]) -> Table:

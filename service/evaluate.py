@@ -1,19 +1,13 @@
 """`surefoot evaluate`: the protocol on recorded scenes, in parallel; table, JSON, plots."""
 
-import json
-import multiprocessing
-import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from models.errors import ShapeError
 from models.evaluation.estimators import UNTRAINED
@@ -31,6 +25,7 @@ from models.evaluation.report import by_scene, overall
 from models.evaluation.scenes import load_scene
 from service.protocol_plots import draw_plots
 from service.protocol_tables import TABLE_WIDTH, overall_table, scene_table
+from service.studies.runs import process_pool, with_bar, write_results
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,17 +72,11 @@ def run_protocol(
     started = time.monotonic()
     tasks = _tasks(folders, seeds, knocks, regressors)
     results: list[_Result] = []
-    # Spawned, not forked: torch's threads do not survive a fork.
-    context = multiprocessing.get_context("spawn")
-    columns = TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        with Progress(*columns, console=console) as bar:
-            row = bar.add_task("cases", total=sum(len(t.knocks) * len(t.seeds) for t in tasks))
-            waiting = {pool.submit(_run, task): task for task in tasks}
-            for done in as_completed(waiting):
-                results += done.result()
-                bar.advance(row, len(waiting[done].knocks) * len(waiting[done].seeds))
-                _write(output, results)
+    cases = [len(task.knocks) * len(task.seeds) for task in tasks]
+    with process_pool(processes) as pool:
+        for found in with_bar(pool, [partial(_run, task) for task in tasks], console, cases=cases):
+            results += found
+            _write(output, results)
         order = {load_scene(folder).scene_id: place for place, folder in enumerate(folders)}
         results.sort(key=lambda r: (order[r.outcome.scene_id], r.outcome.seed))
         _write(output, results)
@@ -142,11 +131,5 @@ def _asked(case: ProtocolCase, trained: Mapping[str, Estimator]) -> dict[str, Ca
 
 
 def _write(output: Path, results: Sequence[_Result]) -> None:
-    document: dict[str, Any] = {
-        "machine": {
-            "processor": platform.processor() or platform.machine(),
-            "cores": multiprocessing.cpu_count(),
-        },
-        "outcomes": [{"knock": r.knock, **asdict(r.outcome)} for r in results],
-    }
-    output.write_text(json.dumps(document, indent=1))
+    outcomes = [{"knock": r.knock, **asdict(r.outcome)} for r in results]
+    write_results(output, outcomes=outcomes)

@@ -1,22 +1,18 @@
 """`surefoot flow-study`: the flow map on simulated sites, in parallel; tables and JSON."""
 
-import json
-import multiprocessing
-import platform
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from models.evaluation.flow_study import REFERENCE_TRACKS, ChangedResult, SiteResults, study_site
 from models.reasons import TracksCode
+from service.studies.runs import process_pool, with_bar, write_results
 
 _TABLE_WIDTH = 110
 
@@ -29,12 +25,10 @@ def run_flow_study(*, sites: int, seed: int, processes: int, output: Path) -> No
     console = Console(width=max(Console().width, _TABLE_WIDTH))
     started = time.monotonic()
     found: list[SiteResults] = []
-    # Spawned, not forked, as for every other pool here.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        waiting = [pool.submit(study_site, site, seed) for site in range(sites)]
-        for done in track(as_completed(waiting), "sites", total=sites, console=console):
-            found.append(done.result())
+    tasks = [partial(study_site, site, seed) for site in range(sites)]
+    with process_pool(processes) as pool:
+        for result in with_bar(pool, tasks, console, "sites"):
+            found.append(result)
             found.sort(key=lambda results: results.site)
             _write(output, seed, found)
     console.print(knocked_table(found))
@@ -105,13 +99,5 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _write(output: Path, seed: int, found: Sequence[SiteResults]) -> None:
-    document: dict[str, Any] = {
-        "machine": {
-            "processor": platform.processor() or platform.machine(),
-            "cores": multiprocessing.cpu_count(),
-        },
-        "seed": seed,
-        "reference_tracks": REFERENCE_TRACKS,
-        "sites": [asdict(results) for results in found],
-    }
-    output.write_text(json.dumps(document, indent=1))
+    sites = [asdict(results) for results in found]
+    write_results(output, seed=seed, reference_tracks=REFERENCE_TRACKS, sites=sites)

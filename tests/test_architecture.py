@@ -16,6 +16,7 @@ SERVICE_ROOMS = [
     {"reason_words"},
     {"formats", "store", "delivery", "reach"},
     {"job_queue"},
+    {"studies"},
     {"recalibration"},
     {"access"},
     {"backup", "schemas", "jobs", "web"},

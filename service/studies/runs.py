@@ -1,0 +1,70 @@
+"""What every study shares: its processes, a bar of what has ended, and JSON that grows."""
+
+import json
+import multiprocessing
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from multiprocessing.context import SpawnContext
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+Result = TypeVar("Result")
+_TICK_S = 1.0
+
+
+def spawning() -> SpawnContext:
+    """How studies make processes: spawned, not forked, for torch's threads survive no fork."""
+    return multiprocessing.get_context("spawn")
+
+
+def process_pool(processes: int) -> ProcessPoolExecutor:
+    """So many processes, a core each."""
+    return ProcessPoolExecutor(processes, mp_context=spawning())
+
+
+def as_they_end(
+    pool: ProcessPoolExecutor,
+    tasks: Sequence[Callable[[], Result]],
+    on_tick: Callable[[], None] | None = None,
+) -> Iterator[tuple[int, Result]]:
+    """The number of each task and its result, as tasks end; `on_tick` is called each second."""
+    numbers = {pool.submit(task): number for number, task in enumerate(tasks)}
+    waiting = set(numbers)
+    while waiting:
+        timeout_s = None if on_tick is None else _TICK_S
+        ended, waiting = wait(waiting, timeout_s, return_when=FIRST_COMPLETED)
+        for done in ended:
+            yield numbers[done], done.result()
+        if on_tick is not None:
+            on_tick()
+
+
+def with_bar(
+    pool: ProcessPoolExecutor,
+    tasks: Sequence[Callable[[], Result]],
+    console: Console,
+    what: str = "cases",
+    cases: Sequence[int] | None = None,
+) -> Iterator[Result]:
+    """The results as tasks end, under a bar; `cases` says how many are in each task, or one."""
+    counts = cases or [1] * len(tasks)
+    columns = TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=console) as bar:
+        row = bar.add_task(what, total=sum(counts))
+        for number, result in as_they_end(pool, tasks):
+            yield result
+            bar.advance(row, counts[number])
+
+
+def write_results(output: Path, *, versions: dict[str, str] | None = None, **fields: Any) -> None:
+    """Write what a study has found so far, and on what machine."""
+    machine = {
+        "processor": platform.processor() or platform.machine(),
+        "cores": multiprocessing.cpu_count(),
+        **(versions or {}),
+    }
+    output.write_text(json.dumps({"machine": machine, **fields}, indent=1))
