@@ -2,18 +2,9 @@
 
 from alembic import context
 
-import service.store.access_tables  # noqa: F401 - its tables are among Record's
-import service.store.activity_tables  # noqa: F401 - its tables are among Record's
-import service.store.alert_tables  # noqa: F401 - its tables are among Record's
-import service.store.delivery_tables  # noqa: F401 - its tables are among Record's
-import service.store.probe_tables  # noqa: F401 - its tables are among Record's
-import service.store.snapshot_tables  # noqa: F401 - its tables are among Record's
-import service.store.source_tables  # noqa: F401 - its tables are among Record's
-import service.store.tables  # noqa: F401 - its tables are among Record's
-import service.store.worker_tables  # noqa: F401 - its tables are among Record's
 from service.settings import Settings
-from service.store.database import engine_for
-from service.store.record import Record, UtcDateTime, Word
+from service.store.sqlite.database import engine_for
+from service.store.tables.record import Record, UtcDateTime, Word
 
 
 def _ours(obj: object, name: str | None, kind: str, reflected: bool, compare_to: object) -> bool:

@@ -8,41 +8,36 @@ import anyio
 import anyio.to_thread
 from fastapi import FastAPI
 
+from service.cameras.quota import Quota
+from service.http import pages
+from service.http.bodies import BodyMiddleware
+from service.http.dependencies import AppState
+from service.http.guard import GuardMiddleware
+from service.http.instruments import InstrumentMiddleware, Instruments
+from service.http.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
+from service.http.origins import OriginMiddleware
+from service.http.problems import ProblemMiddleware, add_problem_handlers
+from service.http.rates import RateMiddleware
 from service.job_queue import JobQueue
-from service.recalibration.quota import Quota
 from service.routes import (
     activity,
     alerts,
-    api_docs,
-    camera_page,
     cameras,
     documented,
     events,
-    fleet,
-    login,
     maintenance,
     metrics,
     operation,
-    pages,
     poses,
-    registration,
     snapshots,
     sources,
-    tokens,
     tracks,
     trainings,
     webhooks,
 )
-from service.routes.bodies import BodyMiddleware
-from service.routes.guard import GuardMiddleware
-from service.routes.instruments import InstrumentMiddleware, Instruments
-from service.routes.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
-from service.routes.origins import OriginMiddleware
-from service.routes.problems import ProblemMiddleware, add_problem_handlers
-from service.routes.rates import RateMiddleware
-from service.routes.state import AppState
+from service.routes.ui import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings
-from service.store.database import Store
+from service.store.sqlite.database import Store
 
 _SPARE_THREADS = 8
 

@@ -9,13 +9,14 @@ import typer
 from pydantic import ValidationError
 from rich.console import Console
 
-from service.commands_data import DATA_COMMANDS, DataDir
-from service.commands_studies import STUDIES
+from service.commands.data import DATA_COMMANDS, DataDir
+from service.commands.studies import STUDIES
+from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
-from service.process import be_private
-from service.settings import Settings, wrong_settings
-from service.token_commands import app as token_app
+from service.process.manners import be_private
+from service.setting_values import wrong_settings
+from service.settings import Settings
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -41,7 +42,7 @@ def serve(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Serve the API and run the local workers, until SIGTERM."""
-    from service.serve import run_service
+    from service.commands.serve import run_service
 
     configure_logs()
     be_private()
@@ -58,9 +59,9 @@ def worker(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Run a worker alone, beside an API that runs elsewhere on this machine."""
-    from service.jobs import exits
-    from service.jobs.worker import WorkerRunningError, run_worker
-    from service.migrate import migrate as run_migrations
+    from service.commands.migrate import migrate as run_migrations
+    from service.commands.worker import WorkerRunningError, run_worker
+    from service.process import exits
 
     configure_logs()
     be_private()
@@ -104,7 +105,7 @@ def replay(
     from rich.progress import Progress
 
     from models.errors import CalibrationError
-    from service.replay import replay_scene
+    from service.commands.replay import replay_scene
 
     if protocol is not None:
         name = "hard" if hard else "still" if still else knock or "knock"
@@ -141,7 +142,7 @@ def demo(
     picture: Annotated[Path | None, typer.Option(help="Save the last screen as SVG.")] = None,
 ) -> None:
     """Simulate a street, knock its camera, and watch the alert come: half a minute on 2 cores."""
-    from service.demo import run_demo
+    from service.commands.demo import run_demo
 
     be_private()
     stays = sys.stdin.isatty() if stay is None else stay
@@ -154,8 +155,8 @@ def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str, token: st
     from rich.progress import Progress
 
     from models.errors import CalibrationError
-    from models.evaluation.protocol import RANGES
-    from service.replay_protocol import print_outcome, replay_protocol
+    from models.evaluation.protocol.cases import RANGES
+    from service.commands.replay_protocol import print_outcome, replay_protocol
 
     if knock not in RANGES:
         raise typer.BadParameter(f"knock: one of {', '.join(RANGES)}, got {knock!r}")

@@ -1,17 +1,17 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
-import base64
 import os
 from datetime import UTC, tzinfo
-from ipaddress import IPv4Network, IPv6Network, ip_network
+from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field, ValidationError, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.data_dir import DATABASE, WEIGHTS
+from service.setting_values import read_key, read_networks, read_numbers
 
 
 class Settings(BaseSettings):
@@ -234,7 +234,7 @@ class Settings(BaseSettings):
     @field_validator("webhook_allow", "proxy_from")
     @classmethod
     def _networks(cls, value: str) -> str:
-        _read_networks(value)
+        read_networks(value)
         return value
 
     @field_validator("proxy_from")
@@ -247,24 +247,24 @@ class Settings(BaseSettings):
     @field_validator("webhook_retry_s")
     @classmethod
     def _delays(cls, value: str) -> str:
-        if not all(delay > 0 for delay in _read_numbers(value)):
+        if not all(delay > 0 for delay in read_numbers(value)):
             raise ValueError(f"numbers above 0, with commas, are needed, got {value!r}")
         return value
 
     @property
     def webhook_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
         """Private networks that webhooks may go to."""
-        return _read_networks(self.webhook_allow)
+        return read_networks(self.webhook_allow)
 
     @property
     def proxy_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
         """Where proxies that log people in ask from."""
-        return _read_networks(self.proxy_from)
+        return read_networks(self.proxy_from)
 
     @property
     def webhook_delays_s(self) -> tuple[float, ...]:
         """Seconds from each failed attempt to the next; the last one repeats."""
-        return _read_numbers(self.webhook_retry_s)
+        return read_numbers(self.webhook_retry_s)
 
     @property
     def database_path(self) -> Path:
@@ -286,40 +286,3 @@ class Settings(BaseSettings):
         values = self.model_dump(mode="json", exclude_none=True)
         ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
-
-
-_SECRETS = ("secret_key", "proxy_secret")
-
-
-def wrong_settings(error: ValidationError) -> list[str]:
-    """One line for each setting that was refused: its variable, what is needed, what was given."""
-    lines = []
-    for item in error.errors(include_url=False):
-        name = ".".join(str(part) for part in item["loc"])
-        reason = item["msg"].removeprefix("Value error, ")
-        given = "" if name in _SECRETS or ", got " in reason else f", got {item['input']!r:.80}"
-        lines.append(f"SUREFOOT_{name.upper()}: {reason}{given}")
-    return lines
-
-
-def read_key(text: str) -> bytes:
-    """The 32 bytes of a key in base64, the plain alphabet or the one for URLs.
-
-    Raises:
-        ValueError: it is not such a key. A passphrase is not: it would be guessed.
-    """
-    try:
-        key = base64.b64decode(text.strip().translate(str.maketrans("-_", "+/")), validate=True)
-    except ValueError:
-        key = b""
-    if len(key) != 32:
-        raise ValueError("32 bytes in base64 are needed, as `openssl rand -base64 32` prints them")
-    return key
-
-
-def _read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
-    return tuple(ip_network(part.strip()) for part in text.split(",") if part.strip())
-
-
-def _read_numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(part) for part in text.split(","))

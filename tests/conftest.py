@@ -19,7 +19,7 @@ import pytest
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.migrate import migrate
+from service.commands.migrate import migrate
 from service.settings import Settings
 
 # The name that starlette's TestClient asks by.

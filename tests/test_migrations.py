@@ -8,18 +8,19 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
 
+from service.alerting.alerts import list_alerts
 from service.app import create_app
-from service.migrate import migrate
+from service.cameras.poses import pose_history, view_pose
+from service.commands.migrate import migrate
 from service.reason_words import in_words
-from service.recalibration.alerts import list_alerts
-from service.recalibration.poses import pose_history, view_pose
 from service.settings import Settings
-from service.store import references, sources
+from service.store import references
 from service.store.alerts import AlertFilter
-from service.store.database import Store
-from service.store.record import Record
-from service.store.revisions import alembic_config
-from service.store.tables import EstimateRecord
+from service.store.sqlite.database import Store
+from service.store.sqlite.revisions import alembic_config
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.record import Record
+from service.store.tracks import sources
 
 
 def test_migrating_twice_changes_nothing(settings):

@@ -19,9 +19,9 @@ from models.errors import CheckpointError
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
 from models.flow.packing import flow_from_bytes, flow_to_bytes
 from models.packing import flattened
-from service.migrate import migrate
+from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.revisions import alembic_config
+from service.store.sqlite.revisions import alembic_config
 from tests.test_migrations import put
 
 BEFORE = "2026_11_26_radians_of_alerts"

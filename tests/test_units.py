@@ -15,12 +15,14 @@ EDGES = (
 # Who tells people otherwise than by schemas and pages: by events and webhooks, and on a
 # terminal. They take the words of `service/formats/degrees.py`.
 TELLING = {
-    "service/demo.py",
-    "service/recalibration/alerts.py",
-    "service/recalibration/estimates.py",
-    "service/recalibration/outbox.py",
-    "service/replay.py",
-    "service/replay_protocol.py",
+    "service/commands/demo.py",
+    "service/commands/demo_screen.py",
+    "service/commands/demo_street.py",
+    "service/alerting/alerts.py",
+    "service/estimation/estimates.py",
+    "service/delivery/outbox.py",
+    "service/commands/replay.py",
+    "service/commands/replay_protocol.py",
 }
 
 

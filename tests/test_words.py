@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import CheckConstraint
 
 from service import kinds
-from service.store.record import Record, Word
+from service.store.tables.record import Record, Word
 from tests.test_architecture import ROOT, sources
 
 VOCABULARIES = [
@@ -27,23 +27,23 @@ FIELDS = {
 # Values that are spelled like a word of a vocabulary, and mean something else.
 OTHERS = {
     ("backup/checking.py", "ok"): "a verdict, defined there",
-    ("centred.py", "tracks"): "a column of a table",
-    ("flow_study.py", "tracks"): "a column of a table",
+    ("studies/centred.py", "tracks"): "a column of a table",
+    ("studies/flow.py", "tracks"): "a column of a table",
     ("formats/batch.py", "source"): "the name of a field",
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
-    ("jobs/housekeeping.py", "stale"): "the name of a log line",
+    ("jobs/upkeep/housekeeping.py", "stale"): "the name of a log line",
     ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
-    ("jobs/rounds.py", "clock"): "the name of a round",
+    ("jobs/upkeep/rounds.py", "clock"): "the name of a round",
     ("reasons.py", "maintenance"): "the code of a reason, defined there",
-    ("recalibration/growth.py", "registered"): "the key of an estimator's answer",
-    ("recalibration/outbox.py", "acknowledged"): "the name of a flag",
-    ("recalibration/outbox.py", "drift"): "the name of a field",
-    ("recalibration/outbox.py", "silenced"): "the name of a flag",
-    ("recalibration/retention.py", "tracks"): "the name of a limit, for the log",
-    ("replay_protocol.py", "estimate"): "what a bar of progress is called",
-    ("replay_protocol.py", "reference"): "what a bar of progress is called",
+    ("estimation/growth.py", "registered"): "the key of an estimator's answer",
+    ("delivery/outbox.py", "acknowledged"): "the name of a flag",
+    ("delivery/outbox.py", "drift"): "the name of a field",
+    ("delivery/outbox.py", "silenced"): "the name of a flag",
+    ("jobs/upkeep/limits.py", "tracks"): "the name of a limit, for the log",
+    ("commands/replay_protocol.py", "estimate"): "what a bar of progress is called",
+    ("commands/replay_protocol.py", "reference"): "what a bar of progress is called",
     ("routes/maintenance.py", "maintenance"): "a tag of the API's description",
     ("routes/poses.py", "pose"): "a tag of the API's description",
     ("routes/sources.py", "tracks"): "a tag of the API's description",
@@ -53,12 +53,14 @@ OTHERS = {
     ("schemas/metrics.py", "pending"): "the name of a field",
     ("schemas/metrics.py", "silenced"): "part of a metric's name",
     ("schemas/webhooks.py", "pending"): "the name of a field",
-    ("serve.py", "warning"): "uvicorn's log level",
-    ("store/files.py", "ok"): "what SQLite's quick_check answers",
-    ("store/tables.py", "source"): "the name of a column",
-    ("store/tables.py", "tracks"): "the name of a table",
-    ("web/judgement.py", "critical"): "a tone, defined there",
-    ("web/judgement.py", "warning"): "a tone, defined there",
+    ("commands/serve.py", "warning"): "uvicorn's log level",
+    ("store/sqlite/files.py", "ok"): "what SQLite's quick_check answers",
+    ("store/tables/__init__.py", "tracks"): "the name of a table",
+    ("store/tables/alerts.py", "source"): "the name of a column",
+    ("store/tables/tracks.py", "source"): "the name of a column",
+    ("store/tables/tracks.py", "tracks"): "the name of a table",
+    ("web/plausibility.py", "critical"): "a tone, defined there",
+    ("web/plausibility.py", "warning"): "a tone, defined there",
 }
 
 

@@ -18,7 +18,7 @@ from models.estimation.joint.observations import Observations, check_in_time, of
 from models.estimation.joint.reference import relearned
 from models.estimation.joint.site import SiteReference
 from models.flow.folds import Fold, Folds
-from models.flow.move import parties_in_time
+from models.flow.turn_detection import parties_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION

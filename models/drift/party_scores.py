@@ -19,10 +19,10 @@ from models.estimation.joint.measures import Measured, measure_speeds, measure_s
 from models.estimation.joint.observations import Observations, Steps, check_in_time
 from models.estimation.joint.site import SiteReference, channels_of
 from models.estimation.numbers import numbers_of
-from models.flow.evidence import Walkers, walkers_of
-from models.flow.move import REACH, parties_in_time
+from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
 from models.flow.registration import Site
+from models.flow.turn_detection import REACH, parties_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 

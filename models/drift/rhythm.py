@@ -24,7 +24,7 @@ _BURST_UNKNOWN = 3.0  # with fewer gaps than that
 _DAY_VARIANCE, _DAY_WEIGHT = 0.1, 5.0
 _SHAPES = (1.0, 50.0)
 # A quiet day or hour has a quarter of the people, give or take a fifth of that. Chosen, with the
-# numbers below, on the simulated years of `models.evaluation.rhythm_study` (seed 7).
+# numbers below, on the simulated years of `models.evaluation.alarms.rhythm_study` (seed 7).
 _QUIET_LEVEL, _QUIET_SHAPE = 0.25, 20.0
 _QUIET_SHARE = 0.05  # of days
 _TURNS_QUIET = 0.1  # of changes of the level

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.flow.evidence import Walkers
-from models.flow.fit import party_fits
 from models.flow.folds import Fold
-from models.flow.move import REACH, parties_in_time, party_scores
+from models.flow.likelihood import Walkers
+from models.flow.path_test import party_fits
 from models.flow.registration import curvature_of
+from models.flow.turn_detection import REACH, parties_in_time, party_scores
 from models.geometry.rotation import Array
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from models.estimation.joint.observations import Observations, of_tracks
-from models.flow.evidence import Walkers, walkers_of
-from models.flow.flow_map import Grain
+from models.flow.likelihood import Walkers, walkers_of
+from models.flow.map.flow_map import Grain
 from models.flow.registration import Site
 from models.flow.site_map import best_grain, mapped
 from models.geometry.intrinsics import Intrinsics

@@ -9,8 +9,8 @@ import numpy as np
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.numbers import NUMBERS, TELLING_SD, WITH_HEADING
-from models.flow.evidence import Walkers, walkers_of
-from models.flow.fit import loss, party_fits
+from models.flow.likelihood import Walkers, walkers_of
+from models.flow.path_test import loss, party_fits
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics

@@ -3,10 +3,10 @@
 import numpy as np
 
 from models.errors import CheckpointError
-from models.flow.flow_map import FlowMap
+from models.flow.map.flow_map import FlowMap
+from models.flow.map.rounding import of_levels, to_levels
+from models.flow.map.view import coverage_of
 from models.flow.reference import FlowReference
-from models.flow.rounding import of_levels, to_levels
-from models.flow.view import coverage_of
 from models.packing import Format, flattened, pack, restored, under, unpack
 
 _FORMAT = Format(name="flow", version=1)

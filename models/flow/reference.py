@@ -6,14 +6,14 @@ import numpy as np
 
 from models.estimation.joint.observations import Observations
 from models.flow.cross_fit import CrossFit, cross_fit
-from models.flow.evidence import walkers_of
-from models.flow.fit import UsualFit, usual_fit
-from models.flow.flow_map import FlowMap
 from models.flow.folds import Folds, fold_maps
-from models.flow.move import StillScores, learn_scores
+from models.flow.likelihood import walkers_of
+from models.flow.map.flow_map import FlowMap
+from models.flow.map.view import Coverage
+from models.flow.path_test import UsualFit, usual_fit
 from models.flow.registration import Peak, Site
 from models.flow.site_map import mapped
-from models.flow.view import Coverage
+from models.flow.turn_detection import StillScores, learn_scores
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.flow.evidence import Likelihood, Walkers, anchored_scores, likelihood
-from models.flow.flow_map import FlowMap
-from models.flow.view import Coverage
+from models.flow.likelihood import Likelihood, Walkers, anchored_scores, likelihood
+from models.flow.map.flow_map import FlowMap
+from models.flow.map.view import Coverage
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 

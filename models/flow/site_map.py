@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from models.flow.evidence import Walkers
-from models.flow.flow_map import Grain, learn_map, slot_of
-from models.flow.placement import place_steps
+from models.flow.likelihood import Walkers
+from models.flow.map.flow_map import Grain, learn_map, slot_of
+from models.flow.map.placement import place_steps
+from models.flow.map.view import coverage_of, in_view
 from models.flow.registration import Site
-from models.flow.view import coverage_of, in_view
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 

@@ -1,7 +1,7 @@
 """Rotations `camera_from_world`: angles, quaternions, distances and means.
 
 A rotation matrix has the camera's right, down and forward axes as its rows, in world
-coordinates (Z up). The signs are pinned by `tests/models/test_rotation.py`.
+coordinates (Z up). The signs are pinned by `tests/models/geometry/test_rotation.py`.
 """
 
 from typing import Any

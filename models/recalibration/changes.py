@@ -9,9 +9,9 @@ from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
-from models.flow.evidence import walkers_of
-from models.flow.move import moved_within
+from models.flow.likelihood import walkers_of
 from models.flow.reference import candidate_of
+from models.flow.turn_detection import moved_within
 from models.recalibration.site import CameraSite
 
 _CUT_RATE = 1e-6  # of windows of a still camera are cut where nothing happened

@@ -17,7 +17,8 @@ from models.geometry.pose import CameraPose
 from models.regression.network import PoseRegressor
 from models.regression.prediction import predict_windows
 from models.regression.recipe import TrainingPlan
-from models.simulation.flows import FlowConfig, simulate_sites
+from models.simulation.crowds import FlowConfig
+from models.simulation.flows import simulate_sites
 from models.simulation.poses import PoseSet, random_poses
 from models.simulation.walkers import Walks, simulate_walks
 from models.trajectory import Windows

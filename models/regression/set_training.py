@@ -20,7 +20,8 @@ from models.regression.set_features import (
     window_features,
 )
 from models.regression.set_network import SetNetwork
-from models.simulation.flows import FlowConfig, simulate_sites
+from models.simulation.crowds import FlowConfig
+from models.simulation.flows import simulate_sites
 from models.simulation.poses import PoseSet
 from models.simulation.walkers import WalkConfig, Walks
 from models.trajectory import Windows

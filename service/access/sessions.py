@@ -7,14 +7,14 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from service.access.activity import note
 from service.access.callers import Caller
 from service.access.tokens import caller_of, caller_of_token, is_valid
 from service.errors import ForbiddenError, UnauthorizedError
 from service.kinds import Act, TokenScope
-from service.recalibration.activity import note
 from service.settings import Settings
-from service.store import access
-from service.store.access_tables import SessionRecord
+from service.store.operation import access
+from service.store.tables.access import SessionRecord
 
 _ID_BYTES = 32
 

@@ -9,12 +9,12 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from service.access.activity import note
 from service.access.callers import Caller
 from service.errors import FieldError, MalformedError, NotFoundError
 from service.kinds import Act, TokenScope
-from service.recalibration.activity import note
-from service.store import access
-from service.store.access_tables import TokenRecord
+from service.store.operation import access
+from service.store.tables.access import TokenRecord
 
 _PREFIX = "sf"
 _SECRET_BYTES = 32

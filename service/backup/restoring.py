@@ -28,12 +28,12 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
+from service.delivery.keys import require_openable
 from service.delivery.sealing import is_sealed, read_key_file, sealer_of
-from service.recalibration.keys import require_openable
 from service.settings import Settings
-from service.store import files
-from service.store.faults import telling_of_database
-from service.store.revisions import require_known
+from service.store.sqlite import files
+from service.store.sqlite.faults import telling_of_database
+from service.store.sqlite.revisions import require_known
 
 _LARGEST_MANIFEST = 64 * 2**20
 

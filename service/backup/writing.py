@@ -32,11 +32,11 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
+from service.delivery.keys import require_openable
 from service.delivery.sealing import is_sealed, sealer_of
-from service.recalibration.keys import require_openable
 from service.settings import Settings
-from service.store import files
-from service.store.faults import telling_of_database
+from service.store.sqlite import files
+from service.store.sqlite.faults import telling_of_database
 
 Progress = Callable[[str, int, int], None]  # what, done, total
 _TRIES = 3

@@ -1,1 +1,1 @@
-"""Sending: which addresses may be reached, how a message is signed, what an attempt came to."""
+"""Telling others of alerts: the outbox, webhooks, their deliveries and secrets."""

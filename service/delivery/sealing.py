@@ -12,7 +12,8 @@ from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from service.data_dir import KEY_FILE, StartError, sync_folder, telling_of
-from service.settings import Settings, read_key
+from service.setting_values import read_key
+from service.settings import Settings
 
 _PREFIX = "sealed:1:"
 _NONCE_BYTES = 12

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from service.job_queue import JobQueue
 from service.jobs.in_hand import InHand
 from service.settings import Settings
-from service.store.database import Store
+from service.store.sqlite.database import Store
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,17 +3,17 @@
 import logging
 import time
 
-from service.delivery.send import Outcome, post
-from service.jobs.context import JobContext
-from service.recalibration.deliveries import (
+from service.delivery.deliveries import (
     begin_run,
     end_run,
-    next_attempt,
-    next_refresh,
-    record_attempt,
-    record_refresh,
+    load_attempt,
+    load_refresh,
+    save_attempt,
+    save_refresh,
 )
-from service.recalibration.messages import Message
+from service.delivery.messages import Message
+from service.delivery.send import Outcome, post
+from service.jobs.context import JobContext
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -32,18 +32,18 @@ def run_deliver(context: JobContext, webhook_id: str) -> None:
         begin_run(session, webhook_id)
     while time.monotonic() < end_s and not context.stopping.is_set():
         with store.read() as session:
-            attempt = next_attempt(session, settings, webhook_id)
+            attempt = load_attempt(session, settings, webhook_id)
         if attempt is None:
             break
         outcome = _send(context, webhook_id, attempt.message)
         with store.write() as session:
-            record_attempt(session, settings, attempt, outcome)
+            save_attempt(session, settings, attempt, outcome)
     with store.read() as session:
-        refresh = next_refresh(session, settings, webhook_id)
+        refresh = load_refresh(session, settings, webhook_id)
     if refresh is not None:
         outcome = _send(context, webhook_id, refresh.message)
         with store.write() as session:
-            record_refresh(session, settings, refresh, outcome)
+            save_refresh(session, settings, refresh, outcome)
     with store.write() as session:
         end_run(session, context.queue, webhook_id)
 

@@ -80,7 +80,7 @@ def take_over(lost: list[str]) -> None:
     """Give the unfinished jobs of lost workers back to the queue.
 
     The engine offers this only with its paid conductor; the call is private, so the version is
-    pinned and `tests/service/test_processes.py` kills a worker to try it.
+    pinned and `tests/service/jobs/test_processes.py` kills a worker to try it.
     """
     from dbos._dbos import _get_dbos_instance
 

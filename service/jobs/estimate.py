@@ -4,22 +4,16 @@ import logging
 import time
 from dataclasses import replace
 
+from service.estimation.estimates import save_estimate
+from service.estimation.evidence import compute_finding, load_evidence
+from service.estimation.growth import compute_growth, load_growth, save_growth
+from service.estimation.lacks import Lacks
+from service.estimation.learning import compute_reference, load_reference_period, save_reference
 from service.jobs.context import JobContext
 from service.jobs.predictions import predict_pending
 from service.reason_words import in_words
-from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import gather, weigh
-from service.recalibration.growth import grow, keep_growth, take_growth
-from service.recalibration.lacks import Lacks
-from service.recalibration.learning import keep_reference, learn_period, take_period
-from service.recalibration.looking import (
-    begin_look,
-    end_look,
-    fail_look,
-    leave_poisoned,
-    note_lacks,
-)
-from service.recalibration.unpacked import Unpacked
+from service.windows.looking import begin_look, end_look, fail_look, leave_poisoned, note_lacks
+from service.windows.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -55,13 +49,13 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
         lacks.add("averaged estimate", missing)
     learn_if_due(context, camera_id, unpacked)
     with store.read() as session:
-        evidence = gather(session, settings, camera_id, unpacked)
-    finding = None if evidence is None else weigh(evidence, settings.seed)
+        evidence = load_evidence(session, settings, camera_id, unpacked)
+    finding = None if evidence is None else compute_finding(evidence, settings.seed)
     if finding is not None:
         finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
     with store.write() as session:
         if evidence is not None and finding is not None:
-            record = store_estimate(session, context.queue, settings, evidence, finding)
+            record = save_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
@@ -74,12 +68,12 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
 def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Learn a camera's reference, once its tracks are there."""
     with context.store.read() as session:
-        period = take_period(session, context.settings, camera_id, unpacked)
+        period = load_reference_period(session, context.settings, camera_id, unpacked)
     if period is None:
         return
-    learned = learn_period(period, context.settings.seed)
+    learned = compute_reference(period, context.settings.seed)
     with context.store.write() as session:
-        keep_reference(session, context.settings, camera_id, period, learned)
+        save_reference(session, context.settings, camera_id, period, learned)
     log.info(
         "reference_learned" if learned else "reference_without_walkers",
         extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
@@ -92,12 +86,12 @@ def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None
     A worker that dies here leaves the map as it was; the next job finds it due again.
     """
     with context.store.read() as session:
-        period = take_growth(session, context.settings, camera_id, unpacked)
+        period = load_growth(session, context.settings, camera_id, unpacked)
     if period is None:
         return
-    learned = grow(period, context.settings.seed)
+    learned = compute_growth(period, context.settings.seed)
     with context.store.write() as session:
-        grown = keep_growth(session, camera_id, period, learned)
+        grown = save_growth(session, camera_id, period, learned)
     if grown:
         fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
         log.info("flow_map_grown", extra=fields)

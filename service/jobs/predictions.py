@@ -4,12 +4,8 @@ import logging
 
 from models.errors import CheckpointError
 from service.jobs.context import JobContext
-from service.recalibration.predictions import (
-    drop_model,
-    keep_predictions,
-    take_pending,
-)
-from service.recalibration.unpacked import Unpacked
+from service.training.predictions import drop_model, load_pending, save_predictions
+from service.windows.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -36,7 +32,7 @@ def predict_pending(context: JobContext, camera_id: str, unpacked: Unpacked) -> 
 def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     while True:
         with context.store.read() as session:
-            pending = take_pending(session, context.settings, camera_id, _BATCH)
+            pending = load_pending(session, context.settings, camera_id, _BATCH)
         if pending is None or not pending.tracks:
             return
         from service.jobs.regressor import predict  # torch: 200 MB that not every worker needs
@@ -48,4 +44,4 @@ def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
                 drop_model(session, pending.model_id)
             raise
         with context.store.write() as session:
-            keep_predictions(session, pending.model_id, rows)
+            save_predictions(session, pending.model_id, rows)

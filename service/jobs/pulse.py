@@ -10,8 +10,8 @@ import os
 import sys
 import threading
 
-from service.jobs import exits
 from service.jobs.context import JobContext
+from service.process import exits
 
 log = logging.getLogger("surefoot.worker")
 

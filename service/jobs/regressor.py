@@ -13,9 +13,9 @@ from models.regression.network import PoseRegressor
 from models.regression.prediction import predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.trajectory import cut_windows
-from service.recalibration.predictions import PendingTracks
-from service.recalibration.unpacked import Unpacked
-from service.store.tables import TrackRecord
+from service.store.tables.tracks import TrackRecord
+from service.training.predictions import PendingTracks
+from service.windows.unpacked import Unpacked
 
 _NETWORKS = 64  # kept in memory, of the cameras that were looked at last
 

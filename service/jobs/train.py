@@ -8,7 +8,7 @@ from models.errors import CalibrationError
 from service.jobs.context import JobContext
 from service.jobs.training_child import Progress, Trained, TrainingDiedError, train_apart
 from service.kinds import TrainingState
-from service.recalibration.trainings import (
+from service.training.trainings import (
     TrainingAttempt,
     begin_training,
     end_training,

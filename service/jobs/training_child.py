@@ -14,7 +14,7 @@ from typing import Any
 
 from models.errors import CalibrationError
 from models.regression.recipe import TrainingPlan, plan_to_config
-from service.jobs.exits import words_of
+from service.process.exits import words_of
 from service.settings import Settings
 
 _TICK_S = 0.5

@@ -14,9 +14,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from service.jobs.niceness import yield_to_others
 from service.logs import configure_logs
-from service.memory import settle_allocator
+from service.process.memory import settle_allocator
+from service.process.niceness import yield_to_others
 
 log = logging.getLogger("surefoot.jobs")
 _TELLS_EVERY_S = 0.25

@@ -6,8 +6,8 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query
 from fastapi.responses import Response, StreamingResponse
 
-from service.recalibration.activity import list_activity
-from service.routes.state import AppState, StateDep
+from service.access.activity import list_activity
+from service.http.dependencies import AppState, StateDep
 from service.schemas.activity import ActivityPage, EntryOut
 
 router = APIRouter(tags=["operation"])

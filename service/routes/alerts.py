@@ -5,9 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
+from service.alerting import alerts, silence
+from service.cameras import decisions
+from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.kinds import AlertState
-from service.recalibration import alerts, decisions, silence
-from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.alerts import (
     AcknowledgeBody,
     AlertDetail,
@@ -17,7 +18,7 @@ from service.schemas.alerts import (
     SilenceBody,
 )
 from service.store.alerts import AlertFilter
-from service.store.tables import AlertRecord
+from service.store.tables.alerts import AlertRecord
 
 router = APIRouter(prefix="/alerts", tags=["alerts"])
 

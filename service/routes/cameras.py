@@ -4,10 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from service.recalibration import cameras
-from service.recalibration.cameras import CameraChange
-from service.routes.state import EtagDep, ReadDep, StateDep, WriteDep
-from service.schemas.cameras import CameraBody, CameraOut, CameraPage, CameraPatch
+from service.cameras import cameras
+from service.cameras.cameras import CameraChange
+from service.http.dependencies import EtagDep, ReadDep, StateDep, WriteDep
+from service.schemas.cameras.cameras import CameraBody, CameraOut, CameraPage, CameraPatch
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
 

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
-from service.routes.scopes import need_of
+from service.http.scopes import need_of
 from service.schemas.problem import Problem
 
 _SCHEME = "token"

@@ -14,10 +14,10 @@ from fastapi import APIRouter, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.recalibration import operation
-from service.routes.guard import still_let_in
-from service.routes.state import AppState, StateDep
-from service.store.tables import EventRecord
+from service.http.dependencies import AppState, StateDep
+from service.http.guard import still_let_in
+from service.store.tables.operation import EventRecord
+from service.views import operation
 
 router = APIRouter(tags=["events"])
 _POLL_S = 0.5

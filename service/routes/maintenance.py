@@ -2,10 +2,10 @@
 
 from fastapi import APIRouter, Response
 
-from service.recalibration import maintenance
-from service.recalibration.maintenance import WindowChange
-from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
-from service.schemas.maintenance import WindowBody, WindowList, WindowOut, WindowPatch
+from service.cameras import maintenance
+from service.cameras.maintenance import WindowChange
+from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.cameras.maintenance import WindowBody, WindowList, WindowOut, WindowPatch
 
 router = APIRouter(prefix="/cameras/{camera_id}/maintenance", tags=["maintenance"])
 

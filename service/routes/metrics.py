@@ -5,9 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from prometheus_client.exposition import choose_encoder
 
-from service.recalibration.figures import take_figures
-from service.routes.state import ReadDep, StateDep
+from service.http.dependencies import ReadDep, StateDep
 from service.schemas.metrics import FiguresCollector
+from service.views.metrics import load_figures
 
 router = APIRouter(tags=["operation"])
 
@@ -20,6 +20,6 @@ _FORMATS = dict.fromkeys(
 def metrics(state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = "") -> Response:
     """The figures now, as Prometheus text or OpenMetrics."""
     encode, media_type = choose_encoder(accept)
-    figures = take_figures(session, state.settings)
+    figures = load_figures(session, state.settings)
     text = encode(FiguresCollector(figures, state.instruments.registry))
     return Response(text, media_type=media_type)

@@ -2,11 +2,11 @@
 
 from fastapi import APIRouter, Response
 
+from service.http.dependencies import CallerDep, StateDep
+from service.http.reach import auth_on
 from service.kinds import Health
-from service.reach import auth_on
-from service.recalibration import operation
-from service.routes.state import CallerDep, StateDep
 from service.schemas.operation import HealthOut, ReadyOut
+from service.views import operation
 
 router = APIRouter(tags=["operation"])
 

@@ -5,12 +5,12 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import PlainTextResponse
 
+from service.cameras import cameras, decisions, poses
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
-from service.recalibration import cameras, decisions, poses
-from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.schemas.base import Moment
-from service.schemas.poses import (
+from service.schemas.cameras.poses import (
     AcceptBody,
     History,
     HistoryPoint,

@@ -4,11 +4,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Request, Response
 
+from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
-from service.recalibration import cameras, snapshots
-from service.routes.state import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
-from service.schemas.snapshots import SnapshotOut
-from service.store.actor import set_actor
+from service.http.dependencies import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
+from service.schemas.cameras.snapshots import SnapshotOut
+from service.store.operation.actor import set_actor
 
 router = APIRouter(prefix="/cameras/{camera_id}/snapshot", tags=["cameras"])
 

@@ -2,9 +2,9 @@
 
 from fastapi import APIRouter
 
-from service.recalibration import sources
-from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
-from service.schemas.sources import SourceList, SourceOut, UseBody
+from service.cameras import sources
+from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.cameras.sources import SourceList, SourceOut, UseBody
 
 router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
 

@@ -5,14 +5,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request
 
+from service.cameras import cameras, tracks
 from service.errors import UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
 from service.formats.track import Batch, Clock, Limits
-from service.recalibration import cameras, tracks
-from service.routes.state import BodyDep, StateDep
-from service.schemas.tracks import DESCRIBED_TRACK, ReceiptOut
+from service.http.dependencies import BodyDep, StateDep
+from service.schemas.cameras.tracks import DESCRIBED_TRACK, ReceiptOut
 
 router = APIRouter(tags=["tracks"])
 

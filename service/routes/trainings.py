@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from service.recalibration import trainings
-from service.routes.state import ActorDep, ReadDep, StateDep, WriteDep, name_of
-from service.schemas.trainings import TrainingBody, TrainingList, TrainingOut
+from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.cameras.trainings import TrainingBody, TrainingList, TrainingOut
+from service.training import trainings
 
 router = APIRouter(tags=["trainings"])
 

@@ -4,10 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from service.delivery import webhooks
+from service.delivery.webhooks import WebhookSpec
+from service.http.dependencies import ReadDep, StateDep, WriteDep
 from service.kinds import DeliveryState
-from service.recalibration import webhooks
-from service.recalibration.webhooks import WebhookSpec
-from service.routes.state import ReadDep, StateDep, WriteDep
 from service.schemas.webhooks import (
     DeliveryList,
     DeliveryOut,

@@ -6,13 +6,13 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from service.delivery.outbox import is_silenced
 from service.formats.degrees import in_degrees
 from service.kinds import AlertAct, AlertKind, AlertState, Answer, Outcome, Severity
-from service.recalibration.outbox import is_silenced
 from service.schemas.base import Body, Moment, Who
 from service.schemas.reasons import ReasonCode, ReasonValues
-from service.store.activity_tables import ActivityRecord
-from service.store.tables import AlertRecord
+from service.store.tables.activity import ActivityRecord
+from service.store.tables.alerts import AlertRecord
 
 
 class AcknowledgeBody(Body):

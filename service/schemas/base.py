@@ -40,3 +40,6 @@ class Body(BaseModel):
         if isinstance(value, str) and "\0" in value:
             raise ValueError("text without NUL characters is needed")
         return value
+
+
+CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]

@@ -16,7 +16,7 @@ from prometheus_client.registry import Collector
 
 from models.estimation.numbers import ANGLES
 from service.kinds import AlertKind, PoseState, Severity, TrainingState
-from service.recalibration.figures import Figures
+from service.views.metrics import Figures
 
 
 class FiguresCollector(Collector):

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import BaseModel
 
 from service.kinds import Health, Readiness
-from service.recalibration import operation
+from service.views import operation
 
 
 class HealthOut(BaseModel):

@@ -7,9 +7,8 @@ from pydantic import BaseModel, Field
 
 from service.access.tokens import MAX_NAME, MadeToken, TokenSpec
 from service.kinds import TokenScope, TokenState
-from service.schemas.base import Body, Moment
-from service.schemas.cameras import CameraId
-from service.store.access_tables import TokenRecord
+from service.schemas.base import Body, CameraId, Moment
+from service.store.tables.access import TokenRecord
 
 
 class TokenBody(Body):

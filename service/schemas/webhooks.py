@@ -5,10 +5,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Field, field_validator
 
+from service.delivery.webhooks import DeliveryView, SecretMade, WebhookView
 from service.kinds import AlertKind, DeliveryState, MessageType, WebhookFormat
-from service.recalibration.webhooks import DeliveryView, SecretMade, WebhookView
 from service.schemas.base import Body
-from service.store.delivery_tables import WebhookRecord
+from service.store.tables.deliveries import WebhookRecord
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
 

@@ -8,7 +8,7 @@ from sqlalchemy import and_, delete, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertKind, AlertState, Outcome
-from service.store.tables import AlertRecord
+from service.store.tables.alerts import AlertRecord
 
 POSE_KINDS = (
     AlertKind.DRIFT,

@@ -5,14 +5,10 @@ from collections.abc import Sequence
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store.tables import (
-    CameraRecord,
-    EstimateRecord,
-    ModelRecord,
-    PriorPoseRecord,
-    SiteReferenceRecord,
-    TrainingRecord,
-)
+from service.store.tables.cameras import CameraRecord, PriorPoseRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.references import SiteReferenceRecord
+from service.store.tables.trainings import ModelRecord, TrainingRecord
 
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:

@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store.tables import EstimateRecord
+from service.store.tables.estimates import EstimateRecord
 
 
 def newest(session: Session, camera_id: str) -> EstimateRecord | None:

@@ -9,17 +9,15 @@ from sqlalchemy import ColumnElement, String, func, select, true, type_coerce
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.kinds import AlertState, DeliveryState, TrainingState
-from service.store.delivery_tables import DeliveryRecord
-from service.store.tables import (
-    AlertRecord,
-    CameraRecord,
-    EstimateRecord,
-    SiteReferenceRecord,
-    TrackRecord,
-    TrainingRecord,
-)
-from service.store.tracks import of_counting_source
-from service.store.worker_tables import WorkerRecord
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.cameras import CameraRecord
+from service.store.tables.deliveries import DeliveryRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.operation import WorkerRecord
+from service.store.tables.references import SiteReferenceRecord
+from service.store.tables.tracks import TrackRecord
+from service.store.tables.trainings import TrainingRecord
+from service.store.tracks.counting import of_counting_source
 
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None

@@ -20,17 +20,15 @@ from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
-from service.store.alert_tables import MaintenanceRecord, RhythmRecord
 from service.store.figures import Ids, among, newest_of
-from service.store.tables import (
-    AlertRecord,
-    CameraRecord,
-    EstimateRecord,
-    SiteReferenceRecord,
-    TrackRecord,
-    TrainingRecord,
-)
-from service.store.tracks import Spans
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
+from service.store.tables.cameras import CameraRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.references import SiteReferenceRecord
+from service.store.tables.tracks import TrackRecord
+from service.store.tables.trainings import TrainingRecord
+from service.store.tracks.counting import Spans
 from service.store.trainings import UNFINISHED
 
 

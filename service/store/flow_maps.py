@@ -2,7 +2,7 @@
 
 from sqlalchemy.orm import Session
 
-from service.store.tables import FlowMapRecord
+from service.store.tables.references import FlowMapRecord
 
 
 def find(session: Session, reference_id: int) -> FlowMapRecord | None:

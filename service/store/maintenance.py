@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store.alert_tables import MaintenanceRecord
+from service.store.tables.attendance import MaintenanceRecord
 
 _UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
 

@@ -11,7 +11,8 @@ from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
-from service.store.tables import CameraRecord, PriorPoseRecord, TrackRecord
+from service.store.tables.cameras import CameraRecord, PriorPoseRecord
+from service.store.tables.tracks import TrackRecord
 
 
 def pack(array: Array) -> bytes:

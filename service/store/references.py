@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from sqlalchemy import Select, delete, exists, select
 from sqlalchemy.orm import Session, defer
 
-from service.store.tables import EstimateRecord, SiteReferenceRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.references import SiteReferenceRecord
 
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:

@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.alert_tables import RhythmRecord
+from service.store.tables.attendance import RhythmRecord
 
 
 def find(session: Session, camera_id: str) -> RhythmRecord | None:

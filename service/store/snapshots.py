@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from service.store.snapshot_tables import SnapshotRecord
+from service.store.tables.cameras import SnapshotRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

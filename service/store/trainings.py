@@ -6,7 +6,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from service.kinds import TrainingState
-from service.store.tables import ModelRecord, TrainingRecord
+from service.store.tables.trainings import ModelRecord, TrainingRecord
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 

@@ -7,8 +7,8 @@ from sqlalchemy import delete, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertState, DeliveryState
-from service.store.delivery_tables import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
-from service.store.tables import AlertRecord
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 
 def find(session: Session, webhook_id: str) -> WebhookRecord | None:

@@ -7,14 +7,14 @@ from datetime import datetime, tzinfo
 
 from markupsafe import Markup
 
+from service.cameras.standing import MOVED
 from service.kinds import AlertKind, PoseState, Severity
 from service.reason_words import group_in_words
-from service.recalibration.camera_state import MOVED
-from service.recalibration.fleet import FleetAlert, FleetCamera, FleetGroup
 from service.store.alerts import POSE_KINDS
-from service.web.camera_words import KINDS
-from service.web.sparkline import sparkline
-from service.web.words import STATES, ago, clock_time, duration, from_seconds, situation
+from service.views.fleet import FleetAlert, FleetCamera, FleetGroup
+from service.web.drawings.sparkline import sparkline
+from service.web.wording.camera_words import KINDS
+from service.web.wording.words import STATES, ago, clock_time, duration, from_seconds, situation
 
 # What a state says by itself; every other alert is named.
 _SAID = {
@@ -127,7 +127,7 @@ def _row(camera: FleetCamera, now: datetime, zone: tzinfo) -> Row:
 
 
 def _key(camera: FleetCamera) -> str:
-    """What `recalibration.fleet.order` says, as a string: newest first is what remains to 2**40."""
+    """What `views.fleet.order` says, as a string: newest first is what remains to 2**40."""
     rank, negative_s, name = camera.order
     return f"{rank}-{2**40 + negative_s:016.1f}-{name}-{camera.camera_id}"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
-from service.migrate import migrate
+from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.browser.conftest import Server
 from tests.conftest import free_port

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from service.migrate import migrate
+from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.benchmarks.http_client import Answer, Connection
 from tests.conftest import CAMERA, RunningService, free_port

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from service.migrate import migrate
+from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.conftest import CAMERA, RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street

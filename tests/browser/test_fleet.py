@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.web.words import ago
+from service.web.wording.words import ago
 from tests.browser.conftest import axe, served, shoot, too_wide
 from tests.service.fleet_bench import Fleet, afternoon
 

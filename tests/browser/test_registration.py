@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.browser.conftest import axe, served, shoot, too_wide
-from tests.service.test_registration import ANGLES, LENS, POSE, walks
+from tests.service.cameras.test_registration import ANGLES, LENS, POSE, walks
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ import httpx
 
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
-from tests.service.receiver import Receiver
+from tests.service.delivery.receiver import Receiver
 
 _STUCK_S, _LONGEST_S = 60.0, 900.0
 _JOBS = "jobs of the engine"

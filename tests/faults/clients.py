@@ -8,10 +8,10 @@ from typing import Any
 
 import httpx
 
+from service.alerting import alerts
 from service.kinds import AlertKind, Severity
 from service.reasons import as_said
-from service.recalibration import alerts
-from service.store.database import Store
+from service.store.sqlite.database import Store
 from tests.conftest import CAMERA
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand

@@ -12,10 +12,10 @@ from models.drift.verdict import DriftLimits
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import of_tracks
-from models.evaluation.flow_runs import fused
-from models.evaluation.learned import Learned
-from models.evaluation.protocol import ProtocolCase
-from models.evaluation.served import served_pose
+from models.evaluation.protocol.cases import ProtocolCase
+from models.evaluation.protocol.flow_runs import fused
+from models.evaluation.protocol.learned import Learned
+from models.evaluation.protocol.served import served_pose
 from models.flow.folds import fold_maps
 from models.flow.fusion import by_speeds_alone
 from models.flow.reference import candidate_of

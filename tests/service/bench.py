@@ -10,13 +10,14 @@ from models.estimation.joint.estimate import JointEstimate
 from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
+from service.estimation.estimates import save_estimate
+from service.estimation.evidence import Evidence, Finding, asked_enough, load_evidence
 from service.job_queue import JobQueue
 from service.reasons import as_said
-from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import Evidence, Finding, asked_enough, gather
-from service.recalibration.trainings import begin_training, publish_model
-from service.store import events, references, trainings
-from service.store.database import Store
+from service.store import references, trainings
+from service.store.operation import events
+from service.store.sqlite.database import Store
+from service.training.trainings import begin_training, publish_model
 from tests.conftest import track
 
 PRIOR = CameraPose(
@@ -64,15 +65,15 @@ class Bench:
         """Post people, who come to a pose, and bring the estimate up to date."""
         self.post(people)
         with self.store.write() as session:
-            evidence = gather(session, self.settings, "corner")
+            evidence = load_evidence(session, self.settings, "corner")
             if evidence is None:
                 return None
             finding = made_up(evidence, pose, **told)
-            return store_estimate(session, self.queue, self.settings, evidence, finding)
+            return save_estimate(session, self.queue, self.settings, evidence, finding)
 
     def refresh(self):
         with self.store.read() as session:
-            return gather(session, self.settings, "corner")
+            return load_evidence(session, self.settings, "corner")
 
     def pose(self):
         return self.http.get("/cameras/corner/pose").json()

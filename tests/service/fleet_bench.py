@@ -10,16 +10,17 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from service.alerting.alerts import acknowledge_alert, open_alert
+from service.cameras.cameras import CameraSpec, register_camera
 from service.job_queue import JobQueue
 from service.reasons import as_said
-from service.recalibration.alerts import acknowledge_alert, open_alert
-from service.recalibration.cameras import CameraSpec, register_camera
 from service.settings import Settings
 from service.store import references, trainings
-from service.store.alert_tables import MaintenanceRecord
-from service.store.database import Store
 from service.store.packing import pack
-from service.store.tables import EstimateRecord, TrackRecord
+from service.store.sqlite.database import Store
+from service.store.tables.attendance import MaintenanceRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.tracks import TrackRecord
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 POSE = CameraPose(height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1))

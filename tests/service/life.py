@@ -20,21 +20,22 @@ from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory
+from service.alerting.staleness import StaleWatch
 from service.app import create_app
+from service.estimation.estimates import save_estimate
+from service.estimation.evidence import Evidence, load_evidence
+from service.estimation.learning import LearnedReference, load_reference_period, save_reference
 from service.job_queue import JobQueue
 from service.jobs.context import JobContext
 from service.jobs.estimate import run_estimate
-from service.jobs.housekeeping import run_reconcile
-from service.jobs.retention import run_retention
-from service.recalibration.estimates import store_estimate
-from service.recalibration.evidence import Evidence, gather
-from service.recalibration.learning import LearnedReference, keep_reference, take_period
-from service.recalibration.looking import begin_look, end_look
-from service.recalibration.staleness import StaleWatch
-from service.recalibration.trainings import begin_training, end_training, publish_model
+from service.jobs.upkeep.housekeeping import run_reconcile
+from service.jobs.upkeep.retention import run_retention
 from service.settings import Settings
-from service.store import tracks, trainings
-from service.store.database import Store
+from service.store import trainings
+from service.store.sqlite.database import Store
+from service.store.tracks import tracks
+from service.training.trainings import begin_training, end_training, publish_model
+from service.windows.looking import begin_look, end_look
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, made_up, moved
 from tests.service.shifted_clock import ShiftedClock
@@ -133,7 +134,7 @@ class Life:
         """The job up to where it has read what it needs; a reference is learned on the way."""
         with self.store.write() as session:
             newest_pk = begin_look(session, camera_id)
-            period = take_period(session, self.settings, camera_id)
+            period = load_reference_period(session, self.settings, camera_id)
             if period is not None:
                 learned = LearnedReference(site=some_site(), paths=None)
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
@@ -141,9 +142,9 @@ class Life:
                     doubt = Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
                     doubted = replace(some_site(), doubt=doubt)
                     learned = LearnedReference(site=doubted, paths=None)
-                keep_reference(session, self.settings, camera_id, period, learned)
+                save_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:
-            evidence = gather(session, self.settings, camera_id)
+            evidence = load_evidence(session, self.settings, camera_id)
         return Look(camera_id=camera_id, evidence=evidence, newest_pk=newest_pk)
 
     def end_look(self, look: Look, weak: tuple[str, ...]) -> bool:
@@ -153,7 +154,7 @@ class Life:
             if look.evidence is not None:
                 pose, change = self._seen(session, look.evidence)
                 finding = made_up(look.evidence, pose, weak=weak, change=change)
-                record = store_estimate(session, self.queue, self.settings, look.evidence, finding)
+                record = save_estimate(session, self.queue, self.settings, look.evidence, finding)
             end_look(session, look.camera_id, look.newest_pk)
         return record is not None
 

@@ -11,8 +11,8 @@ from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.misplacement import misplacements
 from models.geometry.pose import CameraPose
-from service.web.ground_plan import ground_plan_svg, plan_around, view_outline
-from service.web.picture import Overlay
+from service.web.drawings.ground_plan import ground_plan_svg, plan_around, view_outline
+from service.web.drawings.picture import Overlay
 
 # 45 deg to each side and up and down; looks down by 45: from straight down to the horizon.
 LENS = Intrinsics(width=1000, height=1000, fx=500, fy=500, cx=499.5, cy=499.5)

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.web.picture import Overlay, grid_path, ground_of, horizon_path, picture_svg
-from service.web.strokes import Frame, path_data
+from service.web.drawings.picture import Overlay, grid_path, ground_of, horizon_path, picture_svg
+from service.web.drawings.svg_paths import Frame, path_data
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1000, cx=639.5, cy=359.5)
 BENT = Intrinsics(

@@ -6,9 +6,9 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from service.store.tables import EstimateRecord
-from service.web.moments import next_morning, when
-from service.web.sentences import angle_half_width_deg, moved_words, signed
+from service.store.tables.estimates import EstimateRecord
+from service.web.wording.moments import next_morning, when
+from service.web.wording.sentences import angle_half_width_deg, moved_words, signed
 
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 

@@ -1,0 +1,1 @@
+"""The protocol of virtual knocks: cases, estimators, outcomes, plots."""

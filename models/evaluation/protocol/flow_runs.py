@@ -1,0 +1,102 @@
+"""The flow map as the protocol runs it: in the pose that is served, and alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.estimation.numbers import NUMBERS, TELLING_SD
+from models.evaluation.protocol.cases import Answer, nothing_told
+from models.evaluation.protocol.learned import Learned
+from models.evaluation.protocol.served import served_pose
+from models.flow.fusion import elsewhere
+from models.flow.likelihood import Walkers, walkers_of
+from models.flow.reference import candidate_of
+from models.flow.registration import Belief, Peak, Site, register, settled
+from models.geometry.rotation import Array
+from models.recalibration import CameraSite, Observations
+
+_HEADINGS = np.radians(np.arange(-24.0, 25.0, 4.0))
+# Tilts and rolls around the prior's: paths are narrow, a climb from 8 deg off ends beside them.
+_NODES = [np.radians([tilt, roll, 0, 0]) for tilt in (-6, 0, 6) for roll in (-6, 0, 6)]
+_CLIMBED = 2
+_SAME_END = np.radians(0.3)
+_BROAD = np.diag(np.array([np.radians(8), np.radians(8), 0.2, np.radians(15)]) ** -2.0)
+_FEWEST = 5
+
+
+def fused(learned: Learned) -> Answer:
+    """As it is served: speeds and places together, from the newest change on; the heading too."""
+    return served_answer(learned.seen, learned.site)
+
+
+def served_answer(seen: Observations, site: CameraSite) -> Answer:
+    """The pose that the service would serve of what is seen."""
+    found = served_pose(seen, site)
+    pose = found.fused
+    answer = Answer(
+        values=pose.values[:3],
+        covariance=pose.covariance[:3, :3],
+        tracks=found.joint.walkers,
+        weak=tuple(name for name in NUMBERS if name not in pose.told),
+    )
+    return _with_heading(answer, pose.values, pose.covariance) if "heading" in pose.told else answer
+
+
+def registration(learned: Learned) -> Answer:
+    """The flow map alone, around the prior pose: nothing is known of speeds."""
+    case, reference = learned.case, learned.site.flow
+    if reference is None:
+        return nothing_told(case)
+    mean = candidate_of(case.prior_pose)
+    walkers = walkers_of(learned.seen, mean)
+    if walkers.parties < _FEWEST:
+        return nothing_told(case)
+    site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
+    belief = Belief(mean=mean, precision=_BROAD)
+    peaks = _peaks(walkers, site, belief, temper)
+    best = peaks[0]
+    known = reference.precision(best, walkers.people, best.candidate - mean)
+    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
+    chances = np.exp([peak.value - best.value for peak in peaks])
+    covariance = covariance + elsewhere(peaks, chances)
+    sd = np.sqrt(np.diag(covariance))[:3]
+    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
+    answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
+    return _with_heading(answer, values, covariance)
+
+
+def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:
+    """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
+
+    def chance(candidate: Array) -> float:
+        return float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(
+            candidate
+        )
+
+    turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
+    starts = {
+        number: max(chance(belief.mean + node + turn) for turn in turns)
+        for number, node in enumerate(_NODES)
+    }
+    likeliest = sorted(starts, key=lambda number: -starts[number])
+    peaks: list[Peak] = []
+    for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
+        around = replace(belief, mean=belief.mean + node)
+        for peak in register(walkers, site, around, temper=temper, headings=_HEADINGS):
+            # The belief stood at the node; one step takes the peak to where it is around the mean.
+            posterior = peak.curvature / temper + belief.precision
+            candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
+            if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
+                peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+    return sorted(peaks, key=lambda peak: -peak.value)
+
+
+def _with_heading(answer: Answer, values: Array, covariance: Array) -> Answer:
+    """The answer with tilt, roll, log height, heading (4,) and their covariance (4, 4)."""
+    return replace(
+        answer,
+        values=values[:3],
+        covariance=covariance[:3, :3],
+        heading_rad=float(values[3]),
+        heading_sd_rad=float(np.sqrt(covariance[3, 3])),
+    )

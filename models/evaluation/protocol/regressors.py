@@ -1,0 +1,127 @@
+"""The regressors as estimators of the protocol, trained once for each scene."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from models.errors import TooFewTrajectoriesError
+from models.estimation.averaged import average_windows, averaged_estimate
+from models.estimation.calibrated import calibrated_estimate, mean_numbers, sampling_covariance
+from models.estimation.numbers import NumbersEstimate, without_offset
+from models.evaluation.protocol.cases import NUMBERS, Answer, Estimator, ProtocolCase, nothing_told
+from models.evaluation.scenes import Scene
+from models.geometry.pose import CameraPose
+from models.regression.calibration import learn_calibration
+from models.regression.prediction import predict_windows
+from models.regression.recipe import plan_training
+from models.regression.set_prediction import set_estimate
+from models.regression.set_training import SetPlan, train_set
+from models.regression.training import train
+from models.simulation.crowds import FlowConfig
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Trajectory, choose_step_s, cut_windows
+
+# An answer less sure than this of a number declares it weak.
+_WEAK_SD = (math.radians(3), math.radians(3), 0.2)
+_TRAINING_SHARE = 0.5  # of the time: the other half is the set network's
+
+Tracks = Sequence[Trajectory]
+Reading = Callable[[Tracks], NumbersEstimate]
+
+
+def prepare_regressors(
+    scene: Scene,
+    *,
+    seed: int,
+    epochs: int | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
+) -> dict[str, Estimator]:
+    """The estimators of a scene's camera, trained at its true pose: the prior of every case.
+
+    `averaged`, `calibrated` and `set` answer from the tracks alone; `averaged_reference`,
+    `calibrated_reference` and `set_reference` also use the case's reference tracks. `epochs`
+    replaces those of both trainings; `on_progress` gets the share that is done.
+
+    Raises:
+        CalibrationError: the camera sees no ground.
+    """
+    step_s = choose_step_s([track.trajectory for track in scene.tracks])
+    walk = WalkConfig(step_s=step_s)
+    plan = plan_training(
+        intrinsics=scene.intrinsics,
+        prior_pose=scene.true_pose,
+        recipe_name="default",
+        walk=walk,
+        seed=seed,
+        epochs=epochs,
+    )
+    network, _ = train(plan, lambda at: on_progress(_TRAINING_SHARE * at.step / at.steps))
+    calibration = learn_calibration(network, plan, FlowConfig())
+    set_plan = SetPlan(
+        intrinsics=scene.intrinsics, prior_pose=scene.true_pose, walk=walk, seed=seed
+    )
+    if epochs is not None:
+        set_plan = set_plan.with_epochs(epochs)
+    set_network = train_set(
+        set_plan, lambda share: on_progress(_TRAINING_SHARE + (1 - _TRAINING_SHARE) * share)
+    )
+
+    def averaged(tracks: Tracks) -> NumbersEstimate:
+        windows = cut_windows(tracks, scene.intrinsics, step_s)
+        height_m, q = predict_windows(network, windows, plan)
+        _, predictions = average_windows(height_m, q, windows.owner_idx)
+        count = averaged_estimate(predictions, seed).tracks  # refuses too few
+        return NumbersEstimate(
+            values=mean_numbers(predictions),
+            covariance=sampling_covariance(predictions, seed),
+            tracks=count,
+        )
+
+    def calibrated(tracks: Tracks) -> NumbersEstimate:
+        windows = cut_windows(tracks, scene.intrinsics, step_s)
+        height_m, q = predict_windows(network, windows, plan)
+        _, predictions = average_windows(height_m, q, windows.owner_idx)
+        return calibrated_estimate(predictions, calibration, seed)
+
+    def at_once(case: ProtocolCase, *, with_reference: bool) -> Answer:
+        seen = cut_windows(case.seen, scene.intrinsics, step_s)
+        reference = cut_windows(case.reference, scene.intrinsics, step_s)
+        return _answer(
+            set_estimate(set_network, set_plan, seen, reference if with_reference else None)
+        )
+
+    estimators: dict[str, Estimator] = {
+        "averaged": lambda case: _answer(averaged(case.seen)),
+        "calibrated": lambda case: _answer(calibrated(case.seen)),
+        "set": lambda case: at_once(case, with_reference=False),
+        "averaged_reference": lambda case: _with_offset(averaged, case),
+        "calibrated_reference": lambda case: _with_offset(calibrated, case),
+        "set_reference": lambda case: at_once(case, with_reference=True),
+    }
+    return {name: _declaring(estimator) for name, estimator in estimators.items()}
+
+
+def _declaring(estimator: Estimator) -> Estimator:
+    """An estimator that answers too few tracks with the prior pose, and that it knows nothing."""
+
+    def answer(case: ProtocolCase) -> Answer:
+        try:
+            return estimator(case)
+        except TooFewTrajectoriesError:
+            return nothing_told(case)
+
+    return answer
+
+
+def _with_offset(reading: Reading, case: ProtocolCase) -> Answer:
+    prior: CameraPose = case.prior_pose
+    return _answer(without_offset(reading(case.seen), reading(case.reference), prior))
+
+
+def _answer(estimate: NumbersEstimate) -> Answer:
+    sd = np.sqrt(np.diag(estimate.covariance))
+    weak = tuple(name for name, has, most in zip(NUMBERS, sd, _WEAK_SD, strict=True) if has > most)
+    return Answer(
+        values=estimate.values, covariance=estimate.covariance, tracks=estimate.tracks, weak=weak
+    )

@@ -1,0 +1,1 @@
+"""Studies of simulated sites, and the paper's own experiment."""

@@ -1,0 +1,1 @@
+"""The map itself: cells and ways, and how a camera sees them."""

@@ -1,0 +1,96 @@
+"""The fit test: whether people still walk where they did, wherever the camera looks now.
+
+A camera that moves takes all paths along, and some pose puts people back on them. Where no pose
+does, the paths themselves have changed, and the map says nothing true of the camera.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.flow.likelihood import Walkers
+from models.flow.map.placement import place_steps
+from models.flow.map.view import in_view
+from models.flow.registration import Site
+from models.flow.student import value_below
+from models.geometry.rotation import Array
+
+_RATE = 1e-4  # of windows with unchanged paths that are called changed
+_LEAST_DROP = 0.35  # of the mean log density: less moves no pose by much
+_FEWEST = 5
+_KNOWN = 0.5  # of a place's ground must have been seen for it to be asked
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsualFit:
+    """How well a party fits while the paths are as they were: mean and standard deviation."""
+
+    mean: float
+    sd: float
+    parties: float
+
+    def has_changed(self, fits: Array) -> bool:
+        """Whether parties (P,) fit so much worse that the paths must have changed."""
+        if not fits.size:
+            return False
+        drop = self.mean - float(fits.mean())
+        sd = self.sd * float(np.sqrt(1 / fits.size + 1 / self.parties))
+        return drop > max(_LEAST_DROP, -value_below(_RATE, self.parties - 1) * sd)
+
+
+def usual_fit(fits: Array) -> UsualFit:
+    """What is usual of the fits (P,) of parties to maps that they have no part in."""
+    return UsualFit(mean=float(fits.mean()), sd=float(fits.std(ddof=1)), parties=float(fits.size))
+
+
+def party_fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """Each party's mean log density (P,) on known ground, less what the map itself expects.
+
+    The map's expectation is over what a camera at the candidate (4,) sees, so that a busy view and
+    a quiet one compare. Parties on ground that the reference did not see are left out.
+    """
+    fits = _fits(walkers, site, candidate)
+    return fits[np.isfinite(fits)]
+
+
+def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
+    """How much worse parties on known ground fit at another candidate, in standard errors.
+
+    Ground that the reference did not see tells one pose from another by guesses alone. Infinite
+    where hardly anybody is on known ground from both.
+    """
+    apart = _fits(walkers, site, candidate) - _fits(walkers, site, other)
+    apart = apart[np.isfinite(apart)]
+    if apart.size < _FEWEST:
+        return float("inf")
+    return float(apart.mean() / max(apart.std(ddof=1) / np.sqrt(apart.size), 1e-9))
+
+
+def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """The fit (tracks,) of each party at its own number; NaN of those on unknown ground."""
+    flow = site.flow
+    placed = place_steps(walkers.steps, candidate)
+    rows = walkers.steps.rows
+    slot_idx = flow.slot_of(rows.time_s)
+    value, _, _ = flow.look(placed.place, placed.direction, slot_idx)
+    unseen, _ = flow.look_unseen(placed.place)
+    fit = value - _expected(site, candidate)[slot_idx]
+    asked = placed.valid & (unseen < 1 - _KNOWN)
+    parties = walkers.party_idx[rows.owner_idx[asked]]
+    weight = walkers.weight[asked]
+    total = np.bincount(parties, weight, walkers.tracks)
+    sums = np.bincount(parties, weight * fit[asked], walkers.tracks)
+    return np.asarray(np.where(total > 0, sums / np.where(total > 0, total, 1.0), np.nan))
+
+
+def _expected(site: Site, candidate: Array) -> Array:
+    """The mean log density (S,) of the map's own people whom a camera at a candidate sees."""
+    flow = site.flow
+    size = flow.log_density.shape[1:3]
+    nodes = flow.corner + flow.cell_m * np.indices(size).reshape(2, -1).T
+    seen = in_view(site.intrinsics, candidate, nodes, flow.cell_m)
+    seen = seen * (flow.unseen.ravel() < 1 - _KNOWN)
+    density = np.exp(flow.log_density)
+    share = (density.sum(axis=3).reshape(flow.slots, -1) * seen).sum(axis=1)
+    mean = ((density * flow.log_density).sum(axis=3).reshape(flow.slots, -1) * seen).sum(axis=1)
+    return np.asarray(mean / np.maximum(share, 1e-9))

@@ -1,0 +1,67 @@
+"""The log of who did what when: written with the deed that it tells of, never changed."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.kinds import Act, AlertKind, Outcome
+from service.store.operation import activity
+from service.store.operation.actor import actor_of
+from service.store.tables.activity import ActivityRecord
+
+
+def note(
+    session: Session,
+    what: Act,
+    *,
+    by: str | None,
+    via: str | None = None,
+    camera_id: str | None = None,
+    subject_id: str | None = None,
+    kind: AlertKind | None = None,
+    until: datetime | None = None,
+    outcome: Outcome | None = None,
+    text: str | None = None,
+    details: dict[str, Any] | None = None,
+) -> None:
+    """Keep what was done, in the transaction that does it.
+
+    Where it is known in whose name the session writes, that is who did it.
+
+    Args:
+        session: of the deed itself: what is rolled back was not done.
+        what: was done.
+        by: who; None where the service did it by itself, or nobody said a name.
+        via: the id of the token that it was done with.
+        camera_id: the camera, if it is about one; the entry stays when the camera goes.
+        subject_id: the alert's, training's, window's or token's.
+        kind: of an alert.
+        until: of a silence or of maintenance.
+        outcome: of an alert.
+        text: the words that were given.
+        details: what else is worth keeping, as JSON.
+    """
+    actor = actor_of(session)
+    record = ActivityRecord(
+        at=datetime.now(UTC),
+        what=what,
+        by=by if actor is None else actor.name,
+        via=via if actor is None else actor.token_id,
+        camera_id=camera_id,
+        subject_id=subject_id,
+        kind=kind,
+        until=until,
+        outcome=outcome,
+        note=text,
+        details=details or {},
+    )
+    activity.add(session, record)
+
+
+def list_activity(
+    session: Session, camera_id: str | None, entry_id: int, limit: int
+) -> Sequence[ActivityRecord]:
+    """Entries after one, oldest first; of a camera that there is or was, or of everything."""
+    return activity.after(session, camera_id, entry_id, limit)

@@ -1,0 +1,1 @@
+"""Cameras, their state and served pose, and what people and trackers do to them."""

@@ -1,0 +1,284 @@
+"""Register, change and remove cameras."""
+
+import secrets
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from service.access.activity import note
+from service.alerting.alerts import close_pose_alerts, end_alert, list_alerts
+from service.errors import (
+    ConflictError,
+    NotFoundError,
+    PreconditionFailedError,
+    TooManyCamerasError,
+)
+from service.job_queue import JobQueue
+from service.kinds import Act, AlertState, Origin, Outcome
+from service.settings import Settings
+from service.store import cameras, references, trainings
+from service.store.alerts import AlertFilter
+from service.store.operation.actor import name_in
+from service.store.packing import intrinsics_of, pose_of_prior
+from service.store.tables.cameras import CameraRecord, PriorPoseRecord
+from service.store.tracks import tracks
+from service.training.trainings import queue_training, stop_trainings
+from service.windows.references import begin_reference
+from service.windows.requests import request_estimate
+
+_MANY = 1000  # more alerts than a camera has kinds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSpec:
+    """What an integrator says of a camera."""
+
+    camera_id: str | None
+    name: str
+    intrinsics: Intrinsics
+    prior_pose: CameraPose
+    frame_rate_hz: float | None
+    walking_speed_mean_mps: float
+    walking_speed_sd_mps: float
+    reference_tracks: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraChange:
+    """What to change; None stays."""
+
+    name: str | None = None
+    intrinsics: Intrinsics | None = None
+    prior_pose: CameraPose | None = None
+    frame_rate_hz: float | None = None
+    walking_speed_mean_mps: float | None = None
+    walking_speed_sd_mps: float | None = None
+    reference_tracks: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraView:
+    """A camera as clients see it."""
+
+    record: CameraRecord
+    intrinsics: Intrinsics
+    prior_pose: CameraPose
+    tracks: int
+    model_id: str | None
+
+    @property
+    def etag(self) -> str:
+        """Changes whenever the camera's own fields do."""
+        return f'"{self.record.id}-{self.record.version}"'
+
+
+def register_camera(
+    session: Session, queue: JobQueue, settings: Settings, spec: CameraSpec
+) -> CameraView:
+    """Store a camera with its prior pose and queue its first training.
+
+    Raises:
+        ConflictError: the id is taken.
+        TooManyCamerasError: as many are registered as may be.
+    """
+    camera_id = spec.camera_id or f"camera-{secrets.token_hex(4)}"
+    if cameras.find(session, camera_id) is not None:
+        raise ConflictError(f"id: {camera_id!r} is taken")
+    if cameras.count(session) >= settings.max_cameras:
+        raise TooManyCamerasError(
+            f"cameras: {settings.max_cameras} are registered already; delete one that is not used, "
+            "or raise SUREFOOT_MAX_CAMERAS"
+        )
+    now = datetime.now(UTC)
+    record = CameraRecord(
+        id=camera_id,
+        name=spec.name or camera_id,
+        frame_rate_hz=spec.frame_rate_hz,
+        walking_speed_mean_mps=spec.walking_speed_mean_mps,
+        walking_speed_sd_mps=spec.walking_speed_sd_mps,
+        reference_tracks=spec.reference_tracks,
+        version=1,
+        estimate_due_at=None,
+        looked_at_pk=None,
+        created_at=now,
+        updated_at=now,
+    )
+    _set_intrinsics(record, spec.intrinsics)
+    session.add(record)
+    session.flush()
+    add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
+    begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
+    queue_training(session, queue, settings, camera_id)
+    note(session, Act.CAMERA_REGISTERED, by=None, camera_id=camera_id)
+    return view_camera(session, camera_id)
+
+
+def view_camera(session: Session, camera_id: str) -> CameraView:
+    """A camera.
+
+    Raises:
+        NotFoundError: there is none of that id.
+    """
+    return _view(session, require_camera(session, camera_id))
+
+
+def list_cameras(session: Session, after_id: str, limit: int) -> list[CameraView]:
+    """Some cameras in order of their ids, after one."""
+    return [_view(session, record) for record in cameras.page(session, after_id, limit)]
+
+
+def change_camera(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    etag: str,
+    change: CameraChange,
+) -> CameraView:
+    """Change a camera; another lens or prior pose queues a training.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        PreconditionFailedError: it was changed since the client read it.
+    """
+    view = view_camera(session, camera_id)
+    _check_etag(view, etag)
+    record = view.record
+    if change.intrinsics is not None:
+        _set_intrinsics(record, change.intrinsics)
+    for name in (
+        "name",
+        "frame_rate_hz",
+        "walking_speed_mean_mps",
+        "walking_speed_sd_mps",
+        "reference_tracks",
+    ):
+        if getattr(change, name) is not None:
+            setattr(record, name, getattr(change, name))
+    record.version += 1
+    record.updated_at = datetime.now(UTC)
+    if change.reference_tracks is not None:
+        _change_wanted(session, queue, camera_id, change.reference_tracks)
+    geometry_changed = change.intrinsics is not None or change.prior_pose is not None
+    if geometry_changed or change.walking_speed_mean_mps is not None:
+        # A model is for one lens at one prior pose: the new record makes the old one too old.
+        if change.prior_pose is not None:
+            close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, None))
+        # Tracks seen so far may be of another pose or lens, but not of other people.
+        from_s = references.newest(session, camera_id).from_s
+        if geometry_changed:
+            from_s = tracks.newest_end_s(session, camera_id)
+        pose = change.prior_pose or view.prior_pose
+        renew_prior_pose(
+            session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
+        )
+    fields = [field for field in change.__slots__ if getattr(change, field) is not None]
+    note(session, Act.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
+    session.flush()
+    return view_camera(session, camera_id)
+
+
+def remove_camera(session: Session, camera_id: str, etag: str) -> None:
+    """Delete a camera with all that is stored of it; who was told of its alerts is told their end.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        PreconditionFailedError: it was changed since the client read it.
+    """
+    view = view_camera(session, camera_id)
+    _check_etag(view, etag)
+    for alert in list_alerts(
+        session, AlertFilter(state=AlertState.FIRING, camera_id=camera_id), _MANY
+    ):
+        end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
+    details = {"name": view.record.name}
+    note(session, Act.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
+    session.delete(view.record)
+
+
+def require_camera(session: Session, camera_id: str) -> CameraRecord:
+    """The record of a camera.
+
+    Raises:
+        NotFoundError: there is none of that id.
+    """
+    record = cameras.find(session, camera_id)
+    if record is None:
+        raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
+    return record
+
+
+def renew_prior_pose(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    pose: CameraPose,
+    origin: Origin,
+    *,
+    from_s: float | None,
+    by: str | None,
+) -> None:
+    """Make a pose the prior pose, with a reference of the tracks that start at or after a time.
+
+    It is trained at, instead of whatever training is under way.
+    """
+    add_prior_pose(session, camera_id, pose, origin, by)
+    begin_reference(session, camera_id, origin, from_s=from_s, by=by)
+    request_estimate(session, queue, camera_id)
+    stop_trainings(session, camera_id)
+    queue_training(session, queue, settings, camera_id)
+
+
+def add_prior_pose(
+    session: Session, camera_id: str, pose: CameraPose, origin: Origin, by: str | None
+) -> None:
+    """Make a pose the prior pose; the earlier ones stay as history."""
+    session.add(
+        PriorPoseRecord(
+            camera_id=camera_id,
+            height_m=pose.height_m,
+            tilt_rad=pose.tilt_rad,
+            roll_rad=pose.roll_rad,
+            heading_rad=pose.heading_rad,
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            origin=origin,
+            trusted_by=name_in(session, by),
+            created_at=datetime.now(UTC),
+        )
+    )
+    session.flush()
+
+
+def _change_wanted(session: Session, queue: JobQueue, camera_id: str, wanted: int) -> None:
+    """Let a reference that is being learned wait for another number of tracks."""
+    reference = references.newest(session, camera_id)
+    if reference.ready_at is None:
+        reference.wanted = wanted
+        request_estimate(session, queue, camera_id)
+
+
+def _view(session: Session, record: CameraRecord) -> CameraView:
+    model = trainings.newest_model(session, record.id)
+    return CameraView(
+        record=record,
+        intrinsics=intrinsics_of(record),
+        prior_pose=pose_of_prior(cameras.prior_pose(session, record.id)),
+        tracks=tracks.count(session, record.id),
+        model_id=None if model is None else model.id,
+    )
+
+
+def _check_etag(view: CameraView, etag: str) -> None:
+    if etag not in (view.etag, "*"):
+        raise PreconditionFailedError(f"If-Match: the camera is at {view.etag}, got {etag}")
+
+
+def _set_intrinsics(record: CameraRecord, lens: Intrinsics) -> None:
+    record.width, record.height = lens.width, lens.height
+    record.fx, record.fy, record.cx, record.cy = lens.fx, lens.fy, lens.cx, lens.cy
+    record.distortion = list(lens.distortion)

@@ -1,0 +1,144 @@
+"""What a person says of how a camera stands: its pose is accepted, it was put back, it never moved.
+
+Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
+"""
+
+from sqlalchemy.orm import Session
+
+from service.access.activity import note as note_activity
+from service.alerting.alerts import close_alert, close_pose_alerts, require_firing
+from service.cameras.cameras import renew_prior_pose, require_camera
+from service.cameras.poses import PoseView, view_pose
+from service.errors import ConflictError
+from service.job_queue import JobQueue
+from service.kinds import Act, AlertState, Answer, Origin, Outcome
+from service.settings import Settings
+from service.store import alerts
+from service.store.tables.alerts import AlertRecord
+from service.store.tracks import tracks
+from service.windows.references import begin_reference, keep_answer
+from service.windows.requests import request_estimate
+
+
+def accept_pose(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Make the served pose the new prior pose, close its alerts and begin a new reference.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        ConflictError: no pose has been estimated yet.
+    """
+    view = view_pose(session, settings, camera_id)
+    if not view.told:
+        raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
+    close_pose_alerts(session, camera_id, Outcome.ACCEPTED, by, note)
+    note_activity(session, Act.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)
+    from_s = tracks.newest_end_s(session, camera_id)
+    renew_prior_pose(
+        session, queue, settings, camera_id, view.pose, Origin.ACCEPTED, from_s=from_s, by=by
+    )
+    return view_pose(session, settings, camera_id)
+
+
+def put_back(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Take a person's word that the camera is back at its prior pose; what was learned there holds.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    _answer(session, queue, camera_id, Answer.PUT_BACK, by, note)
+    return view_pose(session, settings, camera_id)
+
+
+def learn_anew(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    by: str | None,
+    note: str | None = None,
+) -> PoseView:
+    """Take a person's word that the camera is at its prior pose, and learn it anew there.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    require_camera(session, camera_id)
+    close_pose_alerts(session, camera_id, Outcome.PUT_BACK, by, note)
+    note_activity(session, Act.REFERENCE_RESET, by=by, camera_id=camera_id, text=note)
+    from_s = tracks.newest_end_s(session, camera_id)
+    begin_reference(session, camera_id, Origin.RESET, from_s=from_s, by=by)
+    request_estimate(session, queue, camera_id)
+    return view_pose(session, settings, camera_id)
+
+
+def resolve_alert(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    alert_id: str,
+    answer: Answer,
+    note: str | None,
+    by: str | None,
+) -> AlertRecord:
+    """End an alert with what came of it; an alert of the same kind may open anew later.
+
+    What is said of a camera's pose is said of all its alerts about the pose. A group's members end
+    with it, and the same way.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved, or there is no pose to accept.
+    """
+    record = require_firing(session, alert_id)
+    for each in (*alerts.firing_members(session, record.id), record):
+        if each.state == AlertState.FIRING:
+            _resolve(session, queue, settings, each, answer, note, by)
+    return record
+
+
+def _resolve(
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    record: AlertRecord,
+    answer: Answer,
+    note: str | None,
+    by: str | None,
+) -> None:
+    if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
+        close_alert(session, record, Outcome(answer), note, by)
+    elif answer == Answer.ACCEPTED:
+        accept_pose(session, queue, settings, record.camera_id, by, note)
+    else:
+        _answer(session, queue, record.camera_id, answer, by, note)
+
+
+def _answer(
+    session: Session,
+    queue: JobQueue,
+    camera_id: str,
+    answer: Answer,
+    by: str | None,
+    note: str | None,
+) -> None:
+    """Have a camera judged against its prior pose by whoever comes from now on."""
+    close_pose_alerts(session, camera_id, Outcome(answer), by, note)
+    act = Act.POSE_PUT_BACK if answer == Answer.PUT_BACK else Act.POSE_FALSE_ALARM
+    note_activity(session, act, by=by, camera_id=camera_id, text=note)
+    keep_answer(session, camera_id, answer, by)
+    request_estimate(session, queue, camera_id)

@@ -1,0 +1,94 @@
+"""A camera's still image: kept where the operator allows it, shown on its page, nowhere else."""
+
+import hashlib
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.access.activity import note
+from service.cameras.cameras import require_camera
+from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
+from service.formats.still import Still
+from service.kinds import Act
+from service.settings import Settings
+from service.store import snapshots
+from service.store.snapshots import SnapshotFacts
+from service.store.tables.cameras import SnapshotRecord
+
+_OTHER_SHAPE = 0.01  # of the ratio of its sides
+
+
+def require_snapshots(settings: Settings) -> None:
+    """Refuse while pictures are not to be kept.
+
+    Raises:
+        SwitchedOffError: the setting says so.
+    """
+    if not settings.snapshots:
+        raise SwitchedOffError(
+            "snapshots: this service keeps no pictures; SUREFOOT_SNAPSHOTS=true allows one a camera"
+        )
+
+
+def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFacts:
+    """Keep a still image of a camera in place of the one there was.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        MalformedError: it is not of the camera's shape, so nothing would lie where it belongs.
+    """
+    camera = require_camera(session, camera_id)
+    wanted, got = camera.width / camera.height, still.width / still.height
+    if abs(got / wanted - 1) > _OTHER_SHAPE:
+        reason = (
+            f"an image of the camera's shape, {camera.width} x {camera.height}, is needed, "
+            f"got {still.width} x {still.height}"
+        )
+        raise MalformedError(f"body: {reason}", (FieldError(pointer="", reason=reason),))
+    digest = hashlib.sha256(still.jpeg).hexdigest()
+    now = datetime.now(UTC)
+    snapshots.put(
+        session,
+        SnapshotRecord(
+            camera_id=camera_id,
+            jpeg=still.jpeg,
+            sha256=digest,
+            width=still.width,
+            height=still.height,
+            stored_at=now,
+        ),
+    )
+    note(session, Act.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
+    return SnapshotFacts(sha256=digest, width=still.width, height=still.height, stored_at=now)
+
+
+def show_snapshot(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord:
+    """The still image of a camera.
+
+    Raises:
+        NotFoundError: there is no such camera, or none of it is kept.
+        SwitchedOffError: pictures are not to be kept any more.
+    """
+    require_camera(session, camera_id)
+    require_snapshots(settings)
+    record = snapshots.find(session, camera_id)
+    if record is None:
+        raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
+    return record
+
+
+def remove_snapshot(session: Session, camera_id: str) -> None:
+    """Delete the still image of a camera; allowed whatever the settings are.
+
+    Raises:
+        NotFoundError: there is no such camera, or none of it is kept.
+    """
+    require_camera(session, camera_id)
+    if not snapshots.remove(session, camera_id):
+        raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
+    note(session, Act.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
+
+
+def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:
+    """What is known of the still image of a camera; None where none may be shown."""
+    return snapshots.facts(session, camera_id) if settings.snapshots else None

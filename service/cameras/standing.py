@@ -1,0 +1,208 @@
+"""How a camera stands: the one derivation that pages, API, metrics and lists of alerts share.
+
+While an alert that an estimate fired is open, the camera is taken for moved, whatever else is
+known of it, and the last pose that was told is served. Once a person has answered (it was put back,
+it was a false alarm, its pose is accepted), nothing that was estimated before counts any more.
+"""
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.alerting.arrival_rates import unpacked
+from service.alerting.presence import is_no_data
+from service.delivery.outbox import is_silenced
+from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
+from service.settings import Settings
+from service.store import figures, fleet
+from service.store.alerts import POSE_KINDS
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.estimates import EstimateRecord
+from service.store.tables.references import SiteReferenceRecord
+from service.windows.attendance import Attendance, attendance_by
+from service.windows.references import made_against
+
+MOVED = (PoseState.DRIFTING, PoseState.OUT_OF_RANGE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraFacts:
+    """What is stored of a camera that its state follows from, at a moment.
+
+    `estimate` is the newest, `last_told` the newest that told anything. `silent` says that nobody
+    has been seen for longer than is usual.
+    """
+
+    reference: SiteReferenceRecord
+    estimate: EstimateRecord | None
+    last_told: EstimateRecord | None
+    attended: Attendance
+    firing: Sequence[AlertRecord]
+    last_track_s: float | None
+    silent: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """How a camera stands. `alerts` are all that fire, what needs a person most first.
+
+    `estimate` is what is served, and may tell nothing; None where the prior pose is. It is `judged`
+    where it says how the camera stands now, against its reference; else it is the last that is
+    known, or of a reference that is being learned. `cause` is what is waited after until then.
+    """
+
+    camera_id: str
+    state: PoseState
+    since: datetime
+    reference: SiteReferenceRecord
+    estimate: EstimateRecord | None
+    judged: bool
+    cause: Cause
+    alerts: tuple[AlertRecord, ...]
+    attended: Attendance
+    last_track_s: float | None
+    silent: bool
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Those of tilt, roll, height, heading that are estimated."""
+        return () if self.estimate is None else tuple(self.estimate.told)
+
+
+def standings(
+    session: Session, settings: Settings, ids: Collection[str] | None = None
+) -> dict[str, Standing]:
+    """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
+    now = datetime.now(UTC)
+    references = figures.newest_references(session, ids)
+    newest = figures.newest_estimates(session, ids)
+    ended_s = figures.last_tracks_s(session, ids)
+    windows = fleet.maintenance_windows(session, ids)
+    rhythms = fleet.rhythm_profiles(session, ids)
+    firing: dict[str, list[AlertRecord]] = defaultdict(list)
+    for alert in fleet.firing(session, ids):
+        firing[str(alert.camera_id)].append(alert)
+    held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
+    untold = [i for i in held if i in newest and not newest[i].told]
+    told_before = figures.newest_told_estimates(session, untold) if untold else {}
+    found = {}
+    for camera_id, last_s in ended_s.items():
+        known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
+        last_told = newest.get(camera_id)
+        if camera_id in untold:
+            last_told = told_before.get(camera_id)
+        facts = CameraFacts(
+            reference=references[camera_id],
+            estimate=newest.get(camera_id),
+            last_told=last_told,
+            attended=attendance_by(windows[camera_id], now),
+            firing=firing[camera_id],
+            last_track_s=last_s,
+            silent=is_no_data(settings, known, last_s, now),
+        )
+        found[camera_id] = standing_of(facts, now)
+    return found
+
+
+def standing_of(facts: CameraFacts, now: datetime) -> Standing:
+    """How a camera stands, by what is known of it."""
+    reference = facts.reference
+    estimate = _counting(facts, now)
+    judged = estimate is not None and made_against(reference, estimate)
+    alerts = tuple(sorted(facts.firing, key=lambda alert: _urgency(alert, now)))
+    cause = _cause(reference, facts.attended, now)
+    holding = _holds(alerts)
+    state: PoseState
+    if holding:
+        estimate = estimate if judged else facts.last_told
+        drifts = any(alert.kind != AlertKind.OUT_OF_RANGE for alert in holding)
+        state = PoseState.DRIFTING if drifts else PoseState.OUT_OF_RANGE
+        if estimate is not None and estimate.state in MOVED:
+            state = estimate.state
+    elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
+        state = PoseState.LEARNING
+    elif facts.silent:
+        state = PoseState.NO_DATA
+    elif judged and estimate is not None:
+        state = estimate.state
+    else:
+        state = PoseState.OK
+    return Standing(
+        camera_id=reference.camera_id,
+        state=state,
+        since=_since(state, facts, alerts, cause),
+        reference=reference,
+        estimate=estimate,
+        judged=judged,
+        cause=cause,
+        alerts=alerts,
+        attended=facts.attended,
+        last_track_s=facts.last_track_s,
+        silent=facts.silent,
+    )
+
+
+def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
+    """The alerts that say that a camera has moved, as estimates found."""
+    return [
+        each for each in alerts if each.kind in POSE_KINDS and each.source == AlertSource.ESTIMATE
+    ]
+
+
+def _counting(facts: CameraFacts, now: datetime) -> EstimateRecord | None:
+    """The newest estimate; None where it says nothing of how the camera stands now."""
+    reference, estimate = facts.reference, facts.estimate
+    if estimate is None or estimate.reference_id != reference.id:
+        return None  # it was measured against a pose or a reference that no longer counts
+    if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
+        return None
+    if reference.ready_at is None:
+        return estimate
+    # Somebody was at it and has gone: it may stand elsewhere. While they are there it is not
+    # judged, so what was told before stands.
+    begins_s = max(facts.attended.free_since_s(now) or 0.0, reference.window_from_s or 0.0)
+    return estimate if estimate.to_s >= max(begins_s, reference.from_s or 0.0) else None
+
+
+def _cause(reference: SiteReferenceRecord, attended: Attendance, now: datetime) -> Cause:
+    """What was last of all that has the camera judged anew."""
+    left_s = attended.free_since_s(now)
+    if reference.answer is not None and reference.answered_at is not None:
+        if left_s is not None and left_s > reference.answered_at.timestamp():
+            return Cause.MAINTENANCE
+        if reference.answer == Answer.FALSE_ALARM:
+            return Cause.FALSE_ALARM
+        return Cause.PUT_BACK
+    if left_s is not None and left_s > max(reference.from_s or 0.0, reference.to_s or 0.0):
+        return Cause.MAINTENANCE
+    return Cause.PUT_BACK if reference.origin == Origin.PUT_BACK else Cause.REFERENCE
+
+
+def _urgency(alert: AlertRecord, now: datetime) -> tuple[bool, bool, datetime]:
+    return not waits(alert, now), alert.severity != Severity.CRITICAL, alert_since(alert)
+
+
+def waits(alert: AlertRecord, now: datetime) -> bool:
+    """Whether nobody has taken an alert up, and no group speaks for it."""
+    return not (alert.acknowledged_by or is_silenced(alert, now) or alert.group_id is not None)
+
+
+def alert_since(alert: AlertRecord) -> datetime:
+    """Since when what an alert tells of is so, as far as is known."""
+    return alert.changed_at or alert.opened_at
+
+
+def _since(
+    state: PoseState, facts: CameraFacts, alerts: Sequence[AlertRecord], cause: Cause
+) -> datetime:
+    reference = facts.reference
+    if alerts:
+        return alert_since(alerts[0])
+    if state == PoseState.NO_DATA and facts.last_track_s is not None:
+        return datetime.fromtimestamp(facts.last_track_s, UTC)
+    if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
+        return reference.answered_at
+    return reference.created_at if reference.ready_at is None else reference.ready_at

@@ -1,0 +1,72 @@
+"""Why a camera's state is what it is."""
+
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from models.reasons import Reason, Value
+from service.alerting.presence import silence_of
+from service.cameras.standing import MOVED, Standing
+from service.delivery.outbox import json_time
+from service.kinds import PoseState
+from service.reasons import Reasons, ServiceCode
+from service.settings import Settings
+from service.store import maintenance
+from service.store.tables.attendance import MaintenanceRecord
+from service.store.tracks import windows
+from service.windows.references import FEWEST_WALKERS, tracks_so_far, wanted_tracks, window_beside
+
+
+def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reasons:
+    """Why a camera's state is what it is: what is missing, what was told, who is there."""
+    now = datetime.now(UTC)
+    found: list[Reason] = []
+    window = maintenance.under_way(session, standing.camera_id, now)
+    if window is not None:
+        found.append(_window(window))
+    estimate = standing.estimate
+    if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
+        found += estimate.reasons
+    elif standing.state in MOVED:
+        if estimate is not None and estimate.told:
+            found += [Reason(code=ServiceCode.LAST_TOLD), *estimate.reasons]
+        else:
+            found += _of_alerts(standing)
+    if not standing.judged:
+        found += _missing(session, settings, standing)
+    silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
+    if silence is not None and standing.state in (PoseState.NO_DATA, *MOVED):
+        found += silence.reasons
+    return tuple(found)
+
+
+def _of_alerts(standing: Standing) -> list[Reason]:
+    """What the alerts say; once, where several say the same."""
+    different: list[Reasons] = []
+    for alert in standing.alerts:
+        if alert.reasons not in different:
+            different.append(alert.reasons)
+    return [reason for reasons in different for reason in reasons]
+
+
+def _missing(session: Session, settings: Settings, standing: Standing) -> list[Reason]:
+    """How much is missing until the camera is judged anew."""
+    reference = standing.reference
+    if reference.ready_at is None:
+        so_far = tracks_so_far(session, settings, reference)
+        values = {"tracks": so_far, "wanted": wanted_tracks(reference, settings)}
+        return [Reason(code=ServiceCode.REFERENCE_TRACKS, values=values)]
+    bounds = window_beside(standing.attended, reference, settings)
+    since: dict[str, Value] = {
+        "tracks": windows.count_window(session, bounds),
+        "cause": standing.cause,
+        "least_walkers": FEWEST_WALKERS,
+    }
+    return [Reason(code=ServiceCode.TRACKS_SINCE, values=since), *reference.doubts]
+
+
+def _window(window: MaintenanceRecord) -> Reason:
+    values = {"until": json_time(window.to_at)}
+    if window.reason:
+        values["note"] = window.reason
+    return Reason(code=ServiceCode.MAINTENANCE, values=values)

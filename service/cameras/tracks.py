@@ -1,0 +1,80 @@
+"""Take in tracks."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.cameras.sources import note_source
+from service.errors import FieldError, NothingTakenError
+from service.formats.track import Batch, Rejection
+from service.job_queue import JobQueue
+from service.store.packing import pack
+from service.store.tracks import tracks
+from service.windows.requests import request_estimate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Receipt:
+    """What became of the tracks of one request."""
+
+    accepted: int
+    duplicates: int
+    rejections: tuple[Rejection, ...]
+    left_out: int
+
+
+def receive_tracks(
+    session: Session, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 16
+) -> Receipt:
+    """Store the good tracks of a request and have them looked at, in one transaction.
+
+    A track is known by (camera, source, id, start time): one that is stored already stays, and
+    counts as taken.
+
+    Raises:
+        NothingTakenError: there were tracks, and none of them could be taken.
+        TooManySourcesError: the source is new, and the camera has as many as it may have.
+    """
+    if batch.rejections and not batch.tracks:
+        raise _nothing_taken(batch)
+    now = datetime.now(UTC)
+    added = tracks.add(
+        session,
+        [
+            {
+                "camera_id": camera_id,
+                "source": track.source,
+                "track_id": track.track_id,
+                "started_s": float(track.points[0, 0]),
+                "ended_s": float(track.points[-1, 0]),
+                "points": pack(track.points),
+                "boxes": None if track.boxes is None else pack(track.boxes),
+                "received_at": now,
+            }
+            for track in batch.tracks
+        ],
+    )
+    for source in sorted({track.source for track in batch.tracks}):
+        stored = added if source == batch.tracks[0].source else 0
+        note_source(session, camera_id, source, stored, max_sources)
+    if added:
+        request_estimate(session, queue, camera_id)
+    return Receipt(
+        accepted=added,
+        duplicates=len(batch.tracks) - added,
+        rejections=batch.rejections,
+        left_out=batch.left_out,
+    )
+
+
+def _nothing_taken(batch: Batch) -> NothingTakenError:
+    count = len(batch.rejections)
+    first = batch.rejections[0]
+    return NothingTakenError(
+        f"tracks: none of {count} could be taken, the first since: {first.detail}",
+        tuple(
+            FieldError(pointer=f"/tracks/{each.index}", reason=f"{each.code}: {each.detail}")
+            for each in batch.rejections
+        ),
+    )

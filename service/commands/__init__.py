@@ -1,0 +1,1 @@
+"""What the command line starts, and what else it can be asked."""

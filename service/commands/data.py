@@ -1,0 +1,129 @@
+"""Commands on a data directory: migrate, backup, restore, check, rotate-key."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from service.logs import configure_logs
+from service.process.manners import be_private, end_like_ctrl_c
+from service.settings import Settings
+
+DataDir = Annotated[Path | None, typer.Option(help="Database and weights live here.")]
+
+
+def migrate(data_dir: DataDir = None) -> None:
+    """Bring the database to the newest revision."""
+    from service.commands.migrate import migrate as run_migrations
+
+    settings = _begin(data_dir)
+    run_migrations(settings)
+    _say(f"{settings.database_path} is at the newest revision")
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(help="The archive to write; it must not exist.")],
+    data_dir: DataDir = None,
+) -> None:
+    """Write database, weights and key to one checked archive, while the service runs."""
+    from service.backup.writing import write_backup
+
+    settings = _begin(data_dir)
+    with _progress() as tell:
+        manifest = write_backup(settings, file, tell)
+    size = sum(member.size for member in manifest.members)
+    _say(f"{file}: {len(manifest.members)} files, {size / 1e6:.1f} MB, schema {manifest.revision}")
+    if manifest.key == "environment":
+        _say(f"Keep SUREFOOT_SECRET_KEY (id {manifest.key_id}) elsewhere: it is not in there.")
+    elif manifest.key == "archive":
+        _say("The key of webhooks' secrets is in there: keep it as safe as the service itself.")
+    if manifest.missing_weights:
+        _say(f"{len(manifest.missing_weights)} weights were missing: see `surefoot check`.")
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(help="An archive of `surefoot backup`.")],
+    data_dir: DataDir = None,
+    force: Annotated[bool, typer.Option("--force", help="Move aside what is there.")] = False,
+) -> None:
+    """Verify an archive and put it into a data directory that nothing uses."""
+    from service.backup.restoring import restore_backup
+
+    settings = _begin(data_dir)
+    with _progress() as tell:
+        done = restore_backup(settings, file, tell, force=force)
+    made = f"made {done.manifest.made_at} by release {done.manifest.release}"
+    _say(f"{settings.data_dir} is as in {file}, {made}; the next start migrates it.")
+    if done.replaced is not None:
+        _say(f"What was there before is in {done.replaced}; delete it when you like.")
+    if done.manifest.missing_weights:
+        _say(f"{len(done.manifest.missing_weights)} weights are missing: `surefoot check --repair`")
+
+
+def check(
+    data_dir: DataDir = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Delete models without weights: they are trained anew.")
+    ] = False,
+) -> None:
+    """Look a data directory over; 1 where something is wrong. A service may run meanwhile."""
+    from rich.table import Table
+
+    from service.backup.checking import Verdict, check_data_dir, repair_weights
+
+    settings = _begin(data_dir)
+    if repair:
+        _say(f"{repair_weights(settings)} models deleted, to be trained anew")
+    findings = check_data_dir(settings)
+    table = Table("looked at", "verdict", "detail", title=str(settings.data_dir))
+    colours = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.FAULT: "red"}
+    for one in findings:
+        table.add_row(one.what, f"[{colours[one.verdict]}]{one.verdict}[/]", one.detail)
+    Console().print(table)
+    raise typer.Exit(int(any(one.verdict is Verdict.FAULT for one in findings)))
+
+
+def rotate_key(
+    data_dir: DataDir = None,
+    old_key_file: Annotated[
+        Path | None, typer.Option(help="Of the key until now; secret.key of the data directory.")
+    ] = None,
+    lost: Annotated[
+        bool, typer.Option("--lost", help="There is none: new secrets, webhooks disabled.")
+    ] = False,
+) -> None:
+    """Seal the stored secrets with a new key file, or with SUREFOOT_SECRET_KEY if that is set."""
+    from service.commands.key_rotation import rotate_key as rotate
+
+    count = rotate(_begin(data_dir), old_key_file, lost=lost)
+    _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
+
+
+def _begin(data_dir: Path | None) -> Settings:
+    configure_logs()
+    be_private()
+    return Settings() if data_dir is None else Settings(data_dir=data_dir)
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar on stderr; an end by signal removes what was half done."""
+    from rich.progress import Progress
+
+    end_like_ctrl_c()
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda what, done, total: bar.update(
+            task, description=what, completed=done, total=total
+        )
+
+
+def _say(line: str) -> None:
+    Console().print(line, soft_wrap=True, highlight=False)
+
+
+DATA_COMMANDS = (migrate, backup, restore, check, rotate_key)

@@ -1,0 +1,212 @@
+"""`surefoot demo`: a simulated street, a knocked camera, and the alert, in the terminal."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn
+
+from models.evaluation.scenes import SceneTrack
+from models.geometry.rotation import angle_between
+from service.commands.demo_folder import demo_folder, free_port, remove_left_over, require_free
+from service.commands.demo_screen import Screen, clock, save_picture
+from service.commands.demo_street import (
+    BETWEEN_S,
+    CAMERA_ID,
+    KNOCK,
+    KNOCKED_TRACKS,
+    PRIOR,
+    REFERENCE_TRACKS,
+    STILL_TRACKS,
+    camera_body,
+    street_people,
+)
+from service.commands.replay import post_tracks
+from service.data_dir import StartError
+from service.formats.degrees import degrees
+from service.kinds import AlertState, ReferenceState
+from service.process.manners import end_like_ctrl_c
+from service.settings import Settings
+
+_BATCH = 10
+_PAUSE_S = 0.4  # for the eye
+_EPOCHS = 5
+_LONGEST_S = 150.0
+
+
+def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
+    """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
+    console = Console()
+    started = time.monotonic()
+    port = port or free_port()
+    remove_left_over()
+    require_free(port)
+    end_like_ctrl_c()
+    console.print("A street camera, people walking by; later somebody knocks the camera.")
+    with demo_folder() as folder:
+        settings = Settings(
+            data_dir=folder,
+            port=port,
+            recipe="default",
+            epochs=_EPOCHS,
+            seed=seed,
+            workers=1,
+            auth="off",  # it plays by itself, and with nothing that is anybody's
+        )
+        url = f"http://{settings.host}:{settings.port}"
+        console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")
+        with _service(settings) as service, httpx.Client(base_url=url, timeout=30) as http:
+            _wait_ready(http, service, started)
+            screen, progress = _play(http, console, seed, started)
+            won = _close(console, screen, url, time.monotonic() - started)
+            if picture is not None:
+                save_picture(screen.table(progress), picture)
+            if won and stay:
+                console.print("Ctrl-C stops the service.")
+                _wait_for_interrupt()
+    return 0 if won else 1
+
+
+def _play(
+    http: httpx.Client, console: Console, seed: int, started: float
+) -> tuple[Screen, Progress]:
+    screen = Screen()
+    progress = Progress(
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"),
+        console=console,
+    )  # fmt: skip
+    parts = (
+        ("people walk; the reference is learned", PRIOR, REFERENCE_TRACKS),
+        ("people walk on, the camera is still", PRIOR, STILL_TRACKS),
+        ("knocked; people walk on", KNOCK.apply(PRIOR), KNOCKED_TRACKS),
+    )
+    clock_s = time.time() - BETWEEN_S * sum(count for _, _, count in parts)
+    with Live(get_renderable=lambda: screen.table(progress), console=console) as live:
+        training = progress.add_task("beside it, a regressor is trained", total=None)
+        http.post("/cameras", json=camera_body()).raise_for_status()
+        for number, (words, pose, count) in enumerate(parts):
+            if pose != PRIOR:
+                screen.knocked_at = datetime.fromtimestamp(clock_s, UTC)
+            task = progress.add_task(words, total=count)
+            people = street_people(pose, count, seed + number)
+            for at in range(0, count, _BATCH):
+                _show(http, screen, people[at : at + _BATCH], clock_s, started)
+                progress.update(task, advance=_BATCH)
+                _look_at_training(http, progress, training)
+                time.sleep(_PAUSE_S)
+            clock_s += BETWEEN_S * count
+        live.refresh()
+    return screen, progress
+
+
+def _show(
+    http: httpx.Client,
+    screen: Screen,
+    people: Sequence[SceneTrack],
+    clock_s: float,
+    started: float,
+) -> None:
+    """Post people as a tracker would, when their walks have ended, and wait for the answer."""
+    receipt = post_tracks(http, CAMERA_ID, people, clock_s)
+    assert not receipt["rejected"], receipt
+    screen.tracks += len(people)
+    newest_s = clock_s + float(people[-1].trajectory.time_s[-1])
+    while not _looked_at(http, screen, newest_s):
+        _check_time(started)
+        time.sleep(0.2)
+
+
+def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
+    """Whether the newest track is in the reference or the estimate that is shown."""
+    pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
+    alerts = http.get(
+        "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}
+    ).json()["items"]
+    screen.pose, screen.alert = pose, alerts[0] if alerts else None
+    if pose["reference"]["state"] == ReferenceState.LEARNING:
+        return bool(pose["reference"]["tracks"] < REFERENCE_TRACKS)
+    newest = pose["to"] and datetime.fromisoformat(pose["to"]).timestamp() >= newest_s - 1e-3
+    return bool(newest) or screen.tracks == REFERENCE_TRACKS
+
+
+def _look_at_training(http: httpx.Client, progress: Progress, task: Any) -> None:
+    training = http.get(f"/cameras/{CAMERA_ID}/trainings").json()["items"][-1]
+    step, steps = training["progress"]["step"], training["progress"]["steps"]
+    progress.update(task, completed=step, total=steps or None)
+
+
+def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
+    """Say how it ended."""
+    if screen.pose is None or screen.alert is None or screen.knocked_at is None:
+        console.print("[red]no alert came[/]")
+        return False
+    served = np.array(screen.pose["pose"]["quaternion_wxyz"])
+    to_knocked, to_prior = (
+        degrees(float(angle_between(served, pose.quaternion_wxyz)))
+        for pose in (KNOCK.apply(PRIOR), PRIOR)
+    )
+    console.print(
+        f"\nKnocked at {screen.knocked_at:%H:%M:%S}; the alert says "
+        f"{clock(screen.alert['changed_at'])}.\n"
+        f"The served pose is {to_knocked:.1f} deg from the knocked camera and {to_prior:.1f} deg "
+        f"from where it was; {took_s:.0f} s in all.\n"
+        f"Look: {url}/, {url}/ui/cameras/{CAMERA_ID}, {url}/docs"
+    )
+    return to_knocked < to_prior
+
+
+def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: float) -> None:
+    while True:
+        if service.poll() is not None:
+            raise StartError(f"demo: its service ended with {service.returncode}, see above")
+        try:
+            if http.get("/readyz").status_code == 200:
+                return
+        except httpx.TransportError:
+            pass  # not listening yet
+        _check_time(started)
+        time.sleep(0.2)
+
+
+@contextmanager
+def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
+    log_path = settings.data_dir / "serve.log"
+    with log_path.open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "service.cli", "serve", "--follow-stdin"],
+            env=settings.as_environment(),
+            stdin=subprocess.PIPE,  # its other end closes when we end, in whatever way
+            stdout=log,
+            stderr=log,
+            start_new_session=True,  # Ctrl-C is ours to pass on
+        )
+        try:
+            yield process
+        except Exception:
+            Console(stderr=True).print(log_path.read_text()[-4000:], markup=False)
+            raise
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+def _check_time(started: float) -> None:
+    if time.monotonic() - started > _LONGEST_S:
+        raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
+
+
+def _wait_for_interrupt() -> None:
+    try:
+        while True:
+            time.sleep(3600)
+    except KeyboardInterrupt:
+        return

@@ -1,0 +1,49 @@
+"""Seal the secrets of a data directory with another key."""
+
+from pathlib import Path
+
+from service.data_dir import KEY_FILE, held_alone, make_private, require_stopped
+from service.delivery.keys import NEW_KEY_FILE, give_up_secrets, reseal
+from service.delivery.sealing import read_key_file, sealer_of, write_key_file
+from service.settings import Settings
+from service.store.sqlite import files
+from service.store.sqlite.database import Store
+
+
+def rotate_key(settings: Settings, old_key_file: Path | None, *, lost: bool = False) -> int:
+    """Seal by SUREFOOT_SECRET_KEY, or by a key file that is made anew; returns how many secrets.
+
+    Args:
+        settings: of a data directory that nothing uses.
+        old_key_file: of the key until now; the data directory's own if None.
+        lost: there is none; webhooks get new secrets and are disabled.
+
+    Raises:
+        StartError: something uses it, or the old key does not open what is stored.
+    """
+    folder = settings.data_dir
+    path, new_path = folder / KEY_FILE, folder / NEW_KEY_FILE
+    make_private(folder)
+    with held_alone(folder):
+        require_stopped(folder)
+        old = None if lost else read_key_file(old_key_file or path)
+        if settings.secret_key is not None:
+            new = sealer_of(settings)
+        else:
+            new_path.unlink(missing_ok=True)
+            new = write_key_file(new_path)
+        store = Store(settings)
+        try:
+            with store.write() as session:
+                files.overwrite_deleted(session)
+                count = give_up_secrets(session, new) if old is None else reseal(session, old, new)
+        except BaseException:
+            new_path.unlink(missing_ok=True)
+            raise
+        finally:
+            store.close()
+        if settings.secret_key is None:
+            new_path.replace(path)  # cut off before this, the next start does it
+        else:
+            path.unlink(missing_ok=True)
+    return count

@@ -1,0 +1,113 @@
+"""Bring a data directory's database to the newest revision."""
+
+import fcntl
+import logging
+from pathlib import Path
+
+import alembic.command
+
+from service.backup.before_migration import copy_before
+from service.backup.placing import finish_restore
+from service.data_dir import (
+    MIGRATE_LOCK,
+    StartError,
+    make_file,
+    make_private,
+    require_space,
+    telling_of,
+)
+from service.delivery.keys import settle_key
+from service.job_queue import migrate_engine_tables
+from service.settings import Settings
+from service.store.sqlite import files
+from service.store.sqlite.database import Store
+from service.store.sqlite.faults import telling_of_database
+from service.store.sqlite.revisions import alembic_config, known_revisions, require_known
+
+log = logging.getLogger("surefoot.migrate")
+
+_LOOK_S = 10.0  # reads a gigabyte or more
+
+
+def migrate(settings: Settings) -> None:
+    """Create or upgrade all tables, seal secrets, make old files shrinkable; one process at a time.
+
+    Before the schema of a database changes it is copied, and where that fails put back.
+
+    Raises:
+        StartError: what keeps this data directory from being used, in one line.
+    """
+    folder = settings.data_dir
+    make_private(folder)
+    with telling_of(folder):
+        make_file(folder / MIGRATE_LOCK)
+    with telling_of(folder), (folder / MIGRATE_LOCK).open("r+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        finish_restore(folder)
+        make_private(folder)
+        with telling_of_database(settings.database_path):
+            _require_sound(settings.database_path)
+            _migrate_tables(settings)
+            migrate_engine_tables(settings)
+            _settle_key(settings)
+            _make_shrinkable(settings.database_path)
+
+
+def _require_sound(path: Path) -> None:
+    """Refuse a damaged database before anything is made of it; a large one is looked at in part."""
+    found = files.first_fault(path, _LOOK_S) if path.exists() and path.stat().st_size else None
+    if found is not None:
+        raise StartError(
+            f"database: {path} is damaged ({' '.join(found.split())[:200]}); put a backup in its "
+            "place by `surefoot restore`, `surefoot check` says more"
+        )
+
+
+def _migrate_tables(settings: Settings) -> None:
+    path, head = settings.database_path, known_revisions()[0]
+    found = files.revision(path)
+    require_known(found, str(path))
+    if found == head:
+        return
+    copy: Path | None = None
+    if found is not None and settings.copy_before_migration:
+        copy = copy_before(path, head)
+        log.info("database_copied", extra={"path": str(copy), "revision": found})
+    try:
+        alembic.command.upgrade(alembic_config(settings.database_url), "head")
+    except Exception as error:
+        if copy is None:
+            raise
+        files.copy(copy, path)
+        reason = str(getattr(error, "orig", error)).splitlines()[0]
+        raise StartError(
+            f"migration: from {found} to {head} failed ({reason}); {path} is as it was, and {copy} "
+            "a copy of it: install the release that ran before, and report this"
+        ) from error
+    log.info("migrated", extra={"from": found, "to": head})
+
+
+def _settle_key(settings: Settings) -> None:
+    store = Store(settings)
+    try:
+        with store.write() as session:
+            files.overwrite_deleted(session)
+            sealed = settle_key(session, settings)
+    finally:
+        store.close()
+    if sealed:
+        files.wipe_log(settings.database_path)
+        log.info("secrets_sealed", extra={"secrets": sealed})
+
+
+def _make_shrinkable(path: Path) -> None:
+    """Write a file of an early release anew, once; without the space for it, at a later start."""
+    if files.shrinks(path):
+        return
+    try:
+        require_space(path.parent, 2 * files.size(path) + 2**20, "giving unused space back")
+    except StartError as error:
+        log.warning("not_rebuilt", extra={"reason": str(error)})
+        return
+    log.info("rebuilding", extra={"path": str(path), "bytes": files.size(path)})
+    files.rebuild(path)

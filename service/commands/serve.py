@@ -1,0 +1,117 @@
+"""`surefoot serve`: the API and its local workers, one command."""
+
+import contextlib
+import gc
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+
+import uvicorn
+
+from service.access.tokens import count_tokens
+from service.app import create_app
+from service.commands.migrate import migrate
+from service.data_dir import StartError, held_alone, make_private
+from service.http.connections import ConnectionGuard, protocol_factory
+from service.http.reach import auth_on, is_loopback
+from service.process import exits
+from service.process.listener import listen
+from service.process.local_workers import local_workers
+from service.process.memory import settle_allocator
+from service.settings import Settings
+from service.store.sqlite.database import Store
+
+log = logging.getLogger("surefoot.serve")
+
+_SWITCH_S = 0.001
+_BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
+
+
+def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
+    """Migrate, start the workers, serve until SIGTERM or SIGINT, stop cleanly.
+
+    With `follow_stdin` it ends when its stdin does, too: who started it holds the other end.
+
+    Raises:
+        StartError: what keeps it from serving, in one line.
+    """
+    if follow_stdin:
+        threading.Thread(target=_stop_at_end_of_stdin, daemon=True).start()
+    make_private(settings.data_dir)
+    settle_allocator()
+    with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
+        migrate(settings)
+        _require_way_in(settings)
+        app = create_app(settings)
+        guard = ConnectionGuard(settings, app.state.instruments)
+        config = uvicorn.Config(
+            app,
+            loop="asyncio",
+            http=protocol_factory(guard),  # type: ignore[arg-type]
+            ws="none",
+            backlog=_BACKLOG,
+            log_level="warning",
+            access_log=False,
+            proxy_headers=False,  # whom to believe is the guard's to know
+            timeout_graceful_shutdown=3,
+        )
+        server = uvicorn.Server(config)
+
+        def give_up() -> None:
+            server.should_exit = True
+
+        with local_workers(settings, give_up) as workers:
+            host, port = listener.getsockname()[:2]
+            log.info("serving", extra={"url": f"http://{host}:{port}"})
+            # What was imported stays: to look through it for garbage again and again takes 0.1 s
+            # each time, in which nobody is answered.
+            gc.collect()
+            gc.freeze()
+            # So long waits each step of the loop for threads that compute.
+            sys.setswitchinterval(_SWITCH_S)
+            # uvicorn raises the signal that ended it once more; by then there is nothing to kill.
+            for number in (signal.SIGTERM, signal.SIGINT):
+                signal.signal(number, lambda *_: None)
+            server.run(sockets=[listener])
+    log.info("stopped")
+    if workers.refused:
+        raise SystemExit(exits.REFUSED)
+
+
+def _require_way_in(settings: Settings) -> None:
+    """Refuse to serve strangers by mistake, and to serve nobody at all."""
+    if not auth_on(settings):
+        if not is_loopback(settings.host):
+            log.warning("access_off", extra={"host": settings.host})
+        return
+    if settings.proxy_from:
+        return
+    with contextlib.closing(Store(settings)) as store, store.read() as session:
+        count = count_tokens(session)
+    if not count:
+        raise StartError(
+            "auth: tokens are needed here, and nobody has one; make one by `surefoot token add "
+            "NAME --scope admin` with the same data directory, or let everybody in by "
+            "SUREFOOT_AUTH=off"
+        )
+
+
+def _listen(settings: Settings) -> socket.socket:
+    try:
+        return listen(settings)
+    except OSError as error:
+        raise StartError(
+            f"port: cannot listen on {settings.host}, port {settings.port} ({error.strerror}); "
+            "name others by --host and --port, or SUREFOOT_HOST and SUREFOOT_PORT"
+        ) from error
+
+
+def _stop_at_end_of_stdin() -> None:
+    sys.stdin.buffer.read()
+    while True:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1.0)

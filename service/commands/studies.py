@@ -1,0 +1,120 @@
+"""Commands of the studies: evaluate, flow-study, alarm-study, centred."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+
+def evaluate(
+    scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
+    seeds: Annotated[int, typer.Option(min=1, help="How many knocks a scene.")] = 12,
+    knocks: Annotated[
+        str, typer.Option(help="Of still, knock, hard, pan, hard-pan; with commas.")
+    ] = "knock",
+    regressors: Annotated[
+        bool, typer.Option(help="Train regressors too: minutes for each scene.")
+    ] = False,
+    processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("evaluation.json"),
+    plots: Annotated[Path | None, typer.Option(help="Folder for PNG plots.")] = None,
+    alarms: Annotated[
+        bool, typer.Option("--alarms", help="Still and delay instead: the drift chart's alarms.")
+    ] = False,
+    tracks_a_day: Annotated[
+        float, typer.Option(min=1, help="With --alarms: how many people a camera sees.")
+    ] = 200.0,
+    alarms_a_year: Annotated[
+        float, typer.Option(min=0.001, help="With --alarms: false ones allowed.")
+    ] = 1.0,
+) -> None:
+    """Knock the cameras of recorded scenes and measure every estimator: the protocol."""
+    from models.errors import CalibrationError
+    from service.studies.alarms import AlarmPlan, run_scene_alarms
+    from service.studies.protocol import run_protocol
+
+    try:
+        if alarms:
+            plan = AlarmPlan(
+                alarms_a_year=alarms_a_year,
+                tracks_a_day=tracks_a_day,
+                reference_tracks=0,
+                days=365,
+            )
+            run_scene_alarms(scenes, seeds=seeds, plan=plan, processes=processes, output=output)
+            return
+        run_protocol(
+            scenes,
+            seeds=seeds,
+            knocks=knocks.split(","),
+            regressors=regressors,
+            processes=processes,
+            output=output,
+            plots=plots,
+        )
+    except CalibrationError as error:
+        Console(stderr=True).print(f"[red]evaluate failed:[/] {error}")
+        raise typer.Exit(1) from error
+
+
+def flow_study(
+    sites: Annotated[int, typer.Option(min=1, help="How many simulated sites.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
+    processes: Annotated[int, typer.Option(min=1, help="Sites at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("flow-study.json"),
+) -> None:
+    """Simulated sites: how well a flow map tells a knock, and what a new path does to a pose."""
+    from service.studies.flow import run_flow_study
+
+    run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
+
+
+def alarm_study(
+    sites: Annotated[int, typer.Option(min=1, help="How many simulated cameras.")] = 60,
+    days: Annotated[int, typer.Option(min=7, help="How long each lives.")] = 365,
+    tracks_a_day: Annotated[float, typer.Option(min=1, help="People it sees.")] = 60.0,
+    reference_tracks: Annotated[int, typer.Option(min=20, help="Of its reference.")] = 200,
+    alarms_a_year: Annotated[float, typer.Option(min=0.001, help="False ones allowed.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
+    processes: Annotated[int, typer.Option(min=1, help="Cameras at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("alarm-study.json"),
+) -> None:
+    """Simulated camera-years of people's habits: false alarms, and tracks until true ones."""
+    from service.studies.alarms import AlarmPlan, run_alarm_study
+
+    plan = AlarmPlan(
+        alarms_a_year=alarms_a_year,
+        tracks_a_day=tracks_a_day,
+        reference_tracks=reference_tracks,
+        days=days,
+    )
+    run_alarm_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
+
+
+def centred(
+    scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
+    recipe: Annotated[str, typer.Option(help="Recipe: default or paper.")] = "default",
+    seeds: Annotated[str, typer.Option(help="Seeds, with commas.")] = "0",
+    speeds: Annotated[str, typer.Option(help="Training speeds in m/s, with commas.")] = "1.4",
+    epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
+    processes: Annotated[int, typer.Option(min=1, help="Trainings at once, a core each.")] = 1,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("centred.json"),
+    plot: Annotated[Path | None, typer.Option(help="PNG of errors over training speed.")] = None,
+) -> None:
+    """The paper's own experiment: train around each scene's true pose, average, print errors."""
+    from service.studies.centred import run_centred
+
+    run_centred(
+        scenes,
+        recipe=recipe,
+        seeds=[int(seed) for seed in seeds.split(",")],
+        speeds_mps=[float(speed) for speed in speeds.split(",")],
+        epochs=epochs,
+        processes=processes,
+        output=output,
+        plot=plot,
+    )
+
+
+STUDIES = (evaluate, flow_study, alarm_study, centred)

@@ -1,0 +1,138 @@
+"""The worker process: runs the engine's jobs until it is told to stop, or should start anew."""
+
+import fcntl
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.errors import OverloadedError
+from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
+from service.jobs import engine
+from service.jobs.context import JobContext
+from service.jobs.in_hand import UPKEEP, InHand
+from service.jobs.pulse import BEAT_S, start_pulse
+from service.jobs.upkeep.housekeeping import follow_clock_since_last_run
+from service.jobs.upkeep.rounds import start_rounds
+from service.process import exits
+from service.process.memory import give_back, resident_mb, settle_allocator
+from service.process.niceness import yield_to_others
+from service.process.workforce import Watch, heartbeat, register_worker
+from service.settings import Settings
+from service.store.sqlite.database import Store
+
+log = logging.getLogger("surefoot.worker")
+
+_TRIM_EVERY_S = 30.0
+# A training in hand would start over: the ceiling waits for its end, up to here.
+_CEILING_IN_TRAINING = 1.5
+
+
+class WorkerRunningError(RuntimeError):
+    """Another process works under this name; two would run each other's jobs."""
+
+
+def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
+    """Run jobs until SIGTERM or SIGINT, or until stdin ends if that is to be followed.
+
+    The name must be stable: the engine finds a worker's unfinished jobs by it.
+
+    Raises:
+        WorkerRunningError: a worker of this name is running already.
+    """
+    lock = (settings.data_dir / f"worker-{name}.lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise WorkerRunningError(f"name: worker {name!r} is running already") from error
+    settle_allocator()
+    yield_to_others(settings.worker_nice)
+    store = Store(settings)
+    context = JobContext(
+        settings=settings,
+        store=store,
+        queue=JobQueue(store.engine),
+        in_hand=InHand(limits_s=_limits_s(settings)),
+    )
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: context.stopping.set())
+    if follow_stdin:
+        threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
+    start_pulse(context, tells=follow_stdin)
+    follow_clock_since_last_run(context)
+    with store.write() as session:
+        register_worker(session, name, os.getpid())
+    engine.launch(context, name)
+    start_rounds(context)
+    log.info("worker_started", extra={"worker": name, "pid": os.getpid()})
+    status = _mind(context, name)
+    log.info("worker_stopping", extra={"worker": name})
+    if status == 0:
+        engine.stop(0.0).join(BEAT_S)
+    # A training in hand is parked, not ended (see jobs/train.py); its thread is not waited for.
+    logging.shutdown()
+    os._exit(status)
+
+
+def _mind(context: JobContext, name: str) -> int:
+    """Beat, take over from lost workers, keep below the ceiling; returns the exit status."""
+    watch, settings = Watch(), context.settings
+    trimmed_s, draining = time.monotonic(), None
+    while not context.stopping.wait(BEAT_S):
+        try:
+            with context.store.write() as session:
+                alive = heartbeat(session, name, os.getpid())
+                lost = watch.take_lost(session, settings.worker_lost_s) if alive else []
+            if not alive:
+                log.error("worker_given_up", extra={"worker": name})
+                return exits.GIVEN_UP
+            if lost and draining is None:
+                engine.take_over(lost)
+        except (
+            SQLAlchemyError,
+            OverloadedError,
+        ) as error:  # a full disk, say: the store's trouble, not ours
+            log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
+        if draining is not None:
+            # A training beyond its own ceiling is not waited for: it would be minutes.
+            if not draining.is_alive() or not context.in_hand.of_kind(ESTIMATE_JOB, DELIVER_JOB):
+                return exits.FULL
+            continue
+        if time.monotonic() - trimmed_s > _TRIM_EVERY_S:
+            give_back()
+            trimmed_s = time.monotonic()
+        if _is_full(context):
+            fields = {"resident_mb": round(resident_mb()), "limit_mb": settings.worker_max_mb}
+            log.warning("worker_full", extra={"worker": name, **fields})
+            draining = engine.stop(settings.estimate_limit_s)
+    return 0
+
+
+def _is_full(context: JobContext) -> bool:
+    """Whether a worker has grown beyond its ceiling, after all that is free was given back."""
+    limit_mb: float = context.settings.worker_max_mb
+    if context.in_hand.of_kind(TRAIN_JOB):
+        limit_mb *= _CEILING_IN_TRAINING
+    if resident_mb() <= limit_mb:
+        return False
+    give_back()
+    return resident_mb() > limit_mb
+
+
+def _limits_s(settings: Settings) -> dict[str, float]:
+    """How long a task of each kind may take; trainings mind their time themselves."""
+    return {
+        ESTIMATE_JOB: settings.estimate_limit_s,
+        DELIVER_JOB: settings.delivery_limit_s,
+        UPKEEP: settings.upkeep_limit_s,
+    }
+
+
+def _stop_at_end_of_stdin(context: JobContext) -> None:
+    """`serve` holds the other end: when it dies in whatever way, its workers end too."""
+    sys.stdin.buffer.read()
+    context.stopping.set()

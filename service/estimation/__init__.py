@@ -1,0 +1,1 @@
+"""Estimates: what goes into them, learning and growing references, and what is stored."""

@@ -1,0 +1,147 @@
+"""Learn a camera's reference once its tracks are there: a job's work, seconds of a core."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+
+from sqlalchemy.orm import Session
+
+from models.errors import TooFewTrajectoriesError
+from models.estimation.joint.packing import reference_to_bytes
+from models.estimation.joint.site import SiteReference
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.reasons import TracksCode
+from models.recalibration import learn_site, observe
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Trajectory
+from service.access.activity import note
+from service.alerting.alerts import open_alert
+from service.estimation.evidence import walk_of
+from service.estimation.paths import LearnedPaths, paths_of
+from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.reasons import some
+from service.settings import Settings
+from service.store import cameras, maintenance, references
+from service.store.packing import intrinsics_of, pose_of_prior
+from service.store.tables.references import FlowMapRecord
+from service.store.tracks import windows
+from service.windows.attendance import attendance_of
+from service.windows.references import wanted_tracks
+from service.windows.unpacked import Unpacked
+
+# What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
+_DOUBT_KINDS: dict[StrEnum, AlertKind] = {
+    TracksCode.SPEED_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.STATURE_UNUSUAL: AlertKind.CLOCK,
+    TracksCode.PRIOR_POSE_DOUBTED: AlertKind.DRIFT,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferencePeriod:
+    """The tracks of a reference, in the order of their ends, and what else it is learned of."""
+
+    reference_id: int
+    intrinsics: Intrinsics
+    prior: CameraPose
+    walk: WalkConfig
+    trajectories: tuple[Trajectory, ...]
+    to_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedReference:
+    """What a reference has come to; `paths` are None where too few people walk."""
+
+    site: SiteReference
+    paths: LearnedPaths | None
+
+
+def load_reference_period(
+    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+) -> ReferencePeriod | None:
+    """The tracks to learn a camera's reference of; None as long as there are not enough."""
+    unpacked = unpacked or Unpacked()
+    camera = cameras.find(session, camera_id)
+    reference = references.newest_if_any(session, camera_id)
+    if camera is None or reference is None or reference.ready_at is not None:
+        return None
+    now = datetime.now(UTC)
+    if maintenance.under_way(session, camera_id, now) is not None:
+        return None  # what it doubts could not be told now
+    wanted = wanted_tracks(reference, settings)
+    attended = attendance_of(session, camera_id, now)
+    records = windows.first(session, camera_id, reference.from_s, wanted, without=attended.spans)
+    if len(records) < wanted:
+        return None
+    intrinsics = intrinsics_of(camera)
+    return ReferencePeriod(
+        reference_id=reference.id,
+        intrinsics=intrinsics,
+        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        walk=walk_of(camera),
+        trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
+        to_s=records[-1].ended_s,
+    )
+
+
+def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
+    """What is usual at the site; None where too few of the tracks walk."""
+    observed = observe(period.trajectories, period.intrinsics)
+    try:
+        site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
+    except TooFewTrajectoriesError:
+        return None
+    return LearnedReference(site=site.speeds, paths=paths_of(site))
+
+
+def save_reference(
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    period: ReferencePeriod,
+    learned: LearnedReference | None,
+) -> None:
+    """Make a learned reference the one that counts, unless another has begun meanwhile.
+
+    Where too few of the tracks walk, as many again are waited for.
+    """
+    record = references.newest_if_any(session, camera_id)
+    if record is None or record.id != period.reference_id or record.ready_at is not None:
+        return
+    if learned is None:
+        record.wanted += max(record.wanted, 1)
+        return
+    site = learned.site
+    record.to_s = period.to_s
+    record.tracks = len(period.trajectories)
+    record.data = reference_to_bytes(site)
+    record.walking_speed_mps = site.walking_speed_mps
+    record.doubts = some(site.doubt)
+    record.ready_at = datetime.now(UTC)
+    details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
+    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
+    session.add(
+        FlowMapRecord(
+            reference_id=record.id,
+            data=None if learned.paths is None else learned.paths.flow,
+            chart=None if learned.paths is None else learned.paths.chart,
+            tracks=record.tracks,
+            weight=float(record.tracks),
+            to_s=period.to_s,
+            learned_at=record.ready_at,
+        )
+    )
+    if site.doubt is not None:
+        open_alert(
+            session,
+            settings,
+            camera_id,
+            _DOUBT_KINDS[site.doubt.code],
+            Severity.WARNING,
+            drift={},
+            changed_at=None,
+            reasons=(site.doubt,),
+            source=AlertSource.REFERENCE,
+        )

@@ -1,0 +1,1 @@
+"""What stands around the routes: connections, limits, access, errors, dependencies."""

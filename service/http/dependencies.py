@@ -1,0 +1,107 @@
+"""What routes are given: the application's state, sessions and bodies."""
+
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import anyio
+from fastapi import Depends, Header, Request
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller
+from service.cameras.quota import Quota
+from service.errors import PreconditionRequiredError
+from service.http.instruments import Instruments
+from service.job_queue import JobQueue
+from service.settings import Settings
+from service.store.operation.actor import Actor, set_actor
+from service.store.sqlite.database import Store
+from service.store.sqlite.turns import Turns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppState:
+    """What one application holds from start to stop.
+
+    Event streams look for news by `stream_polls`; large bodies are read in `large_bodies`' turns.
+    """
+
+    settings: Settings
+    store: Store
+    queue: JobQueue
+    quota: Quota
+    stream_polls: anyio.CapacityLimiter
+    instruments: Instruments = field(default_factory=Instruments)
+    large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
+    stopping: threading.Event = field(default_factory=threading.Event)
+
+
+async def get_state(request: Request) -> AppState:
+    """The application's state; a coroutine, since anything else would be given a thread."""
+    state: AppState = request.state.app
+    return state
+
+
+StateDep = Annotated[AppState, Depends(get_state)]
+
+
+def read_session(state: StateDep) -> Iterator[Session]:
+    """A session that only reads."""
+    with state.store.read() as session:
+        yield session
+
+
+def get_caller(request: Request) -> Caller | None:
+    """Who asks; None where access is off."""
+    caller: Caller | None = getattr(request.state, "caller", None)
+    return caller
+
+
+CallerDep = Annotated[Caller | None, Depends(get_caller)]
+
+
+def get_actor(caller: CallerDep) -> Actor | None:
+    """In whose name an act is kept, whatever name its body says."""
+    return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
+
+
+ActorDep = Annotated[Actor | None, Depends(get_actor)]
+
+
+def name_of(actor: Actor | None, said: str | None = None) -> str | None:
+    """Who acts: the person who is known; where access is off, whoever the body says."""
+    return said if actor is None else actor.name
+
+
+def write_session(state: StateDep, actor: ActorDep) -> Iterator[Session]:
+    """A session that commits before the answer is sent, or not at all."""
+    with state.store.write() as session:
+        set_actor(session, actor)
+        yield session
+
+
+ReadDep = Annotated[Session, Depends(read_session, scope="function")]
+WriteDep = Annotated[Session, Depends(write_session, scope="function")]
+
+
+async def whole_body(request: Request) -> bytes:
+    """The request's body; how large it may be was seen to before (`bodies.py`)."""
+    return await request.body()
+
+
+BodyDep = Annotated[bytes, Depends(whole_body)]
+
+
+async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
+    """The version that a change is meant for.
+
+    Raises:
+        PreconditionRequiredError: the header is missing.
+    """
+    if if_match is None:
+        raise PreconditionRequiredError("If-Match: the ETag of the camera as read is needed")
+    return if_match
+
+
+EtagDep = Annotated[str, Depends(required_etag)]

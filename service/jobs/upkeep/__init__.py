@@ -1,0 +1,1 @@
+"""The periodic work: what should be under way, what may be forgotten."""

@@ -1,0 +1,76 @@
+"""The rounds of the upkeep that come often: sweep twice a second, reconcile every few."""
+
+import logging
+import time
+from datetime import timedelta
+
+from sqlalchemy.orm import Session
+
+from service.alerting.staleness import StaleWatch
+from service.delivery import deliveries
+from service.jobs.context import JobContext
+from service.jobs.upkeep import reconciliation
+from service.process.workforce import take_setback
+
+log = logging.getLogger("surefoot.jobs")
+_JUMP_S = 2.0
+
+
+class ClockWatch:
+    """Sees that the clock was set back, and has what waits for a time wait no longer for it."""
+
+    def __init__(self) -> None:
+        self._ahead_s = time.time() - time.monotonic()
+
+    def look(self, context: JobContext) -> None:
+        """Compare the clock with the monotonic one, that nobody sets."""
+        ahead_s = time.time() - time.monotonic()
+        back_s, self._ahead_s = self._ahead_s - ahead_s, ahead_s
+        if back_s >= _JUMP_S:
+            with context.store.write() as session:
+                _follow(session, timedelta(seconds=back_s))
+
+
+def follow_clock_since_last_run(context: JobContext) -> None:
+    """The same of a clock that was set back while no worker watched; before a worker registers."""
+    with context.store.write() as session:
+        back = take_setback(session)
+        if back.total_seconds() >= _JUMP_S:
+            _follow(session, back)
+
+
+def _follow(session: Session, back: timedelta) -> None:
+    moved = deliveries.follow_clock(session, back)
+    log.warning("clock_set_back", extra={"by_s": round(back.total_seconds()), "deliveries": moved})
+
+
+def run_sweep(context: JobContext) -> None:
+    """Queue a look at cameras that were posted to while they were looked at, or rested."""
+    with context.store.read() as session:
+        overlooked = reconciliation.overlooked(session, context.queue)
+    if overlooked:
+        with context.store.write() as session:
+            reconciliation.queue_overlooked(session, context.queue, overlooked)
+
+
+def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
+    """Enqueue what the store says should be under way; a lost nudge costs seconds."""
+    with context.store.read() as session:
+        ids = reconciliation.camera_ids(session)
+        webhook_ids = deliveries.awaited(session, context.settings)
+    for webhook_id in webhook_ids:
+        with context.store.write() as session:
+            deliveries.reconcile_webhook(session, context.queue, webhook_id)
+    for camera_id in ids:
+        # One transaction a camera, so that posts never wait long for the write lock.
+        with context.store.write() as session:
+            found = reconciliation.reconcile_camera(
+                session, context.queue, context.settings, camera_id
+            )
+        for reason in found:
+            log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
+    with context.store.write() as session:
+        reconciliation.reconcile_alerts(session)
+        changed = stale.watch(session, context.settings)
+    for camera_id, change in changed.items():
+        log.warning("stale", extra={"camera_id": camera_id, "alert": change})

@@ -1,0 +1,120 @@
+"""Level-triggered upkeep: what should be under way."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.alerting.alerts import end_empty_groups
+from service.alerting.presence import watch_presence
+from service.alerting.silence import end_silences
+from service.cameras.maintenance import note_ends
+from service.cameras.sources import watch_sources
+from service.job_queue import JobQueue
+from service.kinds import TrainingState
+from service.settings import Settings
+from service.store import cameras, references, trainings
+from service.store.tables.cameras import CameraRecord
+from service.store.tracks import predictions, tracks
+from service.training.lost_trainings import requeue_lost
+from service.training.trainings import camera_step_s, queue_training
+from service.windows.looking import may_look
+from service.windows.references import window_of
+from service.windows.requests import request_estimate
+
+# A model reads tracks at another step than its own, but less well the farther they are apart.
+_STEP_RATIO = 1.3
+
+
+def reconcile_camera(
+    session: Session, queue: JobQueue, settings: Settings, camera_id: str
+) -> list[str]:
+    """Enqueue what the store says should be under way for a camera; says what it found."""
+    camera = cameras.find(session, camera_id)
+    if camera is None:
+        return []
+    found = []
+    reason = _why_train(session, camera)
+    if reason is not None:
+        queue_training(session, queue, settings, camera_id)
+        found.append(reason)
+    if requeue_lost(session, queue, camera_id):
+        found.append("training without a job")
+    if camera.estimate_due_at is None and _is_behind(session, settings, camera):
+        request_estimate(session, queue, camera_id)
+        found.append("tracks that nothing has looked at")
+    source = watch_sources(session, queue, settings, camera_id, datetime.now(UTC))
+    if source is not None:
+        found.append(source)
+    if note_ends(session, camera_id, datetime.now(UTC)):
+        found.append("maintenance that has come to its end")
+    presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
+    if presence is not None:
+        found.append(presence)
+    return found
+
+
+def overlooked(session: Session, queue: JobQueue) -> list[str]:
+    """Cameras that are due and may be looked at, without a job that waits or runs.
+
+    They were posted to while they were looked at or rested, or the engine has lost their job.
+    """
+    now = datetime.now(UTC)
+    due = [camera.id for camera in cameras.due(session) if may_look(camera, now)]
+    if not due:
+        return []
+    under_way = queue.cameras_under_way(session)
+    return [camera_id for camera_id in due if camera_id not in under_way]
+
+
+def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
+    """Queue a look at each of some cameras; those first that have been due for longest."""
+    for camera_id in camera_ids:
+        queue.enqueue_estimate(session, camera_id)
+
+
+def reconcile_alerts(session: Session) -> None:
+    """End silences that have come to their time, and groups whose cameras are gone."""
+    end_silences(session)
+    end_empty_groups(session)
+
+
+def camera_ids(session: Session) -> Sequence[str]:
+    """The ids of all cameras."""
+    return [camera.id for camera in cameras.every(session)]
+
+
+def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:
+    """Whether there are tracks that no estimate job, or not the model in use, has looked at."""
+    newest_pk = tracks.newest_pk(session, camera.id)
+    if newest_pk is None:
+        return False
+    if camera.looked_at_pk is None or camera.looked_at_pk < newest_pk:
+        return True
+    model = trainings.newest_model(session, camera.id)
+    if model is None:
+        return False
+    bounds = window_of(session, references.newest(session, camera.id), settings)
+    return bool(predictions.without_prediction(session, bounds, model.id, 1))
+
+
+def _why_train(session: Session, camera: CameraRecord) -> str | None:
+    if trainings.unfinished(session, camera.id):
+        return None
+    prior = cameras.prior_pose(session, camera.id)
+    newest = trainings.of_camera(session, camera.id, 1)
+    if (
+        newest
+        and newest[0].prior_pose_id == prior.id
+        and newest[0].state in (TrainingState.FAILED, TrainingState.CANCELLED)
+    ):
+        return None  # trying the same again needs a person, or another prior pose
+    model = trainings.newest_model(session, camera.id)
+    if model is None:
+        return "camera without a model"
+    if model.prior_pose_id != prior.id:
+        return "model older than the prior pose"
+    ratio = camera_step_s(session, camera.id) / model.step_s
+    if not 1 / _STEP_RATIO < ratio < _STEP_RATIO:
+        return "model of another sampling step than the tracks offer"
+    return None

@@ -1,0 +1,1 @@
+"""How our processes behave, start, live and end."""

@@ -1,0 +1,1 @@
+"""Bodies of cameras: their geometry, poses, tracks, and what is done to them."""

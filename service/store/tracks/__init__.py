@@ -1,0 +1,1 @@
+"""Statements on tracks: which of them count, windows of them, predictions."""

@@ -1,0 +1,52 @@
+"""Statements on what models say of tracks."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.orm import Session
+
+from service.store.tables.tracks import PredictionRecord, TrackRecord
+from service.store.tracks.windows import WindowBounds, window_ids
+
+
+def without_prediction(
+    session: Session, bounds: WindowBounds, model_id: str, limit: int
+) -> Sequence[TrackRecord]:
+    """Tracks of the window that the model has not looked at, newest first."""
+    return session.scalars(
+        select(TrackRecord)
+        .outerjoin(
+            PredictionRecord,
+            (PredictionRecord.track_pk == TrackRecord.id) & (PredictionRecord.model_id == model_id),
+        )
+        .where(
+            TrackRecord.id.in_(window_ids(session, bounds)),
+            PredictionRecord.track_pk.is_(None),
+        )
+        .order_by(TrackRecord.ended_s.desc())
+        .limit(limit)
+    ).all()
+
+
+def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
+    """Insert predictions; a second run of the same job changes nothing."""
+    if rows:
+        session.execute(insert(PredictionRecord).on_conflict_do_nothing(), rows)
+
+
+def predictions(
+    session: Session, model_id: str, track_pks: Sequence[int]
+) -> Sequence[PredictionRecord]:
+    """What the model says of some tracks, newest first, of those that gave it something to say."""
+    return session.scalars(
+        select(PredictionRecord)
+        .join(TrackRecord, PredictionRecord.track_pk == TrackRecord.id)
+        .where(
+            PredictionRecord.model_id == model_id,
+            PredictionRecord.windows > 0,
+            PredictionRecord.track_pk.in_(track_pks),
+        )
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+    ).all()

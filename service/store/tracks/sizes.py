@@ -1,0 +1,27 @@
+"""Statements on how much space tracks take."""
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session
+
+from service.store.tables.tracks import TrackRecord
+from service.store.tracks.counting import of_counting_source
+
+
+def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int) -> int:
+    """Delete up to `limit` tracks of a camera, the first that came, beyond so many bytes; how many.
+
+    Bytes are those of points and boxes, as `tracks.stored_bytes` counts them; the source that
+    counts has as many as all others together.
+    """
+    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    together = (
+        func.sum(size)
+        .over(partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc())
+        .label("together")
+    )
+    sized = select(TrackRecord.id, together).where(TrackRecord.camera_id == camera_id).subquery()
+    surplus = (
+        select(sized.c.id).where(sized.c.together > most_bytes).order_by(sized.c.id).limit(limit)
+    )
+    result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(surplus)))
+    return int(result.rowcount)  # type: ignore[attr-defined]

@@ -1,0 +1,56 @@
+"""Statements on the sources of a camera's tracks."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session
+
+from service.store.tables.tracks import SourceRecord, TrackRecord
+from service.store.tracks.counting import Spans, outside
+
+
+def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:
+    """A source of a camera, or None."""
+    return session.get(SourceRecord, (camera_id, name))
+
+
+def of_camera(session: Session, camera_id: str) -> Sequence[SourceRecord]:
+    """The sources of a camera, the first to post first."""
+    query = select(SourceRecord).where(SourceRecord.camera_id == camera_id)
+    return session.scalars(query.order_by(SourceRecord.first_seen_at, SourceRecord.name)).all()
+
+
+def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:
+    """When the newest track of a source ended."""
+    return session.scalar(
+        select(func.max(TrackRecord.ended_s)).where(
+            TrackRecord.camera_id == camera_id, TrackRecord.source == name
+        )
+    )
+
+
+def count_from(
+    session: Session, camera_id: str, name: str, started_from_s: float | None, without: Spans
+) -> int:
+    """How many tracks of a source started from a time on and were not seen at others."""
+    query = select(func.count()).where(
+        TrackRecord.camera_id == camera_id, TrackRecord.source == name, *outside(without)
+    )
+    if started_from_s is not None:
+        query = query.where(TrackRecord.started_s >= started_from_s)
+    return session.scalar(query) or 0
+
+
+def has_tracks(session: Session, camera_id: str, name: str) -> bool:
+    """Whether tracks of a source are stored."""
+    return newest_end_s(session, camera_id, name) is not None
+
+
+def forget(session: Session, record: SourceRecord) -> None:
+    """Delete a source with its tracks."""
+    session.execute(
+        delete(TrackRecord).where(
+            TrackRecord.camera_id == record.camera_id, TrackRecord.source == record.name
+        )
+    )
+    session.delete(record)

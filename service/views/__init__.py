@@ -1,0 +1,1 @@
+"""What pages, lists and metrics show of many things at once."""

@@ -1,0 +1,125 @@
+"""What operators of the service itself ask: is it ready, what happened."""
+
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
+
+from service.errors import OverloadedError
+from service.settings import Settings
+from service.store import cameras
+from service.store.operation import events, probes, workers
+from service.store.sqlite.database import Store
+from service.store.sqlite.failures import failure_of
+from service.store.tables.operation import EventRecord
+from service.store.tracks import unseen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Readiness:
+    """Whether the service can do its work, and what is wrong with it.
+
+    A camera whose looks fail is a problem that is named, but does not make the service unready:
+    restarting it, or sending posts elsewhere, would harm all the others. Where most of them fail,
+    it is not a camera's fault. `queue_lag_s` is the age of the oldest track that nothing has
+    looked at.
+    """
+
+    store_writable: bool
+    worker_alive: bool
+    worker_silent_s: float | None
+    queue_lag_s: float
+    failing_cameras: int
+    ready: bool
+    problems: tuple[str, ...]
+
+
+def check_readiness(store: Store, settings: Settings) -> Readiness:
+    """Write something; look at the disk, the workers, the oldest unseen track, failing looks."""
+    now = datetime.now(UTC)
+    try:
+        with store.write() as session:
+            probes.write(session, now)
+        with store.read() as session:
+            heartbeat = workers.newest_heartbeat(session)
+            troubles = workers.troubles(session)
+            failing = {camera.id: camera for camera in cameras.failing(session)}
+            count = cameras.count(session)
+            came = {camera_id: at for camera_id, (_, at) in unseen.since(session).items()}
+    except (SQLAlchemyError, OverloadedError) as error:
+        known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
+        said = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
+        return Readiness(
+            store_writable=False,
+            worker_alive=False,
+            worker_silent_s=None,
+            queue_lag_s=0.0,
+            failing_cameras=0,
+            ready=False,
+            problems=(said if said.startswith("store: ") else f"store: {said}",),
+        )
+    # A heartbeat of the future is one of before the clock was set back: no sign of life either.
+    silent_s = None if heartbeat is None else abs((now - heartbeat).total_seconds())
+    alive = silent_s is not None and silent_s < settings.worker_lost_s
+    # Who fails is named below, and rests between its tries: it does not hold up the queue.
+    waits_s = _oldest_s([at for camera, at in came.items() if camera not in failing], now)
+    problems = []
+    free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
+    full = free_mb < _FULL_MB
+    if full:
+        problems.append(f"store: the disk is full, {free_mb:.1f} MiB are free")
+    elif free_mb < settings.min_free_mb:
+        problems.append(f"disk: {free_mb:.0f} MiB are free; {settings.min_free_mb:g} are the least")
+    if not alive:
+        heard = "none was ever heard of" if silent_s is None else f"silent for {silent_s:.0f} s"
+        problems.append(f"worker: {heard}; up to {settings.worker_lost_s:g} s are waited for")
+    if waits_s > _LONGEST_LAG_S:
+        problems.append(
+            f"queue: tracks wait for {waits_s:.0f} s; {_LONGEST_LAG_S:g} s are the limit"
+        )
+    if 2 * len(failing) > count:
+        problems.append(f"estimates: they fail for {len(failing)} of {count} cameras")
+    named = [f"worker: {name} {trouble}" for name, trouble in troubles.items()]
+    if failing:
+        first = next(iter(failing.values()))
+        named.append(
+            f"cameras: the estimates of {len(failing)} fail ({_names(failing)}); of {first.id} "
+            f"with {first.estimate_error}"
+        )
+    return Readiness(
+        store_writable=not full,
+        worker_alive=alive,
+        worker_silent_s=silent_s,
+        queue_lag_s=_oldest_s(list(came.values()), now),
+        failing_cameras=len(failing),
+        ready=not problems,
+        problems=(*problems, *named),
+    )
+
+
+_LONGEST_LAG_S = 60.0
+_FULL_MB = 1.0  # a small write, as ours is, may still find room in the file that is there
+_NAMED_CAMERAS = 5
+
+
+def _oldest_s(received: Sequence[datetime], now: datetime) -> float:
+    return max(((now - at).total_seconds() for at in received), default=0.0)
+
+
+def _names(ids: Iterable[str]) -> str:
+    names = list(ids)
+    rest = len(names) - _NAMED_CAMERAS
+    return ", ".join(names[:_NAMED_CAMERAS]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def newest_event_id(session: Session) -> int:
+    """The id of the newest event."""
+    return events.newest_id(session)
+
+
+def events_after(session: Session, event_id: int, limit: int) -> Sequence[EventRecord]:
+    """Events after one, oldest first."""
+    return events.after(session, event_id, limit)

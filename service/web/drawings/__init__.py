@@ -1,0 +1,1 @@
+"""Drawings of pages: SVG out of geometry."""

@@ -1,0 +1,33 @@
+"""The tracks that a refresh has unpacked: each once, though several of its parts look at it."""
+
+from datetime import datetime
+
+from models.geometry.intrinsics import Intrinsics
+from models.trajectory import Trajectory
+from service.store.packing import seen_of, trajectory_of
+from service.store.tables.tracks import TrackRecord
+
+# The store may give a deleted track's number to a new one.
+_Track = tuple[int, datetime]
+
+
+class Unpacked:
+    """What was unpacked so far; to be forgotten with the refresh."""
+
+    def __init__(self) -> None:
+        self._feet: dict[_Track, Trajectory] = {}
+        self._seen: dict[tuple[_Track, Intrinsics], Trajectory] = {}
+
+    def feet(self, record: TrackRecord) -> Trajectory:
+        """The foot points of a stored track."""
+        track = (record.id, record.received_at)
+        if track not in self._feet:
+            self._feet[track] = trajectory_of(record)
+        return self._feet[track]
+
+    def seen(self, record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
+        """The foot points of a stored track, and the upper edges of its boxes where it has them."""
+        track = ((record.id, record.received_at), intrinsics)
+        if track not in self._seen:
+            self._seen[track] = seen_of(record, self.feet(record), intrinsics)
+        return self._seen[track]

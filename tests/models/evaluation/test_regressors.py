@@ -1,0 +1,145 @@
+"""The regressors as the protocol calls them, after trainings too short to be good."""
+
+from dataclasses import replace
+from functools import partial
+from math import radians
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from models.estimation.averaged import average_windows, averaged_estimate
+from models.evaluation.protocol import regressors
+from models.evaluation.protocol.cases import KNOCKED, Answer, ProtocolCase, draw_case, judge_answer
+from models.evaluation.protocol.regressors import prepare_regressors
+from models.evaluation.scenes import Scene, SceneTrack
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import array_of
+from models.regression.prediction import predict_windows
+from models.regression.recipe import DEFAULT, TrainingPlan, plan_training
+from models.regression.set_training import SetPlan
+from models.regression.training import train
+from models.simulation.crowds import FlowConfig
+from models.simulation.flows import simulate_sites
+from models.simulation.poses import repeated_pose
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Trajectory, choose_step_s, cut_windows
+
+NAMES = {"averaged", "calibrated", "set"}
+
+
+def tiny_plan(**asked: object) -> TrainingPlan:
+    plan = plan_training(**asked)  # type: ignore[arg-type]
+    return replace(plan, recipe=replace(plan.recipe, random_poses=40, walks_per_pose=2, batch=40))
+
+
+@pytest.fixture
+def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(regressors, "plan_training", tiny_plan)
+    monkeypatch.setattr(
+        regressors, "learn_calibration", partial(regressors.learn_calibration, sites=60)
+    )
+    monkeypatch.setattr(
+        regressors, "SetPlan", partial(SetPlan, sites=24, people=16, fewest_people=6, batch=8)
+    )
+
+
+@pytest.fixture
+def scene(lens: Intrinsics, pose: CameraPose) -> Scene:
+    (walks,) = simulate_sites(
+        lens, [repeated_pose(pose, 1)], 120, FlowConfig(slow_share=(0.0, 0.0)), WalkConfig(),
+        np.random.default_rng(0),
+    )  # fmt: skip
+    tracks = tuple(
+        SceneTrack(
+            track_id=str(number),
+            trajectory=Trajectory(time_s=0.4 * np.arange(length) + number, uv=uv[:length]),
+            person_id=str(number),
+        )
+        for number, (uv, length) in enumerate(zip(walks.uv, walks.lengths, strict=True))
+    )
+    return Scene(scene_id="made", intrinsics=lens, true_pose=pose, frame_rate_hz=2.5, tracks=tracks)
+
+
+def answers(scene: Scene, case: ProtocolCase) -> dict[str, Answer]:
+    estimators = prepare_regressors(scene, seed=0, epochs=1)
+    return {name: estimator(case) for name, estimator in estimators.items()}
+
+
+@pytest.mark.usefixtures("tiny")
+def test_every_estimator_answers_a_case(scene: Scene):
+    case = draw_case(scene, 3, KNOCKED)
+    said = answers(scene, case)
+    assert set(said) == NAMES | {f"{name}_reference" for name in NAMES}
+    for name, answer in said.items():
+        assert 0 < answer.tracks <= len(case.seen)
+        assert np.linalg.eigvalsh(answer.covariance).min() > 0
+        judge_answer(case, name, answer, 0.0)
+
+
+@pytest.mark.usefixtures("tiny")
+def test_the_seed_alone_makes_the_answers(scene: Scene):
+    case = draw_case(scene, 1, KNOCKED)
+    first, again = answers(scene, case), answers(scene, case)
+    for name, answer in first.items():
+        assert_array_equal(answer.values, again[name].values)
+
+
+@pytest.mark.usefixtures("tiny")
+def test_averaged_is_what_the_service_averages(scene: Scene):
+    case = draw_case(scene, 2, KNOCKED)
+    tracks = [track.trajectory for track in scene.tracks]
+    step_s = choose_step_s(tracks)
+    plan = tiny_plan(
+        intrinsics=scene.intrinsics, prior_pose=scene.true_pose, recipe_name=DEFAULT.name,
+        walk=WalkConfig(step_s=step_s), seed=0, epochs=1,
+    )  # fmt: skip
+    network, _ = train(plan)
+    windows = cut_windows(case.seen, scene.intrinsics, step_s)
+    height_m, q = predict_windows(network, windows, plan)
+    estimate = averaged_estimate(average_windows(height_m, q, windows.owner_idx)[1], 0)
+    said = answers(scene, case)["averaged"]
+    expected = array_of(estimate.value)[:3]
+    assert_allclose(said.values, expected, atol=1e-9)
+    sd = np.sqrt(np.diag(said.covariance))
+    assert_allclose(sd[:2], [estimate.sd.tilt_rad, estimate.sd.roll_rad], rtol=0.25)
+
+
+@pytest.mark.usefixtures("tiny")
+def test_only_those_of_the_reference_look_at_it(scene: Scene):
+    case = draw_case(scene, 4, KNOCKED)
+    fewer = replace(case, reference=case.reference[: len(case.reference) // 2])
+    estimators = prepare_regressors(scene, seed=0, epochs=1)
+    for name in NAMES:
+        alone, beside = estimators[name], estimators[f"{name}_reference"]
+        assert_array_equal(alone(case).values, alone(fewer).values)
+        assert np.abs(beside(case).values - beside(fewer).values).max() > 1e-9
+
+
+@pytest.mark.usefixtures("tiny")
+def test_on_its_own_reference_the_set_sees_hardly_a_drift(scene: Scene):
+    # The same tracks before and after: whatever the network makes of them is taken off again.
+    case = draw_case(scene, 5, KNOCKED)
+    still = replace(case, true_pose=case.prior_pose, seen=case.reference)
+    said = prepare_regressors(scene, seed=0, epochs=1)["set_reference"](still)
+    pose = case.prior_pose
+    expected = array_of(pose)[:3]
+    assert_allclose(said.values, expected, atol=radians(1e-3))
+
+
+@pytest.mark.usefixtures("tiny")
+def test_hardly_a_track_is_declared(scene: Scene):
+    case = draw_case(scene, 0, KNOCKED)
+    for answer in answers(scene, replace(case, seen=case.seen[:2])).values():
+        assert answer.weak == ("tilt", "roll", "log_height")
+        assert answer.tracks == 0
+
+
+@pytest.mark.usefixtures("tiny")
+def test_progress_climbs_to_one(scene: Scene):
+    shares: list[float] = []
+    prepare_regressors(scene, seed=0, epochs=2, on_progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert shares[0] < 0.3

@@ -1,0 +1,91 @@
+"""A camera's still image: off unless switched on, made anew, gone with its camera."""
+
+from io import BytesIO
+
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from service.app import create_app
+from service.store import snapshots
+from service.store.sqlite.database import Store
+from tests.conftest import CAMERA
+from tests.service.conftest import problem
+
+URL = "/cameras/corner/snapshot"
+JPEG, PNG = {"Content-Type": "image/jpeg"}, {"Content-Type": "image/png"}
+
+
+def image(width=1280, height=720, form="JPEG", **how):
+    made = BytesIO()
+    Image.new("RGB", (width, height), (90, 120, 80)).save(made, form, **how)
+    return made.getvalue()
+
+
+@pytest.fixture
+def allowed(settings):
+    with TestClient(create_app(settings.model_copy(update={"snapshots": True}))) as client:
+        assert client.post("/cameras", json=CAMERA).status_code == 201
+        yield client
+
+
+def test_no_picture_is_kept_unless_it_is_switched_on(corner):
+    document = problem(corner.put(URL, content=image(), headers=JPEG), 403, "switched_off")
+    assert "SUREFOOT_SNAPSHOTS" in document["detail"]
+    problem(corner.get(URL), 403, "switched_off")
+    problem(corner.delete(URL), 404, "not_found")
+
+
+def test_a_picture_is_kept_without_what_was_beside_it(allowed):
+    exif = Image.Exif()
+    exif[0x010E] = "a place and a name"
+    sent = image(2560, 1440, exif=exif, comment=b"a comment")
+    assert b"a place and a name" in sent
+    body = allowed.put(URL, content=sent, headers=JPEG).json()
+    assert (body["width"], body["height"]) == (1920, 1080)
+    answer = allowed.get(URL)
+    assert answer.headers["content-type"] == "image/jpeg"
+    assert b"a place and a name" not in answer.content
+    assert b"a comment" not in answer.content
+    assert dict(Image.open(BytesIO(answer.content)).getexif()) == {}
+    again = allowed.get(URL, headers={"If-None-Match": answer.headers["ETag"]})
+    assert again.status_code == 304
+
+
+def test_a_png_with_holes_becomes_a_jpeg_and_takes_the_place_of_the_one_before(allowed):
+    allowed.put(URL, content=image(), headers=JPEG).raise_for_status()
+    made = BytesIO()
+    Image.new("RGBA", (640, 360), (0, 0, 0, 0)).save(made, "PNG")
+    allowed.put(URL, content=made.getvalue(), headers=PNG).raise_for_status()
+    kept = Image.open(BytesIO(allowed.get(URL).content))
+    assert (kept.format, kept.size) == ("JPEG", (640, 360))
+
+
+@pytest.mark.parametrize(
+    ("content", "headers", "status", "code"),
+    [
+        (b"", JPEG, 422, "malformed"),
+        (b"\xff\xd8\xff nothing", JPEG, 422, "malformed"),
+        (image()[:-900], JPEG, 422, "malformed"),
+        (image(form="PNG"), JPEG, 422, "malformed"),
+        (image(), {"Content-Type": "image/gif"}, 415, "unsupported_media_type"),
+        (image(), {"Content-Type": ""}, 415, "unsupported_media_type"),
+        (image(720, 1280), JPEG, 422, "malformed"),
+        (b"\xff" * (8 * 1024 * 1024 + 1), JPEG, 413, "too_large"),
+        (image(9000, 5700, form="PNG"), PNG, 413, "too_large"),
+    ],
+)
+def test_what_is_no_picture_of_the_camera_is_refused(allowed, content, headers, status, code):
+    problem(allowed.put(URL, content=content, headers=headers), status, code)
+    problem(allowed.get(URL), 404, "not_found")
+
+
+def test_a_picture_goes_when_it_is_deleted_and_with_its_camera(allowed, settings):
+    allowed.put(URL, content=image(), headers=JPEG).raise_for_status()
+    assert allowed.delete(URL).status_code == 204
+    problem(allowed.get(URL), 404, "not_found")
+    allowed.put(URL, content=image(), headers=JPEG).raise_for_status()
+    allowed.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
+    with Store(settings).read() as session:
+        assert snapshots.find(session, "corner") is None
+    problem(allowed.put(URL, content=image(), headers=JPEG), 404, "not_found")

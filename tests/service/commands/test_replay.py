@@ -1,0 +1,102 @@
+"""Real people: recorded scenes, where they lie beside the project; never copied into it."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from models.evaluation.scenes import load_scene
+from models.evaluation.studies.centred_run import run_averaged
+from service.cli import app
+from tests.conftest import wait_for
+
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}"),
+]
+
+
+def surefoot(*arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "service.cli", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def averaged_of(service):
+    """What the averaged estimator says, while the reference is being learned."""
+    return service.http.get("/cameras/town-centre/pose").json()["estimates"].get("averaged")
+
+
+def test_a_replay_through_http_is_the_offline_evaluation(service):
+    scene = load_scene(SCENES / "town_centre")
+    service.start_again(epochs=3)
+    output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
+    assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
+    served = wait_for(lambda: averaged_of(service), timeout_s=180)
+    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=3)
+    assert served["tracks"] == offline.tracks
+    assert served["height_m"] == pytest.approx(offline.height_m, abs=1e-4)
+    assert served["tilt_deg"] == pytest.approx(offline.tilt_deg, abs=1e-3)
+    assert served["roll_deg"] == pytest.approx(offline.roll_deg, abs=1e-3)
+
+
+def test_every_recorded_camera_can_be_loaded():
+    for folder in sorted(SCENES.iterdir()):
+        if folder.is_dir():
+            scene = load_scene(folder)
+            truth = json.loads((folder / "camera.json").read_text())["true_pose"]
+            assert math.degrees(scene.true_pose.tilt_rad) == pytest.approx(truth["tilt_deg"])
+            assert len(scene.tracks) > 20
+
+
+def test_centred_prints_a_table_and_writes_json_and_a_plot(tmp_path):
+    output, plot = tmp_path / "out.json", tmp_path / "out.png"
+    text = surefoot(
+        "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0,1",
+        "--speeds", "1.4", "--processes", "2", "--output", str(output), "--plot", str(plot),
+    )  # fmt: skip
+    assert "town-centre" in text
+    runs = json.loads(output.read_text())["runs"]
+    assert [run["seed"] for run in runs] == [0, 1]
+    assert plot.stat().st_size > 5000
+
+
+def test_evaluate_knocks_scenes_and_says_how_each_estimator_did(tmp_path):
+    output, plots = tmp_path / "out.json", tmp_path / "plots"
+    scenes = [str(SCENES / name) for name in ("pets2009_s2l1_v001_sort", "meva_g336_school")]
+    text = surefoot(
+        "evaluate", *scenes, "--seeds", "2", "--knocks", "knock,still",
+        "--output", str(output), "--plots", str(plots),
+    )  # fmt: skip
+    outcomes = json.loads(output.read_text())["outcomes"]
+    assert len(outcomes) == 2 * 2 * 2 * 5  # scenes, ranges, seeds, estimators
+    assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
+    assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
+    assert "bar (or declared)" in text  # the bar stands beside the figures
+    for name in (
+        "drift-knock.png",
+        "ground-meva_g336_school.png",
+        "flow-meva_g336_school.png",
+        "flow-tracks.png",
+    ):
+        assert (plots / name).stat().st_size > 5000
+
+
+def test_evaluate_refuses_a_range_it_does_not_know(tmp_path):
+    asked = ["evaluate", str(SCENES / "town_centre"), "--knocks", "soft"]
+    answer = CliRunner().invoke(app, asked)
+    assert answer.exit_code == 1
+    assert "soft" in answer.output

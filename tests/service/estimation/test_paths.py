@@ -1,0 +1,126 @@
+"""What is served where people walk elsewhere than they did: a turned camera, or other paths."""
+
+import math
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+
+from models.drift.chart_packing import chart_from_bytes
+from service.estimation.evidence import compute_finding, load_evidence
+from service.store import flow_maps, references
+from tests.conftest import CAMERA
+from tests.service.street import PRIOR, Street
+
+WANTED = 120
+
+
+@pytest.fixture
+def street(learned):
+    """A street of lanes whose reference and map are learned."""
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
+        street.keep_to_lanes(PRIOR, WANTED)
+        assert street.look()["reference"]["state"] == "ready"
+        return street
+
+    return learned("paths", make)
+
+
+def turned(degrees: float):
+    return replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(degrees))
+
+
+def tracks_of_map(street):
+    with street.context.store.read() as session:
+        return flow_maps.find(session, references.newest(session, "corner").id).tracks
+
+
+def test_the_window_begins_where_the_camera_turned(street):
+    street.keep_to_lanes(PRIOR, 60)
+    assert street.look()["tracks"] == 60
+    street.keep_to_lanes(turned(6), 60)
+    body = street.look()
+    assert 45 <= body["tracks"] <= 72
+    assert body["drift"]["heading_deg"] == pytest.approx(6, abs=1.2)
+    street.keep_to_lanes(turned(6), 30)
+    assert street.look()["tracks"] >= body["tracks"] + 30
+
+
+def test_a_turn_is_an_alert_within_sixty_tracks_that_says_since_when_and_stops_the_map(street):
+    street.keep_to_lanes(PRIOR, 60)
+    assert (street.look()["state"], street.alerts()) == ("ok", [])
+    before_s = street.clock_s
+    street.keep_to_lanes(turned(-6), 60)
+    body = street.look()
+    assert body["state"] == "drifting"
+    assert "if the heading had gone down (drift chart" in body["reason"]
+    (alert,) = street.alerts(state="firing")
+    assert alert["kind"] == "drift"
+    changed_s = datetime.fromisoformat(alert["changed_at"]).timestamp()
+    assert changed_s == pytest.approx(before_s, abs=12 * 5.0)  # a dozen people
+    street.keep_to_lanes(turned(-6), 30)
+    street.look()
+    assert [one["id"] for one in street.alerts()] == [alert["id"]]
+    assert tracks_of_map(street) == WANTED + 60
+
+
+def test_a_still_camera_is_not_suspected_and_its_map_grows(street):
+    street.keep_to_lanes(PRIOR, 60)
+    body = street.look()
+    assert "drift chart" not in body["reason"]
+    assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
+    assert tracks_of_map(street) == WANTED + 60
+
+
+def test_new_paths_leave_the_map_out_and_say_so(street):
+    street.keep_to_lanes(PRIOR, 50)
+    street.cross(PRIOR, 80)
+    body = street.look()
+    assert "the paths have changed: the flow map is left out" in body["reason"]
+    assert "heading_deg" not in body["estimated"]
+    assert body["pose"]["heading_deg"] == pytest.approx(40)
+    assert "registered" not in body["estimates"]
+    assert tracks_of_map(street) == WANTED
+
+
+def test_fewer_allowed_alarms_need_more(street):
+    street.keep_to_lanes(turned(2), 40)
+    levels = []
+    for allowed in (0.01, 1.0, 100.0):
+        settings = street.context.settings.model_copy(update={"false_alarms_per_year": allowed})
+        with street.context.store.read() as session:
+            found = compute_finding(load_evidence(session, settings, "corner"), 0)
+        levels.append(found.reading.level)
+    assert levels[0] > levels[1] > levels[2]
+
+
+def test_what_was_seen_while_somebody_was_at_the_camera_is_no_alarm(street):
+    street.keep_to_lanes(PRIOR, 40)
+    street.look()
+    window = {"from": at(street.clock_s + 1), "to": at(street.clock_s + 60 * 5 + 2), "by": "Ada"}
+    street.http.post("/cameras/corner/maintenance", json=window).raise_for_status()
+    street.keep_to_lanes(turned(8), 60)
+    street.look()
+    street.keep_to_lanes(PRIOR, 40)
+    assert (street.look()["state"], street.alerts()) == ("ok", [])
+    street.keep_to_lanes(turned(8), 60)
+    street.look()
+    assert [alert["kind"] for alert in street.alerts(state="firing")] == ["drift"]
+
+
+def at(time_s):
+    return datetime.fromtimestamp(time_s, UTC).isoformat()
+
+
+def test_a_chart_of_another_release_is_done_without(street):
+    with street.context.store.write() as session:
+        reference = references.newest(session, "corner")
+        flow_maps.find(session, reference.id).chart = b"of another release"
+    street.keep_to_lanes(PRIOR, 60)
+    assert street.look()["state"] == "ok"
+    with street.context.store.read() as session:
+        kept = flow_maps.find(session, references.newest(session, "corner").id)
+    assert chart_from_bytes(kept.chart).parties > 100  # the map has grown, and its chart with it

@@ -1,0 +1,121 @@
+"""MOTChallenge text: counted from 1, and of people alone."""
+
+import numpy as np
+import pytest
+from sqlalchemy import select
+
+from service.formats import mot
+from service.store.packing import unpack
+from service.store.sqlite.database import Store
+from service.store.tables.tracks import TrackRecord
+from tests.service.conftest import problem
+
+T0 = 1_700_000_000.0
+
+
+def send(http, lines, **query):
+    return http.post(
+        "/cameras/corner/tracks",
+        params={"started_at": "2023-11-14T22:13:20Z", **query},
+        content="\n".join(lines),
+        headers={"Content-Type": "text/csv"},
+    )
+
+
+def stored(settings):
+    with Store(settings).read() as session:
+        return list(session.scalars(select(TrackRecord).order_by(TrackRecord.id)))
+
+
+def walk(track_id, rest="1", every=25, count=6):
+    """Lines of a track from frame 1 on, at 25 frames a second."""
+    return [f"{n * every + 1},{track_id},{101 + n},51,40,150,{rest}" for n in range(count)]
+
+
+def test_frames_and_pixels_count_from_1_and_lines_come_in_any_order(corner, settings):
+    rows = [f"{n * 10 + 1},7,101,51,40,{150 + n},1,-1,-1,-1" for n in range(8)]
+    rows += ["5,7,0,0,10,10,0,-1,-1,-1"]  # conf 0: to be ignored
+    answer = send(corner, reversed(rows), frame_rate_hz=10)
+    assert answer.json() == {"accepted": 1, "duplicates": 0, "rejected": [], "left_out": 1}
+    (record,) = stored(settings)
+    points = unpack(record.points, 3)
+    np.testing.assert_allclose(points[:, 0] - T0, np.arange(8))
+    assert points[3].tolist()[1:] == [120.0, 203.0]
+    assert unpack(record.boxes, 4)[3].tolist() == [100.0, 50.0, 140.0, 203.0]
+
+
+@pytest.mark.parametrize(
+    ("person", "car"),
+    [
+        ("0.9,0,-1", "0.9,2,-1"),  # BoxMOT: COCO's numbers
+        ("0.9,0", "0.9,2"),
+        ("1,1,0.86", "1,3,1"),  # MOTChallenge ground truth: 3 is a car, 2 a person on wheels
+        ("1,7,0.5", "1,2,0.5"),
+    ],
+)
+def test_a_car_is_no_person(corner, settings, person, car):
+    answer = send(corner, walk("p", person) + walk("c", car)).json()
+    assert answer == {"accepted": 1, "duplicates": 0, "rejected": [], "left_out": 6}
+    assert [record.track_id for record in stored(settings)] == ["p"]
+
+
+@pytest.mark.parametrize("rest", ["1", "0.7,-1,-1,-1", "1,-1,-1", "1,12.5,3.25,0"])
+def test_lines_without_a_class_are_of_people(corner, settings, rest):
+    assert send(corner, walk("p", rest)).json()["accepted"] == 1
+
+
+def test_a_query_says_which_classes_are_people(corner, settings):
+    lines = walk("a", "0.9,3,0,0") + walk("b", "0.9,4,0,0") + walk("c", "0.9,5,0,0")
+    answer = send(corner, lines, classes="3,5").json()
+    assert (answer["accepted"], answer["left_out"]) == (2, 6)
+    assert [record.track_id for record in stored(settings)] == ["a", "c"]
+    document = problem(send(corner, lines, classes="person"), 422, "malformed")
+    assert document["errors"][0]["pointer"] == "/classes"
+
+
+def test_a_detector_that_changes_its_mind_loses_those_lines_alone(corner, settings):
+    lines = walk("p", "0.9,0,-1", count=9)
+    lines[4] = lines[4].replace("0.9,0", "0.9,1")
+    answer = send(corner, lines).json()
+    assert (answer["accepted"], answer["left_out"]) == (1, 1)
+    assert len(unpack(stored(settings)[0].points, 3)) == 8
+
+
+def test_a_text_of_cars_is_refused_by_their_number(corner, settings):
+    document = problem(send(corner, walk("c", "0.9,2,-1")), 422, "malformed")
+    assert "classes 0 are taken for people, got 6 lines of classes 2" in document["detail"]
+    assert stored(settings) == []
+
+
+def test_malformed_text_costs_only_its_own_track(corner, settings):
+    lines = walk("1") + walk("2")
+    lines[8] = "51,2,oops,50,40,150,1"
+    answer = send(corner, lines).json()
+    assert answer["accepted"] == 1
+    assert answer["rejected"][0]["id"] == "2"
+    assert "line 9" in answer["rejected"][0]["detail"]
+    assert [record.track_id for record in stored(settings)] == ["1"]
+
+
+def test_a_text_of_too_many_lines_is_refused_before_it_is_read(corner, monkeypatch):
+    monkeypatch.setattr(mot, "MAX_LINES", 5)
+    answer = send(corner, walk("7", count=7), frame_rate_hz="25")
+    body = problem(answer, 413, "too_large")
+    assert "at most 5 a request are taken, got 6" in body["detail"]
+
+
+def test_what_is_no_such_text_or_lacks_its_clock(corner):
+    url, headers = "/cameras/corner/tracks", {"Content-Type": "text/csv"}
+    problem(corner.post(url, content="1,1,1,1,1,1,1", headers=headers), 422, "malformed")
+    problem(send(corner, ["a;b;c"]), 422, "malformed")
+    problem(send(corner, ["1,1,2,3"]), 422, "malformed")
+
+
+def test_the_form_to_register_with_reads_it_the_same(http):
+    answer = http.post(
+        "/ui/tracks",
+        params={"width": 1280, "height": 720},
+        content="\n".join(walk("p", "1,1,0.9") + walk("c", "1,3,0.9")),
+    ).json()
+    assert answer["text"] == "1 tracks read; 6 lines are of no person."
+    assert answer["tracks"][0][0] == [0.0, 120.0, 200.0]
