@@ -45,8 +45,8 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     assert done.returncode == 0, done.stdout + done.stderr
     case = draw_case(load_scene(folder), seed, RANGES[knock])
     known, seen = observe(case.reference, case.intrinsics), observe(case.seen, case.intrinsics)
-    seed = service.settings.seed
-    site = learn_site(known, case.intrinsics, case.prior_pose, seed=seed, chart=False)
+    drawn_by = service.settings.seed
+    site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
     stored = flow_from_bytes(flow_to_bytes(site.flow))
     found = estimate_pose(seen, replace(site, flow=stored))
     offline = found.fused
