@@ -4,6 +4,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.estimation.joint.reference import FEWEST_WALKERS
 from models.reasons import Reason, Value
 from service.alerting.presence import silence_of
 from service.cameras.standing import MOVED, Standing
@@ -14,7 +15,7 @@ from service.settings import Settings
 from service.store import maintenance
 from service.store.tables.attendance import MaintenanceRecord
 from service.store.tracks import windows
-from service.windows.references import FEWEST_WALKERS, tracks_so_far, wanted_tracks, window_beside
+from service.windows.references import tracks_so_far, wanted_tracks, window_beside
 
 
 def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reasons:

@@ -18,6 +18,7 @@ from models.estimation.averaged import (
 )
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.packing import reference_from_bytes
+from models.estimation.joint.reference import FEWEST_WALKERS
 from models.flow.fusion import FusedEstimate
 from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
@@ -48,7 +49,7 @@ from service.store.tables.tracks import PredictionRecord, TrackRecord
 from service.store.tables.trainings import ModelRecord
 from service.store.tracks import predictions as stored_predictions
 from service.store.tracks import tracks, windows
-from service.windows.references import FEWEST_WALKERS, made_against, window_of
+from service.windows.references import made_against, window_of
 from service.windows.unpacked import Unpacked
 
 

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from models.errors import CheckpointError
 from models.reasons import Reason
-from models.recalibration import Lack
+from models.recalibration.lacks import Lack, unless_failed
 from service.reasons import ServiceCode
 
 log = logging.getLogger("surefoot.recalibration")
@@ -23,23 +23,21 @@ class Lacks:
 
     def unless_failed(self, what: str, make: Callable[[], _Made]) -> _Made | None:
         """What is made; None if it failed. `what` is of the log's event, `flow_map` say."""
-        try:
-            return make()
-        except CheckpointError as error:
-            fields = {"camera_id": self._camera_id, "why": str(error)}
-            log.warning(f"{what}_unreadable", extra=fields)
-            self.add(what, "cannot be read")
-        except Exception as error:
-            log.exception(f"{what}_failed", extra={"camera_id": self._camera_id})
-            self.add(what, repr(error))
-        return None
+        found: list[Lack] = []
+        made = unless_failed(found, what, make)
+        self.take(found)
+        return made
 
     def take(self, found: Sequence[Lack]) -> None:
-        """Say what failed beside a pose."""
+        """Log and say what failed."""
         for lack in found:
             fields = {"camera_id": self._camera_id}
-            log.error(f"{lack.part}_failed", exc_info=lack.error, extra=fields)
-            self.add(lack.part, repr(lack.error))
+            if isinstance(lack.error, CheckpointError):
+                log.warning(f"{lack.part}_unreadable", extra=fields | {"why": str(lack.error)})
+                self.add(lack.part, "cannot be read")
+            else:
+                log.error(f"{lack.part}_failed", exc_info=lack.error, extra=fields)
+                self.add(lack.part, repr(lack.error))
 
     def add(self, what: str, why: str) -> None:
         """Say that something is missing, and why."""

@@ -14,9 +14,6 @@ from service.store.tracks import tracks, windows
 from service.store.tracks.windows import WindowBounds
 from service.windows.attendance import Attendance, attendance_of
 
-# Fewer people than that who walk for a few seconds make no estimate, and no reference.
-FEWEST_WALKERS = 5
-
 
 def begin_reference(
     session: Session,

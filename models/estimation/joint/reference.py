@@ -25,6 +25,7 @@ from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 
+# Fewer who walk for a few seconds make no estimate, and no reference.
 FEWEST_WALKERS = 5
 _STATURE_M = 1.7  # people, give or take 4 %; boxes are drawn a little loose
 _TOPS_SHAPE = FieldShape(

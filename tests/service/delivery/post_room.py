@@ -1,5 +1,6 @@
 """A camera with alerts, a webhook and the delivery job run by hand."""
 
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy import text
@@ -31,7 +32,13 @@ class PostRoom:
         body: dict[str, Any] = answer.json()
         return body
 
-    def open(self, kind: str = "drift", severity: str = "warning", **more: Any) -> str:
+    def open(
+        self,
+        kind: str = "drift",
+        severity: str = "warning",
+        changed_at: datetime | None = None,
+        **more: Any,
+    ) -> str:
         drift = {"tilt_deg": 5.0, "told": True}
         with self.store.write() as session:
             record = alerts.open_alert(
@@ -41,7 +48,7 @@ class PostRoom:
                 kind,
                 severity,
                 drift,
-                None,
+                changed_at,
                 reasons=as_said("tilt +5.00 deg"),
                 **more,
             )

@@ -116,18 +116,7 @@ def test_another_severity_ends_the_alert_of_the_first(post_room, inbox, manager)
 def test_a_change_that_the_camera_dates_after_its_alert_is_no_contradiction(post_room, inbox):
     """Cameras' clocks may be ahead; Alertmanager refuses alerts that end before they start."""
     manager = post_room.hook(inbox.url, format="alertmanager")
-    with post_room.store.write() as session:
-        ahead = datetime.now(UTC) + timedelta(hours=2)
-        alerts.open_alert(
-            session,
-            post_room.settings,
-            "corner",
-            "clock",
-            "warning",
-            {},
-            ahead,
-            reasons=as_said("r"),
-        )
+    post_room.open("clock", changed_at=datetime.now(UTC) + timedelta(hours=2))
     post_room.end("clock")
     post_room.send(manager)
     for received in inbox.received:

@@ -8,8 +8,6 @@ from datetime import UTC, datetime, timedelta
 import httpx
 import pytest
 
-from service.alerting import alerts
-from service.reasons import as_said
 from tests.conftest import free_port, wait_for
 
 PROGRAM = (
@@ -70,18 +68,7 @@ def held(url):
 def test_alertmanager_holds_what_fires_and_nothing_else(post_room, alertmanager):
     hook = post_room.hook(alertmanager, format="alertmanager")
     post_room.open("drift", "warning")
-    with post_room.store.write() as session:
-        ahead = datetime.now(UTC) + timedelta(hours=2)
-        alerts.open_alert(
-            session,
-            post_room.settings,
-            "corner",
-            "clock",
-            "warning",
-            {},
-            ahead,
-            reasons=as_said("r"),
-        )
+    post_room.open("clock", changed_at=datetime.now(UTC) + timedelta(hours=2))
     post_room.send(hook)
     assert held(alertmanager) == [
         ("SurefootCameraClock", "warning"), ("SurefootCameraDrift", "warning")
