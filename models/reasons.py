@@ -34,3 +34,4 @@ class TracksCode(StrEnum):
     SPEED_UNUSUAL = "speed_unusual"
     STATURE_UNUSUAL = "stature_unusual"
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"
+    NOT_ALL_WALKERS = "not_all_walkers"

@@ -156,6 +156,15 @@ def _prior_doubted(v: _Values) -> str:
     )
 
 
+def _not_all_walkers(v: _Values) -> str:
+    kinds = {"walker": "walk", "standing": "stand", "wheels": "ride or run", "other": "are unclear"}
+    said = ", ".join(f"{v[kind]:g} {does}" for kind, does in kinds.items() if v[kind])
+    return (
+        f"of {v['tracks']:g} tracks {v['linked']:g} go on another's walk; of the rest {said}: "
+        "only those who walk are asked"
+    )
+
+
 def _since(v: _Values) -> str:
     return (
         f"{v['tracks']} tracks {_SINCE[Cause(v['cause'])]}; at least {v['least_walkers']} of "
@@ -248,6 +257,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.SPEED_UNUSUAL: _speed,
     TracksCode.STATURE_UNUSUAL: _stature,
     TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,
+    TracksCode.NOT_ALL_WALKERS: _not_all_walkers,
     ServiceCode.AS_SAID: lambda v: str(v["text"]),
     ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: f"{v['tracks']} of {v['wanted']} reference tracks",

@@ -37,6 +37,7 @@ MODEL_ROOMS = [
     {"trajectory"},
     {"simulation"},
     {"estimation"},
+    {"people"},
     {"regression"},
     {"flow"},
     {"drift"},

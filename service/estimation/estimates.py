@@ -16,6 +16,7 @@ from models.drift.verdict import (
 )
 from models.estimation.numbers import NUMBERS
 from models.geometry.pose_parameters import PoseParameters
+from models.people.said import reason_of_people
 from models.reasons import Reason
 from models.recalibration import drift_of
 from service.alerting.alerts import end_alert, fired_by_estimate, open_alert
@@ -128,6 +129,7 @@ def _judge(
         finding.fused.reason,
         None if set(NUMBERS) <= set(drift.told) else finding.joint.reason,
         *reference.doubts,
+        None if finding.people is None else reason_of_people(finding.people),
         *finding.lacks,
     )
     charted = reading is not None and reading.moved

@@ -1,7 +1,7 @@
 """What an estimate is made of, read in one transaction, and what it comes to without one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -27,11 +27,13 @@ from models.recalibration import (
     AlarmRate,
     CameraSite,
     Observations,
+    People,
     SecondLook,
     assume_site,
+    count_walks,
     estimate_pose,
-    observe,
     read_alarm_chart,
+    see_people,
 )
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
@@ -49,6 +51,7 @@ from service.store.tables.tracks import PredictionRecord, TrackRecord
 from service.store.tables.trainings import ModelRecord
 from service.store.tracks import predictions as stored_predictions
 from service.store.tracks import tracks, windows
+from service.windows.people import MOST_PIECES, until_so_many
 from service.windows.references import made_against, window_of
 from service.windows.unpacked import Unpacked
 
@@ -98,7 +101,8 @@ class Finding:
     `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
     for it. `reading` is what the drift chart says of the tracks after the change, or of all where
     these are too few, long before a pose can say how far; None where there is no chart.
-    `lacks` names what should be there beside the served pose and failed.
+    `people` is what became of all tracks of the window. `lacks` names what should be there beside
+    the served pose and failed.
     """
 
     joint: JointEstimate
@@ -108,6 +112,7 @@ class Finding:
     reading: Reading | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    people: People | None = None
     lacks: Reasons = ()
 
     @property
@@ -128,11 +133,19 @@ def load_evidence(
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
         return None
-    records = windows.window(session, window_of(session, reference, settings))
+    intrinsics = intrinsics_of(camera)
+    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    bounds = window_of(session, reference, settings)
+    records = until_so_many(
+        lambda limit: windows.window(session, replace(bounds, tracks=limit)),
+        bounds.tracks,
+        intrinsics,
+        prior,
+        unpacked,
+    ).records
     model = trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
-    intrinsics = intrinsics_of(camera)
     answered_at = alerts.answered_at(session, camera_id)
     kept = flow_maps.find(session, reference.id)
     predictions: Sequence[PredictionRecord] = []
@@ -146,7 +159,7 @@ def load_evidence(
         flow=None if kept is None else kept.data,
         chart=None if kept is None else kept.chart,
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=prior,
         walk=walk_of(camera),
         tracks=tuple(
             SeenTrack(
@@ -169,7 +182,10 @@ def load_evidence(
 
 def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     """The pose by all estimators, from the newest change on; None where too few people walk."""
-    observed = observe([track.trajectory for track in evidence.tracks], evidence.intrinsics)
+    seen_people = see_people(
+        [track.trajectory for track in evidence.tracks], evidence.intrinsics, evidence.prior
+    )
+    observed = seen_people.observations
     if observed.walkers < FEWEST_WALKERS:
         return None
     lacks = Lacks(evidence.camera_id)
@@ -196,6 +212,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         reading=reading,
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
+        people=seen_people.people,
         lacks=tuple(lacks.said),
     )
 
@@ -238,7 +255,11 @@ def _read(
 
 def asked_enough(evidence: Evidence) -> bool:
     """Whether enough people came since a person last said how the camera stands."""
-    return sum(track.unanswered for track in evidence.tracks) >= evidence.limits.people
+    unanswered = [track.trajectory for track in evidence.tracks if track.unanswered]
+    wanted = evidence.limits.people
+    if not wanted <= len(unanswered) < MOST_PIECES * wanted:
+        return len(unanswered) >= wanted
+    return count_walks(unanswered, evidence.intrinsics, evidence.prior) >= wanted
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

@@ -103,7 +103,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     if not period.trajectories:
         return None
     grown = learn_site(
-        observe(period.trajectories, period.intrinsics),
+        observe(period.trajectories, period.intrinsics, period.prior),
         period.intrinsics,
         period.prior,
         seed=seed,

@@ -27,6 +27,7 @@ from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.references import FlowMapRecord
 from service.store.tracks import windows
 from service.windows.attendance import attendance_of
+from service.windows.people import until_so_many
 from service.windows.references import wanted_tracks
 from service.windows.unpacked import Unpacked
 
@@ -72,14 +73,24 @@ def load_reference_period(
         return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
     attended = attendance_of(session, camera_id, now)
-    records = windows.first(session, camera_id, reference.from_s, wanted, without=attended.spans)
-    if len(records) < wanted:
-        return None
     intrinsics = intrinsics_of(camera)
+    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    gathered = until_so_many(
+        lambda limit: windows.first(
+            session, camera_id, reference.from_s, limit, without=attended.spans
+        ),
+        wanted,
+        intrinsics,
+        prior,
+        unpacked,
+    )
+    if not gathered.enough:
+        return None
+    records = gathered.records
     return ReferencePeriod(
         reference_id=reference.id,
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=prior,
         walk=walk_of(camera),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
         to_s=records[-1].ended_s,
@@ -88,7 +99,7 @@ def load_reference_period(
 
 def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
     """What is usual at the site; None where too few of the tracks walk."""
-    observed = observe(period.trajectories, period.intrinsics)
+    observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:

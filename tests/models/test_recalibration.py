@@ -231,7 +231,7 @@ def test_tracks_that_ended_together_are_in_order(site, tracks):
     together = [
         replace(track, time_s=track.time_s - track.time_s[-1] + last_s) for track in tracks[2]
     ]
-    crowd = observe([*tracks[1], *together], LENS)
+    crowd = observe([*tracks[1], *together], LENS, PRIOR)
     found = estimate_pose(crowd, site)
     assert found.change_idx is not None
     assert found.first == 60 <= found.change_idx

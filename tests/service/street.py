@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from models.estimation.joint.observations import observe
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
+from models.recalibration import observe
 from models.simulation.poses import repeated_pose
 from models.simulation.site import Lane, SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig, simulate_walks
@@ -137,7 +137,7 @@ class Street:
 
     def observed(self, first: int, last: int) -> Any:
         """What the joint estimator reads of the posted tracks."""
-        return observe(self.seen[first:last], LENS)
+        return observe(self.seen[first:last], LENS, PRIOR)
 
 
 def people_boxes(pose: CameraPose, uv: np.ndarray, tall_m: float) -> np.ndarray:

@@ -49,7 +49,7 @@ def live_year(
     while len(first) < reference_tracks:
         first += next(life)
         day += 1
-    reference = observe_feet(first[:reference_tracks], place.intrinsics)
+    reference = observe_feet(first[:reference_tracks], place.intrinsics, place.prior)
     learned = learn_site(reference, place.intrinsics, place.prior, speed_tracks=SPEED_TRACKS)
     watch = watch_over(learned, alarms_a_year=alarms_a_year, parties_a_day=tracks_a_day)
     assert watch is not None
@@ -57,7 +57,7 @@ def live_year(
     for _ in range(0, days, _WEEK):
         week = [track for tracks in islice(life, _WEEK) for track in tracks]
         if week:
-            seen = observe_feet(week, place.intrinsics)
+            seen = observe_feet(week, place.intrinsics, place.prior)
             apart.append(watch.apart(score_parties(seen, watch.usual)))
     walked = np.concatenate(apart)
     delays = [
@@ -96,7 +96,7 @@ def _knocked(
                 break
     except DegenerateGeometryError:
         return None
-    observations = observe_feet(seen[:_LONGEST_TRACKS], place.intrinsics)
+    observations = observe_feet(seen[:_LONGEST_TRACKS], place.intrinsics, place.prior)
     scores = score_parties(observations, watch.usual)
     if not scores.last.size:
         return None

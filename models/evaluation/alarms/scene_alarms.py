@@ -47,7 +47,7 @@ def judge_scene(
     """False alarms and delays on a recorded scene; None where too few people walk for a chart."""
     case = draw_case(scene, seed, STILL)
     learned = learn_case(case, chart=True)
-    reference = observe(case.reference, case.intrinsics)
+    reference = observe(case.reference, case.intrinsics, case.prior_pose)
     rng = np.random.default_rng([seed, 5])
     parties_a_track = _parties_a_track(reference, case.prior_pose)
     watch = watch_over(
@@ -114,7 +114,8 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
         knock_trajectory(track, scene.intrinsics, scene.true_pose, moved) for track in tracks
     )
     kept = [track for track in knocked if track is not None and track.long_enough]
-    return observe(sorted(kept, key=lambda track: float(track.time_s[-1])), scene.intrinsics)
+    in_time = sorted(kept, key=lambda track: float(track.time_s[-1]))
+    return observe(in_time, scene.intrinsics, scene.true_pose)
 
 
 def _parties_a_track(observations: Observations, prior: CameraPose) -> float:

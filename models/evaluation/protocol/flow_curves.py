@@ -45,7 +45,9 @@ def flow_errors(
     The tracks of a smaller number are among those of a larger one.
     """
     case = draw_case(scene, seed, knock_range)
-    known, seen = (observe(tracks, case.intrinsics) for tracks in (case.reference, case.seen))
+    known, seen = (
+        observe(tracks, case.intrinsics, case.prior_pose) for tracks in (case.reference, case.seen)
+    )
     points = []
     for some in _parts(known, counts, seed):
         try:

@@ -4,12 +4,13 @@ import numpy as np
 
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
-from models.estimation.joint.observations import Observations, observe, of_tracks
+from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.reference import assumed_reference, learn_reference
 from models.estimation.numbers import numbers_of
 from models.evaluation.protocol.cases import KNOCKED, Answer, KnockRange, draw_case, nothing_told
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.scenes import Scene
+from models.recalibration import observe
 from models.simulation.walkers import WalkConfig
 
 _SEED = 0
@@ -55,9 +56,12 @@ def track_errors(
     """
     case = draw_case(scene, seed, knock_range)
     reference = learn_reference(
-        observe(case.reference, case.intrinsics), case.prior_pose, WalkConfig(), _SEED
+        observe(case.reference, case.intrinsics, case.prior_pose),
+        case.prior_pose,
+        WalkConfig(),
+        _SEED,
     )
-    seen = observe(case.seen, case.intrinsics)
+    seen = observe(case.seen, case.intrinsics, case.prior_pose)
     order = np.random.default_rng(seed).permutation(seen.tracks)
     found = []
     for count in counts:

@@ -34,12 +34,16 @@ def learn_case(case: ProtocolCase, *, chart: bool = False) -> Learned:
     Raises:
         TooFewTrajectoriesError: fewer than 5 reference tracks with a step.
     """
-    known, seen = (observe(tracks, case.intrinsics) for tracks in (case.reference, case.seen))
+    known, seen = (
+        observe(tracks, case.intrinsics, case.prior_pose) for tracks in (case.reference, case.seen)
+    )
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=_SEED, chart=chart)
     feet, feet_speeds = seen, site.speeds
     if site.speeds.statures is not None:  # else boxes are not used, and the feet's are the same
         known_feet, feet = (
-            observe([replace(track, top_v=None) for track in tracks], case.intrinsics)
+            observe(
+                [replace(track, top_v=None) for track in tracks], case.intrinsics, case.prior_pose
+            )
             for tracks in (case.reference, case.seen)
         )
         feet_speeds = learn_reference(known_feet, case.prior_pose, WalkConfig(), _SEED)

@@ -150,7 +150,7 @@ def _changed(place: Place, count: int, rng: np.random.Generator) -> Observations
             tracks = walk_changed(lens, prior, place.lanes[1:], new_lane, config, count, rng)
         except DegenerateGeometryError:
             continue
-        return observe_feet(tracks, lens)
+        return observe_feet(tracks, lens, prior)
     raise DegenerateGeometryError(f"new lane: none of {_MOST_DRAWS} is seen")
 
 

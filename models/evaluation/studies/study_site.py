@@ -99,13 +99,15 @@ def seen_from(place: Place, pose: CameraPose, count: int, rng: np.random.Generat
         DegenerateGeometryError: hardly any walk is seen from the pose.
     """
     tracks = walk_site(place.intrinsics, pose, place.lanes, place.config, count, rng)
-    return observe_feet(tracks, place.intrinsics)
+    return observe_feet(tracks, place.intrinsics, place.prior)
 
 
-def observe_feet(tracks: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:
+def observe_feet(
+    tracks: Sequence[Trajectory], intrinsics: Intrinsics, prior: CameraPose
+) -> Observations:
     """What is read of simulated feet, in the order that the service sees: of the tracks' ends.
 
     Simulated boxes are truer than any detector's, and left out.
     """
     feet = [replace(track, top_v=None) for track in tracks]
-    return observe(sorted(feet, key=lambda track: float(track.time_s[-1])), intrinsics)
+    return observe(sorted(feet, key=lambda track: float(track.time_s[-1])), intrinsics, prior)

@@ -83,7 +83,7 @@ def test_pictures_are_written(scene, tmp_path):
 
 def test_smaller_numbers_are_of_the_same_tracks(scene):
     case = draw_case(scene, 1, PANNED)
-    whole = flow_curves.observe(case.seen, LENS)
+    whole = flow_curves.observe(case.seen, LENS, case.prior_pose)
     few, more, every = flow_curves._parts(whole, [5, 20, 1000], 1)
     assert (few.tracks, more.tracks, every) == (5, 20, whole)
     starts = [set(np.round(part.steps.start_rays[:, 0], 9)) for part in (few, more)]

@@ -44,7 +44,9 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     )
     assert done.returncode == 0, done.stdout + done.stderr
     case = draw_case(load_scene(folder), seed, RANGES[knock])
-    known, seen = observe(case.reference, case.intrinsics), observe(case.seen, case.intrinsics)
+    known, seen = (
+        observe(tracks, case.intrinsics, case.prior_pose) for tracks in (case.reference, case.seen)
+    )
     drawn_by = service.settings.seed
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
     stored = flow_from_bytes(flow_to_bytes(site.flow))

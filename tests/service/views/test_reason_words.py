@@ -76,6 +76,11 @@ SAID = [
     (T.STATURE_UNUSUAL, {"stature_m": 2.5, "short_m": 1.4, "tall_m": 2.2},
      "boxes say that people are 2.50 m tall at the prior pose, 1.4 to 2.2 m is usual: the prior "
      "height is wrong"),
+    (T.NOT_ALL_WALKERS,
+     {"tracks": 400.0, "linked": 250.0, "walker": 120.0, "standing": 0.0, "wheels": 30.0,
+      "other": 0.0, "unseen": 0.0},
+     "of 400 tracks 250 go on another's walk; of the rest 120 walk, 30 ride or run: only those who "
+     "walk are asked"),
     (T.PRIOR_POSE_DOUBTED, {"tilt_rad": math.radians(5), "roll_rad": math.radians(-0.3)},
      "the reference tracks put the camera +5.0 deg in tilt and -0.3 deg in roll from its prior "
      "pose: the prior pose is wrong, or the camera had moved before"),
