@@ -161,7 +161,7 @@ def _not_all_walkers(v: _Values) -> str:
     said = ", ".join(f"{v[kind]:g} {does}" for kind, does in kinds.items() if v[kind])
     return (
         f"of {v['tracks']:g} tracks {v['linked']:g} go on another's walk; of the rest {said}: "
-        "only those who walk are asked"
+        "who rides or is unclear has no say"
     )
 
 

@@ -15,6 +15,7 @@ from models.people.usual import residuals
 _SLOW = float(np.log(0.4))  # of the usual pace there: a foot that shifts, no walk
 _STANDING = 0.75  # of the steps
 _FAST = float(np.log(1.75))  # three times what people differ by
+_FAST_MPS = 1.8  # at a height that is right to a third; where most amble, walkers are no riders
 _STEADY = float(np.log(1.4))  # what rides is fast for three quarters of its way
 _ERRATIC = 0.6  # of a log: half of the steps are further apart than any walker's
 
@@ -30,6 +31,9 @@ class Kind(StrEnum):
 
 
 KINDS = tuple(Kind)
+# Whose steps and boxes count. How fast somebody is who stands is no walker's pace, which the
+# likelihood knows of each step; how tall they are is as good as anybody's.
+ASKED = (Kind.WALKER, Kind.STANDING, Kind.UNSEEN)
 
 
 def kinds_of(observations: Observations, pose: CameraPose) -> npt.NDArray[np.int64]:
@@ -51,11 +55,14 @@ def kinds_of(observations: Observations, pose: CameraPose) -> npt.NDArray[np.int
     along, aside = (away * way).sum(axis=1), away[:, 0] * way[:, 1] - away[:, 1] * way[:, 0]
     beside = np.stack([2 * along**2 - 1, 2 * along * aside], axis=1)
     owner_idx = rows.owner_idx[seen]
-    off = residuals(rays, beside, speeds.value[seen], owner_idx)
-    return _sorted(off, owner_idx, observations.tracks)
+    value = speeds.value[seen]
+    off = residuals(rays, beside, value, owner_idx)
+    return _sorted(off, value, owner_idx, observations.tracks)
 
 
-def _sorted(off: Array, owner_idx: npt.NDArray[np.int64], tracks: int) -> npt.NDArray[np.int64]:
+def _sorted(
+    off: Array, value: Array, owner_idx: npt.NDArray[np.int64], tracks: int
+) -> npt.NDArray[np.int64]:
     number = np.bincount(owner_idx, minlength=tracks)
     stood = np.bincount(owner_idx, off < _SLOW, tracks)
     walked = off >= _SLOW
@@ -67,7 +74,8 @@ def _sorted(off: Array, owner_idx: npt.NDArray[np.int64], tracks: int) -> npt.ND
     def name(kind: Kind, those: Mask) -> None:
         found[those] = KINDS.index(kind)
 
-    fast = middle > _FAST
+    pace = _quantiles(value[walked], owner_idx[walked], tracks, 0.5)
+    fast = (middle > _FAST) & (pace > np.log(_FAST_MPS))
     name(Kind.OTHER, (high - low > _ERRATIC) | fast)
     name(Kind.WHEELS, fast & (low > _STEADY))
     name(Kind.STANDING, stood > _STANDING * number)

@@ -16,7 +16,8 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Mask
 from models.people.feet import at_border, hidden
-from models.people.kinds import KINDS, Kind, kinds_of
+from models.people.kinds import ASKED, KINDS, Kind, kinds_of
+from models.people.likely import likely_pose
 from models.people.linking import link_pieces, walks_of
 from models.trajectory import Trajectory
 
@@ -49,8 +50,8 @@ class People:
 class Seen:
     """What is read of tracks, by the order that they were given in, and who they are.
 
-    The steps of a walk in several pieces are those of its last one. Tracks of nobody who walks
-    have no steps.
+    The steps of a walk in several pieces are those of its last one. Tracks of what rides, or of a
+    tracker's mistakes, have no steps.
     """
 
     observations: Observations
@@ -60,7 +61,7 @@ class Seen:
 def see_people(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> Seen:
-    """The walkers among tracks, each once.
+    """The people among tracks, each once.
 
     The same tracks give the same, in whatever portions they came. The pose need only be about
     right: who is a walker is told by those around them.
@@ -74,13 +75,14 @@ def see_people(
     walk_idx = _last_pieces(trajectories, link_pieces(trajectories, intrinsics, pose))
     walks = _walks(_whole(trajectories, intrinsics, pose), walk_idx)
     found = replace(observe(walks, intrinsics), ended_s=ended_s)
-    no_feet, short = hidden(found, pose)
+    likely = likely_pose(found, pose)
+    no_feet, short = hidden(found, likely)
     found = _where(found, ~no_feet, ~short)
-    kind_idx = kinds_of(found, pose)
-    walking = kind_idx == KINDS.index(Kind.WALKER)
+    kind_idx = kinds_of(found, likely)
+    asked = np.isin(kind_idx, [KINDS.index(kind) for kind in ASKED])
     return Seen(
         observations=_where(
-            found, walking[found.steps.rows.owner_idx], walking[found.tops.rows.owner_idx]
+            found, asked[found.steps.rows.owner_idx], asked[found.tops.rows.owner_idx]
         ),
         people=People(
             walk_idx=walk_idx, kind_idx=kind_idx[walk_idx], hidden_steps=int(no_feet.sum())

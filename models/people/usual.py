@@ -12,6 +12,7 @@ from models.geometry.rotation import Array
 _CUTS = (2.0, 1.5, 1.1, 0.8, 0.8, 0.8)  # of a log: what is further off counts for nothing
 _FIRM = 0.05  # of a feature's own weight holds it at nothing
 _FREE_ROWS = 10.0  # a feature is free where so many times as much is seen
+_FIRST = 0.6  # the quantile that it begins at: there are slower people who stand about
 _MOST_ROWS = 4.0  # a track counts as so many rows at the most
 
 
@@ -40,7 +41,7 @@ def residuals(rays: Array, beside: Array, value: Array, owner_idx: npt.NDArray[n
     features = np.clip(features, -4.0, 4.0)
     hold = np.full(features.shape[1], _FIRM * share.sum() + _FREE_ROWS)
     hold[0] = 1e-6
-    residual = value - _median(value, share)
+    residual = value - _quantile(value, share)
     for cut in _CUTS:
         weight = share * np.clip(1 - (residual / cut) ** 2, 0.0, None) ** 2
         weighted = features * weight[:, None]
@@ -49,7 +50,7 @@ def residuals(rays: Array, beside: Array, value: Array, owner_idx: npt.NDArray[n
     return np.asarray(residual)
 
 
-def _median(value: Array, share: Array) -> float:
+def _quantile(value: Array, share: Array) -> float:
     order = np.argsort(value)
     passed = np.cumsum(share[order])
-    return float(value[order][np.searchsorted(passed, passed[-1] / 2)])
+    return float(value[order][np.searchsorted(passed, _FIRST * passed[-1])])

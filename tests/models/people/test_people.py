@@ -50,15 +50,19 @@ def test_those_who_ride_are_told_from_those_who_walk(pose):
     assert found[Kind.WALKER] >= 0.95 * (unmixed[Kind.WALKER] - len(ride))
 
 
-def test_only_walkers_have_steps():
+def test_who_rides_has_no_steps_and_who_stands_keeps_his_box():
     walked = street(4)
     stands = walk(0, 40, velocity=[0.0, 0.02])
     tracks = in_time([*walked[:40], *(faster(t, 3.2) for t in walked[40:50]), stands])
     seen = see_people(tracks, LENS, PRIOR)
     at = next(n for n, track in enumerate(tracks) if track is stands)
     assert KINDS[seen.people.kind_idx[at]] is Kind.STANDING
-    assert at not in seen.observations.steps.rows.owner_idx
-    assert seen.observations.walkers == seen.people.count(Kind.WALKER)
+    assert at in seen.observations.steps.rows.owner_idx
+    assert seen.people.count(Kind.WHEELS) >= 8
+    riding = np.flatnonzero(seen.people.kind_idx == KINDS.index(Kind.WHEELS))
+    assert not np.isin(riding, seen.observations.steps.rows.owner_idx).any()
+    asked = sum(seen.people.count(kind) for kind in (Kind.WALKER, Kind.STANDING))
+    assert seen.observations.walkers == asked
 
 
 def test_pieces_count_once_with_their_last():

@@ -1,0 +1,84 @@
+"""A tracker that cuts walks into pieces: references and windows count people."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from models.recalibration import count_walks
+from models.trajectory import Trajectory
+from service.store.packing import pack
+from service.store.tables.tracks import TrackRecord
+from service.windows.people import until_so_many
+from service.windows.unpacked import Unpacked
+from tests.conftest import CAMERA
+from tests.service.estimation.test_batchings import Recording, at_once, at_random
+from tests.service.street import KNOCKED, LENS, PRIOR
+
+REFERENCE, LATER = 30, 30
+PIECE, GAP = 6, 1  # points, 0.4 s apart
+
+
+class Pieces(Recording):
+    """People whom the tracker loses every two seconds, and finds again under another name."""
+
+    def _post(self):
+        for body in self._bodies:
+            points = body["points"]
+            for number, first in enumerate(range(0, len(points), PIECE + GAP)):
+                piece = points[first : first + PIECE]
+                if len(piece) == PIECE:
+                    self.people.append({"id": f"{body['id']}.{number}", "points": piece})
+        self._bodies.clear()
+        self.people.sort(key=lambda piece: piece["points"][-1][0])
+
+    def count(self, pieces):
+        """How many walks the first so many pieces are of."""
+        return count_walks([trajectory(piece) for piece in self.people[:pieces]], LENS, PRIOR)
+
+
+def trajectory(piece):
+    points = np.array(piece["points"])
+    return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+
+
+@pytest.fixture
+def pieces(http, settings):
+    http.post("/cameras", json={**CAMERA, "reference_tracks": REFERENCE}).raise_for_status()
+    return Pieces(http, settings)
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        pytest.param(at_once, id="at once"),
+        pytest.param(at_random(1), id="at random", marks=pytest.mark.slow),
+        pytest.param(at_random(2), id="at random again", marks=pytest.mark.slow),
+    ],
+)
+def test_a_reference_is_of_so_many_people_however_they_were_posted(pieces, sizes):
+    pieces.walk(PRIOR, REFERENCE + 10)
+    pieces.walk(KNOCKED, LATER)
+    wanted = next(n for n in range(len(pieces.people)) if pieces.count(n) == REFERENCE)
+    assert wanted > 1.5 * REFERENCE
+    pieces.play(sizes(len(pieces.people)))
+    assert pieces.pose()["reference"]["tracks"] == wanted
+    assert pieces.end() == ("drifting", ["drift"])
+    assert "go on another's walk" in pieces.pose()["reason"]
+
+
+def test_as_many_tracks_are_read_as_are_of_so_many_people(pieces):
+    pieces.walk(PRIOR, REFERENCE)
+    stored = pieces.people[: len(pieces.people) // 2]
+    walks = [pieces.count(n) for n in range(len(stored) + 1)]
+    assert set(b - a for a, b in zip(walks, walks[1:], strict=False)) == {0, 1}
+    records = [
+        TrackRecord(id=n, points=pack(np.array(piece["points"])), received_at=datetime.now(UTC))
+        for n, piece in enumerate(stored)
+    ]
+    for wanted in (5, 8):
+        found = until_so_many(lambda limit: records[:limit], wanted, LENS, PRIOR, Unpacked())
+        assert found.enough
+        assert len(found.records) == walks.index(wanted)
+    short = until_so_many(lambda limit: records[:limit], 10**6, LENS, PRIOR, Unpacked())
+    assert (short.enough, len(short.records)) == (False, len(stored))
