@@ -34,12 +34,12 @@ CAMERA: dict[str, Any] = {
 }
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def lens() -> Intrinsics:
     return Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def pose() -> CameraPose:
     return CameraPose(
         height_m=6.0,
