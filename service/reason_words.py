@@ -157,7 +157,7 @@ def _prior_doubted(v: _Values) -> str:
 
 
 def _not_all_walkers(v: _Values) -> str:
-    kinds = {"walker": "walk", "standing": "stand", "wheels": "ride or run", "other": "are unclear"}
+    kinds = {"walker": "walk", "standing": "stand", "wheels": "ride", "other": "are unclear"}
     said = ", ".join(f"{v[kind]:g} {does}" for kind, does in kinds.items() if v[kind])
     return (
         f"of {v['tracks']:g} tracks {v['linked']:g} go on another's walk; of the rest {said}: "

@@ -14,9 +14,9 @@ from models.people.usual import residuals
 
 _SLOW = float(np.log(0.4))  # of the usual pace there: a foot that shifts, no walk
 _STANDING = 0.75  # of the steps
-_FAST = float(np.log(2.1))  # four times what people differ by
+_FAST = float(np.log(2.5))  # five times what people differ by: few run as fast
 _FAST_MPS = 2.3  # at a height that is right to a third; where most amble, walkers are no riders
-_STEADY = float(np.log(1.6))  # what rides is fast for three quarters of its way
+_STEADY = float(np.log(1.8))  # what rides is fast for three quarters of its way
 _ERRATIC = 0.6  # of a log: half of the steps are further apart than any walker's
 
 

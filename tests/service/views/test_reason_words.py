@@ -79,7 +79,7 @@ SAID = [
     (T.NOT_ALL_WALKERS,
      {"tracks": 400.0, "linked": 250.0, "walker": 120.0, "standing": 0.0, "wheels": 30.0,
       "other": 0.0, "unseen": 0.0},
-     "of 400 tracks 250 go on another's walk; of the rest 120 walk, 30 ride or run: who rides or "
+     "of 400 tracks 250 go on another's walk; of the rest 120 walk, 30 ride: who rides or "
      "is unclear has no say"),
     (T.PRIOR_POSE_DOUBTED, {"tilt_rad": math.radians(5), "roll_rad": math.radians(-0.3)},
      "the reference tracks put the camera +5.0 deg in tilt and -0.3 deg in roll from its prior "
