@@ -18,7 +18,7 @@ from models.drift.party_scores import PartyScores
 from models.estimation.joint.site import SiteReference
 from models.geometry.rotation import Array
 
-FEWEST = 16  # parties that a move is told by
+FEWEST = 16  # parties that a move is detected by
 LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
 CLOCK = 4  # the number of times that are too long
 # What a site's people may do of themselves for hours on end, as moves of the camera, and of its

@@ -37,13 +37,13 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
         prior: that pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
-    if not set(NUMBERS) <= set(drift.told):
+    if not set(NUMBERS) <= set(drift.identifiable):
         return None
     factor = 1 + drift.by.height_m / prior.height_m
     relative_sd = drift.sd.height_m / (factor * prior.height_m)
     if abs(math.log(factor)) <= max(_SIGMAS * relative_sd, _LEAST_LOG):
         return None
-    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.told):
+    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
         if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
             return None
     values = {"factor": factor, "rate_hz": frame_rate_hz or _USUAL_RATE_HZ}

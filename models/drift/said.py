@@ -1,4 +1,4 @@
-"""What a verdict and a chart are to be told with: codes and numbers."""
+"""What a verdict and a chart give as their reason: codes and numbers."""
 
 from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
@@ -7,7 +7,7 @@ from models.reasons import Reason, TracksCode, Value
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
-    """The told numbers against the prior pose and the limits; None where none is told."""
+    """The identifiable numbers against the prior pose and the limits; None where none is."""
     values: dict[str, Value] = {
         "sigmas": limits.sigmas,
         "floor_rad": limits.floor_rad,
@@ -15,10 +15,10 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
         "people": limits.people,
         "clear_ratio": limits.clear_ratio,
     }
-    if not drift.told:
-        last_told = TracksCode.BEYOND_LIMITS_LAST_TOLD
-        return Reason(code=last_told, values=values) if verdict.drifting else None
-    for name in drift.told:
+    if not drift.identifiable:
+        code = TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE
+        return Reason(code=code, values=values) if verdict.drifting else None
+    for name in drift.identifiable:
         unit = "m" if name == "height" else "rad"
         values[f"{name}_{unit}"], values[f"{name}_sd_{unit}"] = drift.of(name)
     beyond = verdict.excess >= 1

@@ -10,12 +10,12 @@ from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
 
-# As they are named where they are told or not, in the order of every (3,) and (4,).
+# As they are named where they are identifiable or not, in the order of every (3,) and (4,).
 NUMBERS = ("tilt", "roll", "height")
 WITH_HEADING = (*NUMBERS, "heading")
 ANGLES = ("tilt", "roll", "heading")
-# A number whose standard deviation is larger is not told; in the order of WITH_HEADING.
-TELLING_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
+# A parameter whose standard deviation is larger is not identifiable; in the order of WITH_HEADING.
+IDENTIFIABLE_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
 # How far an estimator is usually off on a site for good: foot points, places of other speed.
 SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 
@@ -40,6 +40,12 @@ class NumbersEstimate:
             )
         if not (np.isfinite(self.values).all() and np.isfinite(self.covariance).all()):
             raise ShapeError("values, covariance: must be finite")
+
+
+def identifiable_of(names: tuple[str, ...], sd: Array) -> tuple[str, ...]:
+    """Those of the named numbers (N,), in the order of `sd` (N,), that the data determine."""
+    most = IDENTIFIABLE_SD[: len(names)]
+    return tuple(name for name, known in zip(names, sd <= most, strict=True) if known)
 
 
 def numbers_of(pose: CameraPose) -> Array:

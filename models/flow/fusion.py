@@ -8,7 +8,7 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import NUMBERS, TELLING_SD, WITH_HEADING
+from models.estimation.numbers import IDENTIFIABLE_SD, WITH_HEADING, identifiable_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.path_test import loss, party_fits
 from models.flow.reference import FlowReference, candidate_of
@@ -31,8 +31,8 @@ _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
-    `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` is
-    what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
+    `identifiable` names those of tilt, roll, height, heading that the tracks determine; `reason`
+    is what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
     off; None where the map had no part: then all is the joint estimate's and the heading the prior
     pose's.
     `rivals` are headings (radians) of other poses that explain the tracks about as well.
@@ -40,7 +40,7 @@ class FusedEstimate:
 
     values: Array
     covariance: Array
-    told: tuple[str, ...]
+    identifiable: tuple[str, ...]
     reason: Reason | None
     raw: Array | None = None
     rivals: tuple[float, ...] = ()
@@ -117,7 +117,7 @@ def fused_estimate(
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        told=tuple(n for n, telling in zip(WITH_HEADING, sd <= TELLING_SD, strict=True) if telling),
+        identifiable=identifiable_of(WITH_HEADING, sd),
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
@@ -127,14 +127,14 @@ def fused_estimate(
 def by_speeds_alone(
     joint: JointEstimate, prior: CameraPose, reason: Reason | None = None
 ) -> FusedEstimate:
-    """The joint estimate with the prior's heading, which it cannot tell."""
+    """The joint estimate with the prior's heading, which speeds leave open."""
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
     covariance[3, 3] = _HEADING_SD**2
     return FusedEstimate(
         values=np.append(joint.values, prior.heading_rad),
         covariance=covariance,
-        told=tuple(name for name in NUMBERS if name not in joint.weak),
+        identifiable=joint.identifiable,
         reason=reason,
     )
 
@@ -145,8 +145,8 @@ def _reason(
     if rivals:
         turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
         return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
-    if sd > TELLING_SD[3]:
-        return Reason(code=TracksCode.HEADING_UNTOLD, values={"heading_sd_rad": sd})
+    if sd > IDENTIFIABLE_SD[3]:
+        return Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": sd})
     return None
 
 

@@ -129,7 +129,7 @@ def anchored_scores(
 ) -> Array:
     """The scores (N, 4) of people in those parts of the picture that see known ground.
 
-    Which these are is told at an anchor (4,), about where the candidate is, and stays so. Unlike
+    Which these are is decided at an anchor (4,), about where the candidate is, and stays so. Unlike
     the whole likelihood's, the mean of these scores is nothing at the truth whatever people do on
     ground that the reference did not see.
     """

@@ -18,7 +18,7 @@ from models.geometry.rotation import Array
 
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.
 REACH = np.array([np.radians(3), np.radians(3), 0.08, np.radians(4)])
-_FEWEST = 8  # parties that a move is told by
+_FEWEST = 8  # parties that a move is detected by
 _MOST = 300
 _BLOCK = 3  # parties after one another that the bootstrap keeps together
 _DRAWS = 1500

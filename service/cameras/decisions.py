@@ -35,7 +35,7 @@ def accept_pose(
         ConflictError: no pose has been estimated yet.
     """
     view = view_pose(session, settings, camera_id)
-    if not view.told:
+    if not view.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     close_pose_alerts(session, camera_id, Outcome.ACCEPTED, by, note)
     note_activity(session, Act.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)

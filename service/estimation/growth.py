@@ -147,7 +147,7 @@ def _in_doubt(
 ) -> bool:
     """Whether the camera may have moved by now, or people walk elsewhere than they did."""
     last = estimates.newest(session, reference.camera_id)
-    if last is None or not made_against(reference, last) or not last.told:
+    if last is None or not made_against(reference, last) or not last.identifiable:
         return True
     if is_outdated(last, window_of(session, reference, settings)):
         return True  # somebody was at the camera, and nobody knows yet how it stands since

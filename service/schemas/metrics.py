@@ -58,15 +58,15 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
     )
     yield _gauge(
         "surefoot_camera_drift_radians",
-        "Drift of tilt, roll or heading against the prior pose, where it is told.",
+        "Drift of tilt, roll or heading against the prior pose, where it is identifiable.",
         ["camera_id", "number"],
-        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.told},
+        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.identifiable},
     )
     yield _gauge(
         "surefoot_camera_drift_height_meters",
-        "Drift of the height against the prior pose, where it is told.",
+        "Drift of the height against the prior pose, where it is identifiable.",
         ["camera_id"],
-        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.told},
+        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.identifiable},
     )
 
 

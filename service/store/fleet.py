@@ -170,7 +170,7 @@ def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
 def _ratio(
     name: str, drift: Any, sd: Any, limits: DriftLimits, floor: float
 ) -> ColumnElement[float]:
-    """A number's drift in units of its limit; -1 where it is not told."""
-    told = type_coerce(EstimateRecord.told, String).contains(f'"{name}"')
+    """A number's drift in units of its limit; -1 where it is not identifiable."""
+    identifiable = type_coerce(EstimateRecord.identifiable, String).contains(f'"{name}"')
     limit = func.max(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
-    return case((told, func.abs(drift) / limit), else_=-1.0)
+    return case((identifiable, func.abs(drift) / limit), else_=-1.0)

@@ -109,7 +109,11 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     )
     misplaced: tuple[Misplacement, ...] = ()
     # Of a camera that stands still it would tell of the estimate's noise.
-    if estimate is not None and estimate.told and (estimate.drifted or estimate.drift_streak > 0):
+    if (
+        estimate is not None
+        and estimate.identifiable
+        and (estimate.drifted or estimate.drift_streak > 0)
+    ):
         misplaced = misplacements(camera.intrinsics, pose.pose, camera.prior_pose, DISTANCES_M)
     return CameraPage(
         now=now,

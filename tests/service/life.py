@@ -147,13 +147,13 @@ class Life:
             evidence = load_evidence(session, self.settings, camera_id)
         return Look(camera_id=camera_id, evidence=evidence, newest_pk=newest_pk)
 
-    def end_look(self, look: Look, weak: tuple[str, ...]) -> bool:
+    def end_look(self, look: Look, unidentifiable: tuple[str, ...]) -> bool:
         """The job from there on, its numbers made up; says whether an estimate was stored."""
         record = None
         with self.store.write() as session:
             if look.evidence is not None:
                 pose, change = self._seen(session, look.evidence)
-                finding = made_up(look.evidence, pose, weak=weak, change=change)
+                finding = made_up(look.evidence, pose, unidentifiable=unidentifiable, change=change)
                 record = save_estimate(session, self.queue, self.settings, look.evidence, finding)
             end_look(session, look.camera_id, look.newest_pk)
         return record is not None

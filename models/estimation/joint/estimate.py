@@ -1,4 +1,4 @@
-"""The joint estimate: one pose for all tracks, with a covariance, and what it cannot tell."""
+"""The joint estimate: one pose for all tracks, with a covariance, and what it leaves open."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from models.estimation.joint.groups import count_parties
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
-from models.estimation.numbers import NUMBERS, TELLING_SD, numbers_of
+from models.estimation.numbers import NUMBERS, identifiable_of, numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
@@ -26,10 +26,10 @@ _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
-    `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
-    tell; `reason` says why, and is None where they tell all. `walkers` is the number of
-    tracks that were used, `parties` that of people or groups who walked independently. `bound`
-    (3, 3) is the Cramer-Rao bound of the likelihood.
+    `raw` (3,) is before that. `identifiable` names those of tilt, roll, height that the tracks
+    determine; `reason` says what is missing, and is None where they determine all. `walkers` is
+    the number of tracks that were used, `parties` that of people or groups who walked
+    independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood.
     """
 
     values: Array
@@ -38,7 +38,7 @@ class JointEstimate:
     bound: Array
     walkers: int
     parties: int
-    weak: tuple[str, ...]
+    identifiable: tuple[str, ...]
     reason: Reason | None
 
     @property
@@ -64,10 +64,10 @@ def joint_estimate(
     covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
-    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
-    reason = _reason(weak, sd, covariance)
+    identifiable = identifiable_of(NUMBERS, sd)
+    reason = _reason(identifiable, sd, covariance)
     if parties < _FEWEST_PARTIES:
-        weak = NUMBERS
+        identifiable = ()
         reason = Reason(
             code=TracksCode.TOO_FEW_PARTIES,
             values={
@@ -83,7 +83,7 @@ def joint_estimate(
         bound=best.bound,
         walkers=observations.walkers,
         parties=parties,
-        weak=weak,
+        identifiable=identifiable,
         reason=reason,
     )
 
@@ -113,15 +113,16 @@ def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
     return np.asarray((apart * chances[:, None]).T @ apart)
 
 
-def _reason(weak: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
-    """What the tracks cannot tell; `alike` names two numbers that make up for one another."""
-    if not weak:
+def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
+    """What is not identifiable; `alike` names two numbers that make up for one another."""
+    missing = [name for name in NUMBERS if name not in identifiable]
+    if not missing:
         return None
     said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
-    values: dict[str, Value] = {said[name]: float(sd[NUMBERS.index(name)]) for name in weak}
+    values: dict[str, Value] = {said[name]: float(sd[NUMBERS.index(name)]) for name in missing}
     together = covariance / np.outer(sd, sd)
     pairs = [(0, 2), (1, 2), (0, 1)]
     first, second = max(pairs, key=lambda pair: abs(together[pair]))
     if abs(together[first, second]) > 0.9:
         values["alike"] = [NUMBERS[first], NUMBERS[second]]
-    return Reason(code=TracksCode.NUMBERS_UNTOLD, values=values)
+    return Reason(code=TracksCode.UNIDENTIFIABLE, values=values)

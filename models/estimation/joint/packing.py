@@ -9,7 +9,7 @@ _FORMAT = Format(name="site", version=1)
 
 
 def reference_to_bytes(reference: SiteReference) -> bytes:
-    """A reference as it is stored, but for its doubt, which is told once."""
+    """A reference as it is stored, but for its doubt, which has a column of its own."""
     return pack(_FORMAT, flattened(replace(reference, doubt=None)))
 
 

@@ -72,7 +72,7 @@ def live_year(
         years=days / DAYS,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, walked).statistic.max()) / watch.level,
-        told=0.0,
+        pose_excess=0.0,
         delays=tuple(delays),
     )
 

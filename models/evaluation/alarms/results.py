@@ -28,7 +28,7 @@ class AlarmResults:
     """One case: false alarms in some camera-years, and delays after knocks.
 
     `highest` is the largest statistic of the still half as it was recorded, in units of the level,
-    `told` the largest drift that the pose by that half tells, in units of its limit.
+    `pose_excess` the largest identifiable drift of the pose by that half, in units of its limit.
     """
 
     name: str
@@ -37,7 +37,7 @@ class AlarmResults:
     years: float
     false_alarms: int
     highest: float
-    told: float
+    pose_excess: float
     delays: tuple[Delay, ...]
 
 

@@ -1,7 +1,7 @@
 """False alarms and delays on recorded scenes, by the protocol's halves.
 
 One half is the reference, and the people of the other are drawn some parties after one another (a
-block bootstrap) for as long as is asked. An alarm is the chart's or the told pose's, whichever
+block bootstrap) for as long as is asked. An alarm is the chart's or the pose's, whichever
 comes first, as in the service.
 """
 
@@ -66,11 +66,12 @@ def judge_scene(
         seen = _seen(scene, case.seen, moved)
         apart = watch.apart(score_parties(seen, watch.usual))
         if len(apart):
-            told = _told_after(learned, seen, limits)
+            by_pose = _tracks_until_drifting(learned, seen, limits)
             drawn = (apart[drawn_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
             tracks = seen.tracks / len(apart)
             delays += [
-                replace(asked, tracks=min(told, first_alarm(watch, one, tracks))) for one in drawn
+                replace(asked, tracks=min(by_pose, first_alarm(watch, one, tracks)))
+                for one in drawn
             ]
     return AlarmResults(
         name=scene.scene_id,
@@ -79,15 +80,15 @@ def judge_scene(
         years=years,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, still).statistic.max()) / watch.level,
-        told=_told(learned, learned.seen, limits),
+        pose_excess=_pose_excess(learned, learned.seen, limits),
         delays=tuple(delays),
     )
 
 
-def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
-    """Tracks after which the pose by all until then tells a drift beyond its limit; inf: never.
+def _tracks_until_drifting(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """Tracks after which the pose by all until then has drifted beyond its limit; inf: never.
 
-    And told it without the newest people, too. Looked at after some numbers of tracks only: a pose
+    And had so without the newest people, too. Looked at after some numbers of tracks only: a pose
     takes half a second.
     """
     for number in _LOOKS:
@@ -95,15 +96,15 @@ def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> fl
         if held > seen.tracks:
             break
         if all(
-            _told(learned, of_tracks(seen, np.arange(count)), limits) >= 1
+            _pose_excess(learned, of_tracks(seen, np.arange(count)), limits) >= 1
             for count in (number, held)
         ):
             return float(held)
     return math.inf
 
 
-def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
-    """The largest told drift of the pose by what is seen, in units of its limit."""
+def _pose_excess(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """The largest identifiable drift of the pose by what is seen, in units of its limit."""
     if learned.site.flow is None or seen.walkers < FEWEST_WALKERS:
         return 0.0
     return judge(served_pose(seen, learned.site).drift, limits, ()).excess

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.numbers import numbers_of
+from models.estimation.numbers import NUMBERS, numbers_of
 from models.evaluation.scenes import Knock, Scene, knock_trajectory
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -14,7 +14,6 @@ from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
 from models.trajectory import Trajectory
 
-NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
 
 
@@ -61,14 +60,14 @@ class ProtocolCase:
 class Answer:
     """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
 
-    `weak` names those of the three that it declares the tracks cannot tell. `heading_rad` and its
+    `identifiable` names those of the three that it says the tracks determine. `heading_rad` and its
     standard deviation are what it says of the heading; None is the prior's.
     """
 
     values: Array
     covariance: Array
     tracks: int
-    weak: tuple[str, ...] = ()
+    identifiable: tuple[str, ...] = NUMBERS
     heading_rad: float | None = None
     heading_sd_rad: float | None = None
 
@@ -170,20 +169,20 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         ),
         height_error=abs(math.expm1(error[2])),
         covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
-        degenerate=bool(answer.weak),
+        degenerate=len(answer.identifiable) < len(NUMBERS),
         seconds=seconds,
         heading_error_deg=heading_error,
         heading_covered=heading_covered,
     )
 
 
-def nothing_told(case: ProtocolCase) -> Answer:
+def nothing_identifiable(case: ProtocolCase) -> Answer:
     """The answer to too few tracks: the prior pose, and that nothing is known of it."""
     return Answer(
         values=numbers_of(case.prior_pose),
         covariance=np.diag(np.square(_UNKNOWN_SD)),
         tracks=0,
-        weak=NUMBERS,
+        identifiable=(),
     )
 
 

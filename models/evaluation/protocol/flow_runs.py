@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.numbers import NUMBERS, TELLING_SD
-from models.evaluation.protocol.cases import Answer, nothing_told
+from models.estimation.numbers import NUMBERS, identifiable_of
+from models.evaluation.protocol.cases import Answer, nothing_identifiable
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.protocol.served import served_pose
 from models.flow.fusion import elsewhere
@@ -37,20 +37,24 @@ def served_answer(seen: Observations, site: CameraSite) -> Answer:
         values=pose.values[:3],
         covariance=pose.covariance[:3, :3],
         tracks=found.joint.walkers,
-        weak=tuple(name for name in NUMBERS if name not in pose.told),
+        identifiable=tuple(name for name in NUMBERS if name in pose.identifiable),
     )
-    return _with_heading(answer, pose.values, pose.covariance) if "heading" in pose.told else answer
+    return (
+        _with_heading(answer, pose.values, pose.covariance)
+        if "heading" in pose.identifiable
+        else answer
+    )
 
 
 def registration(learned: Learned) -> Answer:
     """The flow map alone, around the prior pose: nothing is known of speeds."""
     case, reference = learned.case, learned.site.flow
     if reference is None:
-        return nothing_told(case)
+        return nothing_identifiable(case)
     mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
     if walkers.parties < _FEWEST:
-        return nothing_told(case)
+        return nothing_identifiable(case)
     site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
     belief = Belief(mean=mean, precision=_BROAD)
     peaks = _peaks(walkers, site, belief, temper)
@@ -60,8 +64,11 @@ def registration(learned: Learned) -> Answer:
     chances = np.exp([peak.value - best.value for peak in peaks])
     covariance = covariance + elsewhere(peaks, chances)
     sd = np.sqrt(np.diag(covariance))[:3]
-    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
-    answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
+    answer = replace(
+        nothing_identifiable(case),
+        tracks=int(walkers.people),
+        identifiable=identifiable_of(NUMBERS, sd),
+    )
     return _with_heading(answer, values, covariance)
 
 

@@ -7,7 +7,13 @@ from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.reference import assumed_reference, learn_reference
 from models.estimation.numbers import numbers_of
-from models.evaluation.protocol.cases import KNOCKED, Answer, KnockRange, draw_case, nothing_told
+from models.evaluation.protocol.cases import (
+    KNOCKED,
+    Answer,
+    KnockRange,
+    draw_case,
+    nothing_identifiable,
+)
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.scenes import Scene
 from models.simulation.walkers import WalkConfig
@@ -31,7 +37,7 @@ def joint_assumed(learned: Learned) -> Answer:
     try:
         reference = assumed_reference(learned.seen, prior, WalkConfig())
     except TooFewTrajectoriesError:
-        return nothing_told(learned.case)
+        return nothing_identifiable(learned.case)
     return joint_answer(joint_estimate(learned.seen, prior, reference))
 
 
@@ -41,7 +47,7 @@ def joint_answer(estimate: JointEstimate) -> Answer:
         values=estimate.values,
         covariance=estimate.covariance,
         tracks=estimate.walkers,
-        weak=estimate.weak,
+        identifiable=estimate.identifiable,
     )
 
 

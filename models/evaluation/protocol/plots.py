@@ -1,4 +1,4 @@
-"""Plots of the protocol: drift told against true, the ground re-projected, errors over tracks."""
+"""Plots of the protocol: drift found against true, the ground re-projected, errors over tracks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -8,8 +8,8 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import average_windows, averaged_estimate
 from models.estimation.calibrated import calibrated_estimate, mean_numbers, sampling_covariance
-from models.estimation.numbers import NumbersEstimate, without_offset
-from models.evaluation.protocol.cases import NUMBERS, Answer, Estimator, ProtocolCase, nothing_told
+from models.estimation.numbers import NUMBERS, NumbersEstimate, without_offset
+from models.evaluation.protocol.cases import Answer, Estimator, ProtocolCase, nothing_identifiable
 from models.evaluation.scenes import Scene
 from models.geometry.pose import CameraPose
 from models.regression.calibration import learn_calibration
@@ -22,8 +22,8 @@ from models.simulation.crowds import FlowConfig
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory, choose_step_s, cut_windows
 
-# An answer less sure than this of a number declares it weak.
-_WEAK_SD = (math.radians(3), math.radians(3), 0.2)
+# A number of which an answer is less sure than this is not identifiable.
+_IDENTIFIABLE_SD = (math.radians(3), math.radians(3), 0.2)
 _TRAINING_SHARE = 0.5  # of the time: the other half is the set network's
 
 Tracks = Sequence[Trajectory]
@@ -109,7 +109,7 @@ def _declaring(estimator: Estimator) -> Estimator:
         try:
             return estimator(case)
         except TooFewTrajectoriesError:
-            return nothing_told(case)
+            return nothing_identifiable(case)
 
     return answer
 
@@ -121,7 +121,10 @@ def _with_offset(reading: Reading, case: ProtocolCase) -> Answer:
 
 def _answer(estimate: NumbersEstimate) -> Answer:
     sd = np.sqrt(np.diag(estimate.covariance))
-    weak = tuple(name for name, has, most in zip(NUMBERS, sd, _WEAK_SD, strict=True) if has > most)
+    known = zip(NUMBERS, sd <= _IDENTIFIABLE_SD, strict=True)
     return Answer(
-        values=estimate.values, covariance=estimate.covariance, tracks=estimate.tracks, weak=weak
+        values=estimate.values,
+        covariance=estimate.covariance,
+        tracks=estimate.tracks,
+        identifiable=tuple(name for name, is_known in known if is_known),
     )

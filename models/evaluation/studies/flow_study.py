@@ -1,7 +1,7 @@
 """Simulated sites with a long reference: how well registration does there, and what misleads it.
 
-A knock is told from 25, 100 and 400 tracks. And with the camera still, half of the people take a
-new path: that must not look like a move of the camera.
+A knock is estimated from 25, 100 and 400 tracks. And with the camera still, half of the people take
+a new path: that must not look like a move of the camera.
 """
 
 import math

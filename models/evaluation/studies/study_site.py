@@ -33,7 +33,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedPlace:
-    """A place with what its reference tracks told: learned once, whatever happens after."""
+    """A place with what its reference tracks showed: learned once, whatever happens after."""
 
     place: Place
     site: CameraSite

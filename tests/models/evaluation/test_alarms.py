@@ -71,7 +71,7 @@ def results(alarms, years=1.0, delays=()):
         years=years,
         false_alarms=alarms,
         highest=0.5,
-        told=0.0,
+        pose_excess=0.0,
         delays=delays,
     )
 
@@ -188,7 +188,7 @@ def test_a_recorded_camera_is_judged_still_and_knocked():
     )
     assert found.false_alarms == 0
     assert 0 < found.highest < 1
-    assert 0 < found.told < 1
+    assert 0 < found.pose_excess < 1
     assert found.parties == pytest.approx(60, abs=15)
     assert [len(own) for own in by_knock([found]).values()] == [10, 10]
     assert share_within(by_knock([found])[(5.0, False)], 130) == 1.0

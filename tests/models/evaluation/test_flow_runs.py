@@ -77,7 +77,7 @@ def test_speeds_make_the_map_surer(learned):
 def test_without_a_map_registration_says_nothing_and_fused_is_the_joint_estimate(learned):
     blind = replace(learned, site=replace(learned.site, flow=None))
     nothing = registration(blind)
-    assert (nothing.tracks, len(nothing.weak), nothing.heading_rad) == (0, 3, None)
+    assert (nothing.tracks, nothing.identifiable, nothing.heading_rad) == (0, (), None)
     assert_array_equal(fused(blind).values, joint(blind).values)
     assert fused(blind).heading_rad is None
     few = replace(learned, seen=seen(list(learned.case.seen[:3])))

@@ -97,7 +97,9 @@ def test_an_answer_is_judged_by_hand_derived_numbers(scene):
     truth = numbers_of(case.true_pose)
     off = np.array([math.radians(1), 0.0, math.log(1.1)])
     sd = np.array([math.radians(0.7), math.radians(1), 0.05])
-    answer = Answer(values=truth + off, covariance=np.diag(sd**2), tracks=40, weak=("tilt",))
+    answer = Answer(
+        values=truth + off, covariance=np.diag(sd**2), tracks=40, identifiable=("roll", "height")
+    )
     outcome = judge_answer(case, "joint", answer, 0.1)
     assert outcome.angle_error_deg == pytest.approx(1.0, abs=1e-6)
     assert outcome.height_error == pytest.approx(0.1)

@@ -151,7 +151,7 @@ def test_a_turned_camera_is_told_with_its_heading(site):
         joint = joint_estimate(tracks, PRIOR, speeds)
         fused = fused_estimate(tracks, LENS, PRIOR, joint, reference)
         assert fused.registered
-        assert fused.told == ("tilt", "roll", "height", "heading")
+        assert fused.identifiable == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
         assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 1.0
         assert np.abs(off / np.sqrt(np.diag(fused.covariance))).max() < 3.5
@@ -165,6 +165,6 @@ def test_few_people_make_no_map_and_no_registration(site):
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
     fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, reference)
     assert not fused.registered
-    assert "heading" not in fused.told
+    assert "heading" not in fused.identifiable
     assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])
     assert_allclose(fused.covariance[:3, :3], joint.covariance)

@@ -158,7 +158,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
     fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
-    assert "heading" not in fused.told
+    assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
     turns_deg = [math.degrees(heading - PRIOR.heading_rad) for heading in fused.rivals]

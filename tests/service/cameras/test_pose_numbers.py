@@ -24,14 +24,14 @@ def lived(bench):
     for _ in range(2):
         bench.see(moved(tilt_deg=5.3, roll_deg=-1.7, height_m=0.42, heading_deg=2.2), paths=True)
     yield "knocked"
-    bench.see(moved(tilt_deg=4.9, height_m=-0.3), weak=("roll", "height"))
+    bench.see(moved(tilt_deg=4.9, height_m=-0.3), unidentifiable=("roll", "height"))
     yield "weak"
     bench.see(moved(height_m=0.9))
     yield "raised"
     for _ in range(2):
         bench.see(moved(), paths=True)
     yield "still"
-    bench.see(moved(), weak=("tilt", "roll", "height"))
+    bench.see(moved(), unidentifiable=("tilt", "roll", "height"))
     yield "untold"
 
 

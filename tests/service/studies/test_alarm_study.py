@@ -19,7 +19,7 @@ def results(name, alarms, tracks):
         years=2.0,
         false_alarms=alarms,
         highest=0.4,
-        told=0.2,
+        pose_excess=0.2,
         delays=delays,
     )
 
