@@ -59,7 +59,7 @@ def find_change(
     assert before is not None
     assert after is not None
     apart = after.candidate - before.candidate
-    covariance = (before.covariance + after.covariance) * reference.inflation
+    covariance = (before.covariance + after.covariance) * reference.pose_variance_inflation
     limit = chi_squared_above(_BY_CHANCE, 3)
     excess = float(apart @ np.linalg.solve(covariance, apart)) / limit
     return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None

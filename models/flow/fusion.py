@@ -86,8 +86,10 @@ def fused_estimate(
     if walkers.parties < _FEWEST_PARTIES:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
-    temper = reference.temper_for(walkers.people)
-    search = partial(register, walkers, site, temper=temper, headings=_HEADINGS)
+    variance_inflation = reference.variance_inflation_for(walkers.people)
+    search = partial(
+        register, walkers, site, variance_inflation=variance_inflation, headings=_HEADINGS
+    )
     belief = Belief(mean=mean, precision=precision)
     peaks = search(belief)
     apart = (peaks[0].candidate - mean)[:3]
@@ -105,7 +107,7 @@ def fused_estimate(
         covariance = np.asarray(np.linalg.inv(known + precision))
     chances = _chances(walkers, site, belief, peaks)
     covariance = covariance + elsewhere(peaks, chances)
-    covariance = covariance + _spread(walkers, site, belief, best, covariance, temper)
+    covariance = covariance + _spread(walkers, site, belief, best, covariance, variance_inflation)
     if reference.fit.has_changed(party_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     rivals = tuple(
@@ -169,7 +171,12 @@ def elsewhere(peaks: list[Peak], chances: Array) -> Array:
 
 
 def _spread(
-    walkers: Walkers, site: Site, belief: Belief, best: Peak, covariance: Array, temper: float
+    walkers: Walkers,
+    site: Site,
+    belief: Belief,
+    best: Peak,
+    covariance: Array,
+    variance_inflation: float,
 ) -> Array:
     """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
 
@@ -182,7 +189,7 @@ def _spread(
     for turn in turns:
         candidate = best.candidate + turn * line
         chance = site.log_chances(walkers, candidate).sum()
-        values.append(chance / temper + belief.log_density(candidate))
+        values.append(chance / variance_inflation + belief.log_density(candidate))
     chances = np.exp(np.array(values) - max(values))
     variance = float(chances @ turns**2 / chances.sum())
     return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

@@ -77,22 +77,28 @@ class Peak:
 
 
 def register(
-    walkers: Walkers, site: Site, belief: Belief, *, temper: float, headings: Sequence[float]
+    walkers: Walkers,
+    site: Site,
+    belief: Belief,
+    *,
+    variance_inflation: float,
+    headings: Sequence[float],
 ) -> list[Peak]:
     """Peaks of the posterior, the highest first.
 
-    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg
-    apart are climbed from, and ends that are the same are one. `temper` divides what the map
+    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
+    are climbed from, and ends that are the same are one. `variance_inflation` divides what the map
     says: how much larger its squared errors are than its scores would have it.
     """
 
     def posterior(candidate: Array) -> tuple[float, Likelihood]:
         found = site.likelihood(walkers, candidate)
-        return found.value / temper + belief.log_density(candidate), found
+        return found.value / variance_inflation + belief.log_density(candidate), found
 
     tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
     chances = [
-        float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(candidate)
+        float(site.log_chances(walkers, candidate).sum()) / variance_inflation
+        + belief.log_density(candidate)
         for candidate in tried
     ]
     begin: list[Array] = []
@@ -103,7 +109,7 @@ def register(
             begin.append(tried[number])
     ends: list[tuple[Array, float, Likelihood]] = []
     for candidate in begin:
-        end = _climbed(candidate, posterior, belief, temper)
+        end = _climbed(candidate, posterior, belief, variance_inflation)
         if all(np.abs(end[0] - other[0]).max() > _SAME_END for other in ends):
             ends.append(end)
     ends.sort(key=lambda end: -end[1])
@@ -123,8 +129,8 @@ def settled(
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
-    A single `temper` lets directions in which the map is noise drown a belief that is sure of
-    them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
+    A single `variance_inflation` lets directions in which the map is noise drown a belief that is
+    sure of them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
 
     Args:
         walkers: who is registered.
@@ -149,12 +155,14 @@ def _climbed(
     candidate: Array,
     posterior: Callable[[Array], tuple[float, Likelihood]],
     belief: Belief,
-    temper: float,
+    variance_inflation: float,
 ) -> tuple[Array, float, Likelihood]:
     value, found = posterior(candidate)
     for _ in range(_MOST_ROUNDS):
-        slope = found.scores.sum(axis=0) / temper - belief.precision @ (candidate - belief.mean)
-        matrix = _scatter(found.scores) / temper + belief.precision
+        slope = found.scores.sum(axis=0) / variance_inflation - belief.precision @ (
+            candidate - belief.mean
+        )
+        matrix = _scatter(found.scores) / variance_inflation + belief.precision
         move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
         move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
         share, gain = 1.0, -1.0

@@ -58,7 +58,7 @@ def joint_estimate(
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     best = ends[0]
-    covariance = best.covariance * reference.inflation + _elsewhere(ends, reference)
+    covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
     parties = count_parties(channels[0].measure(best.candidate))
     # One party is one draw of pace and pauses, however many tracks it has.
     covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
@@ -107,7 +107,7 @@ def _distinct(ends: list[Fit]) -> list[Fit]:
 def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
     """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
     best = ends[0]
-    chances = np.exp([(end.score - best.score) / reference.inflation for end in ends])
+    chances = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
     chances = chances / chances.sum()
     apart = np.array([end.candidate - best.candidate for end in ends])
     return np.asarray((apart * chances[:, None]).T @ apart)

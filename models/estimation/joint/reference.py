@@ -59,10 +59,10 @@ _DOUBT_RAD = float(np.radians(4.0))
 _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
 _PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
-# Squared errors against predicted ones, before any is seen, and what that guess weighs.
-_SURPRISE = 3.0
-_SURPRISE_WEIGHT = 6.0
-_LARGEST_SURPRISE = 9.0
+# Squared errors over predicted variances: before any are seen, and what that guess weighs.
+_ASSUMED_INFLATION = 3.0
+_ASSUMED_INFLATION_WEIGHT = 6.0
+_LARGEST_RATIO = 9.0
 
 
 def assumed_reference(
@@ -96,7 +96,7 @@ def assumed_reference(
         statures=statures,
         offset=np.zeros(3),
         offset_covariance=np.zeros((3, 3)),
-        inflation=_SURPRISE,
+        pose_variance_inflation=_ASSUMED_INFLATION,
         tracks=0,
         boxes=words,
     )
@@ -119,7 +119,9 @@ def learn_reference(
     site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
     whole = fit_pose(channels_of(observations, site, prior), numbers_of(prior), pose_prior(prior))
     offset = whole.candidate - numbers_of(prior)
-    inflation = _inflation(observations, prior, _with_spreads(blank, site), offset, seed)
+    inflation = _pose_variance_inflation(
+        observations, prior, _with_spreads(blank, site), offset, seed
+    )
     # A bias is of a degree or so: what the tracks leave free is not taken for one.
     plausible = np.diag(_PLAUSIBLE_OFFSET**2)
     noise = whole.covariance * inflation
@@ -128,7 +130,7 @@ def learn_reference(
         site,
         offset=kept @ offset,
         offset_covariance=kept @ noise,
-        inflation=inflation,
+        pose_variance_inflation=inflation,
         tracks=observations.walkers,
     )
     return replace(site, doubt=_doubt(observations, prior, blank, site))
@@ -166,7 +168,8 @@ def _doubt(
             code=TracksCode.STATURE_UNUSUAL,
             values={"stature_m": site.stature_m, "short_m": short, "tall_m": tall},
         )
-    free = joint_estimate(observations, prior, replace(blank, inflation=site.inflation))
+    inflated = replace(blank, pose_variance_inflation=site.pose_variance_inflation)
+    free = joint_estimate(observations, prior, inflated)
     apart = (free.raw - numbers_of(prior))[:2]
     sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
     if ((np.abs(apart) > _DOUBT_RAD) & (sigmas > _DOUBT_SIGMAS)).any():
@@ -235,7 +238,7 @@ def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
     return replace(blank, speeds=speeds, statures=statures)
 
 
-def _inflation(
+def _pose_variance_inflation(
     observations: Observations,
     prior: CameraPose,
     blank: SiteReference,
@@ -245,7 +248,7 @@ def _inflation(
     """How much larger squared errors are than predicted, by halves of the reference itself."""
     rng = np.random.default_rng(seed)
     at = numbers_of(prior)
-    surprises = []
+    ratios = []
     for _ in range(_FOLDS):
         order = rng.permutation(observations.tracks)
         half = observations.tracks // 2
@@ -257,9 +260,9 @@ def _inflation(
             fit = fit_pose(channels_of(unknown, site, prior), at, pose_prior(prior))
             error = fit.candidate - at - offset
             squared = float(error @ np.linalg.solve(fit.covariance, error)) / 3
-            surprises.append(min(squared, _LARGEST_SURPRISE))
-    guess = _SURPRISE * _SURPRISE_WEIGHT
-    return max(1.0, (sum(surprises) + guess) / (len(surprises) + _SURPRISE_WEIGHT))
+            ratios.append(min(squared, _LARGEST_RATIO))
+    guess = _ASSUMED_INFLATION * _ASSUMED_INFLATION_WEIGHT
+    return max(1.0, (sum(ratios) + guess) / (len(ratios) + _ASSUMED_INFLATION_WEIGHT))
 
 
 def _judge_boxes(tops: Measured) -> tuple[bool, str]:

@@ -10,6 +10,7 @@ from models.estimation.joint.observations import Observations
 from models.estimation.numbers import numbers_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.packing import stored_as
 from models.reasons import Reason
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
@@ -21,17 +22,17 @@ _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log h
 class SiteReference:
     """What is usual at a site, and how the joint estimator errs there.
 
-    `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth,
-    with `offset_covariance` (3, 3); its variances are to be multiplied by `inflation`. `tracks`
-    is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit the
-    prior pose, `boxes` says why boxes are used or not.
+    `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth, with
+    `offset_covariance` (3, 3); its variances are to be multiplied by `pose_variance_inflation`.
+    `tracks` is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit
+    the prior pose, `boxes` says why boxes are used or not.
     """
 
     speeds: Learned
     statures: Learned | None
     offset: Array
     offset_covariance: Array
-    inflation: float
+    pose_variance_inflation: float = stored_as("inflation")
     tracks: int
     doubt: Reason | None = None
     boxes: str = ""

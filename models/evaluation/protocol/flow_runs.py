@@ -55,9 +55,12 @@ def registration(learned: Learned) -> Answer:
     walkers = walkers_of(learned.seen, mean)
     if walkers.parties < _FEWEST:
         return nothing_identifiable(case)
-    site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
+    site, variance_inflation = (
+        reference.site(case.intrinsics),
+        reference.variance_inflation_for(walkers.people),
+    )
     belief = Belief(mean=mean, precision=_BROAD)
-    peaks = _peaks(walkers, site, belief, temper)
+    peaks = _peaks(walkers, site, belief, variance_inflation)
     best = peaks[0]
     known = reference.precision(best, walkers.people, best.candidate - mean)
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
@@ -72,13 +75,13 @@ def registration(learned: Learned) -> Answer:
     return _with_heading(answer, values, covariance)
 
 
-def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:
+def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
 
     def chance(candidate: Array) -> float:
-        return float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(
-            candidate
-        )
+        return float(
+            site.log_chances(walkers, candidate).sum()
+        ) / variance_inflation + belief.log_density(candidate)
 
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
@@ -89,9 +92,11 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[
     peaks: list[Peak] = []
     for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
         around = replace(belief, mean=belief.mean + node)
-        for peak in register(walkers, site, around, temper=temper, headings=_HEADINGS):
+        for peak in register(
+            walkers, site, around, variance_inflation=variance_inflation, headings=_HEADINGS
+        ):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            posterior = peak.curvature / temper + belief.precision
+            posterior = peak.curvature / variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
                 peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))

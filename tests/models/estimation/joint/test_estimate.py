@@ -60,7 +60,7 @@ def test_the_reference_knows_its_site(site):
     reference = site[0]
     assert reference.walking_speed_mps == pytest.approx(1.3, abs=0.07)
     assert reference.tracks == 150
-    assert 1 <= reference.inflation < 4
+    assert 1 <= reference.pose_variance_inflation < 4
     assert reference.doubt is None
     assert np.abs(reference.offset[:2]).max() < math.radians(0.3)
 
