@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.estimation.joint.fit import Fit, fit_pose, per_track, track_goodness
+from models.estimation.joint.fit import Fit, fit_pose, per_track, track_log_likelihoods
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.numbers import numbers_of
@@ -49,7 +49,7 @@ def find_change(
         before = _fit(observations, np.arange(cut), prior, reference)
         after = _fit(observations, np.arange(cut, observations.tracks), prior, reference)
         channels = channels_of(observations, reference, prior)
-        gain = track_goodness(channels, after.candidate) - track_goodness(
+        gain = track_log_likelihoods(channels, after.candidate) - track_log_likelihoods(
             channels, before.candidate
         )
         moved = _best_cut(np.cumsum(gain[::-1])[::-1])

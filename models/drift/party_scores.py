@@ -127,7 +127,8 @@ def _along_paths(walkers: Walkers, paths: Site, at: Array, share: float) -> Arra
     """How much likelier tracks (N, 4) are a step on than a step back, along each number."""
     return np.stack(
         [
-            paths.log_chances(walkers, at + step) - paths.log_chances(walkers, at - step)
+            paths.track_log_likelihoods(walkers, at + step)
+            - paths.track_log_likelihoods(walkers, at - step)
             for step in share * np.diag(REACH)
         ],
         axis=1,

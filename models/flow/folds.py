@@ -29,7 +29,7 @@ class Fold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folds:
-    """All quarters, and the grain of map that foretells people best."""
+    """All quarters, and the grain of map that predicts people best."""
 
     each: tuple[Fold, ...]
     grain: Grain

@@ -105,15 +105,15 @@ def fused_estimate(
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
     if belief.precision is not precision:
         covariance = np.asarray(np.linalg.inv(known + precision))
-    chances = _chances(walkers, site, belief, peaks)
-    covariance = covariance + elsewhere(peaks, chances)
+    odds = _odds(walkers, site, belief, peaks)
+    covariance = covariance + elsewhere(peaks, odds)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, variance_inflation)
     if reference.fit.has_changed(party_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     rivals = tuple(
         float(peak.candidate[3])
-        for peak, chance in zip(peaks, chances, strict=True)
-        if peak is not best and chance > _RIVAL
+        for peak, against_best in zip(peaks, odds, strict=True)
+        if peak is not best and against_best > _RIVAL
     )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
@@ -152,22 +152,22 @@ def _reason(
     return None
 
 
-def _chances(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) -> Array:
+def _odds(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) -> Array:
     """How likely each peak is against the first, by all it says or by known ground alone."""
     best = peaks[0]
-    chances = [1.0]
+    odds = [1.0]
     for peak in peaks[1:]:
         worse = max(loss(walkers, site, best.candidate, peak.candidate), 0.0)
         believed = belief.log_density(peak.candidate) - belief.log_density(best.candidate)
         by_known = math.exp(-0.5 * worse**2 + min(believed, 0.0))
-        chances.append(max(math.exp(peak.value - best.value), by_known))
-    return np.array(chances)
+        odds.append(max(math.exp(peak.value - best.value), by_known))
+    return np.array(odds)
 
 
-def elsewhere(peaks: list[Peak], chances: Array) -> Array:
-    """What other peaks add to the covariance (4, 4), each by its chance (P,); the first is best."""
+def elsewhere(peaks: list[Peak], odds: Array) -> Array:
+    """What other peaks add to the covariance (4, 4), each by its odds (P,); the first is best."""
     apart = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
-    return np.asarray((apart * (chances / chances.sum())[:, None]).T @ apart)
+    return np.asarray((apart * (odds / odds.sum())[:, None]).T @ apart)
 
 
 def _spread(
@@ -188,8 +188,8 @@ def _spread(
     values = []
     for turn in turns:
         candidate = best.candidate + turn * line
-        chance = site.log_chances(walkers, candidate).sum()
-        values.append(chance / variance_inflation + belief.log_density(candidate))
-    chances = np.exp(np.array(values) - max(values))
-    variance = float(chances @ turns**2 / chances.sum())
+        log_likelihood = site.track_log_likelihoods(walkers, candidate).sum()
+        values.append(log_likelihood / variance_inflation + belief.log_density(candidate))
+    density = np.exp(np.array(values) - max(values))
+    variance = float(density @ turns**2 / density.sum())
     return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

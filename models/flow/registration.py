@@ -37,7 +37,7 @@ class Site:
         """How likely the walkers are, seen from a candidate (4,)."""
         return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
 
-    def log_chances(self, walkers: Walkers, candidate: Array) -> Array:
+    def track_log_likelihoods(self, walkers: Walkers, candidate: Array) -> Array:
         """The log likelihood (N,) of each track alone."""
         lens = self.intrinsics
         return likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
@@ -96,15 +96,15 @@ def register(
         return found.value / variance_inflation + belief.log_density(candidate), found
 
     tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
-    chances = [
-        float(site.log_chances(walkers, candidate).sum()) / variance_inflation
+    log_posteriors = [
+        float(site.track_log_likelihoods(walkers, candidate).sum()) / variance_inflation
         + belief.log_density(candidate)
         for candidate in tried
     ]
     begin: list[Array] = []
-    for number in np.argsort(chances)[::-1]:
+    for number in np.argsort(log_posteriors)[::-1]:
         apart = [abs(tried[number][3] - other[3]) for other in begin]
-        hopeless = chances[number] < max(chances) - _HOPELESS
+        hopeless = log_posteriors[number] < max(log_posteriors) - _HOPELESS
         if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
             begin.append(tried[number])
     ends: list[tuple[Array, float, Likelihood]] = []

@@ -53,7 +53,8 @@ def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.ND
     """The mean scores (P, 4) of each party, in the order of their last tracks (P,)."""
     scores = np.stack(
         [
-            site.log_chances(walkers, at + step) - site.log_chances(walkers, at - step)
+            site.track_log_likelihoods(walkers, at + step)
+            - site.track_log_likelihoods(walkers, at - step)
             for step in np.diag(REACH)
         ],
         axis=1,

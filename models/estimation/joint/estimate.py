@@ -107,10 +107,10 @@ def _distinct(ends: list[Fit]) -> list[Fit]:
 def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
     """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
     best = ends[0]
-    chances = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
-    chances = chances / chances.sum()
+    odds = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
+    odds = odds / odds.sum()
     apart = np.array([end.candidate - best.candidate for end in ends])
-    return np.asarray((apart * chances[:, None]).T @ apart)
+    return np.asarray((apart * odds[:, None]).T @ apart)
 
 
 def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:

@@ -11,9 +11,9 @@ from models.estimation.joint.hierarchy import (
     Curvature,
     Spread,
     Weights,
+    composite_log_likelihoods,
     curvature,
-    fitness,
-    goodness,
+    hierarchical_log_likelihood,
     relearn,
     reweigh,
     track_curvatures,
@@ -63,7 +63,7 @@ class Fit:
     """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
     `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao). `score`
-    compares ends of different starts: goodness, less the prior's penalty.
+    compares ends of different starts: the composite log likelihood, less the prior's penalty.
     """
 
     candidate: Array
@@ -117,13 +117,13 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
     )
 
 
-def foretold(measured: Measured, learned: Learned) -> float:
-    """How well a learned field foretells what other tracks measured at the same pose."""
+def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
+    """The log likelihood, by a learned field, of what other tracks measured at the same pose."""
     residual = measured.value - learned.field.features(measured) @ learned.mean
     residual = np.where(measured.valid, residual, 0.0)
     rows, spread = measured.rows, learned.spread
     weights = reweigh(residual, measured.value, measured.valid, rows, spread)
-    return fitness(residual, weights, rows, spread)
+    return hierarchical_log_likelihood(residual, weights, rows, spread)
 
 
 def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit:
@@ -161,7 +161,7 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
             break
     score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):
-        score += float(_goodness(channel, candidate, mean).sum())
+        score += float(_log_likelihoods(channel, candidate, mean).sum())
     return Fit(
         candidate=candidate,
         covariance=honest_covariance(matrix, noise),
@@ -184,9 +184,9 @@ def per_track(channels: Sequence[Channel], candidate: Array) -> Curvature:
     )
 
 
-def track_goodness(channels: Sequence[Channel], candidate: Array) -> Array:
-    """How well a candidate explains each track (N,)."""
-    each = [_goodness(channel, candidate, channel.learned.mean) for channel in channels]
+def track_log_likelihoods(channels: Sequence[Channel], candidate: Array) -> Array:
+    """The composite log likelihood (N,) of each track at a candidate."""
+    each = [_log_likelihoods(channel, candidate, channel.learned.mean) for channel in channels]
     return np.asarray(np.sum(each, axis=0))
 
 
@@ -204,7 +204,9 @@ def _linear(
     return measured, jacobian, residual, weights
 
 
-def _goodness(channel: Channel, candidate: Array, mean: Array) -> Array:
+def _log_likelihoods(channel: Channel, candidate: Array, mean: Array) -> Array:
     measured = channel.measure(candidate)
     residual = measured.value - channel.learned.field.features(measured) @ mean
-    return goodness(residual, measured.value, measured.valid, measured.rows, channel.learned.spread)
+    return composite_log_likelihoods(
+        residual, measured.value, measured.valid, measured.rows, channel.learned.spread
+    )

@@ -216,7 +216,9 @@ def _by_track(values: Array, rows: Rows) -> tuple[npt.NDArray[np.int64], Array]:
     return rows.owner_idx[firsts], np.asarray(np.add.reduceat(values, firsts, axis=0))
 
 
-def goodness(residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread) -> Array:
+def composite_log_likelihoods(
+    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread
+) -> Array:
     """How well a candidate explains each track (N,): log density, long tracks as short ones.
 
     For comparing candidates far apart; a row above the horizon counts as all but impossible.
@@ -230,7 +232,9 @@ def goodness(residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spr
     return np.asarray(total / np.maximum(number, 1) * np.minimum(number, _INDEPENDENT_ROWS))
 
 
-def fitness(residual: Array, weights: Weights, rows: Rows, spread: Spread) -> float:
+def hierarchical_log_likelihood(
+    residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> float:
     """How well a field explains tracks: a log density, but for what the spread alone decides."""
     half = (_FREEDOM + 1) / 2
     scaled = weights.deviation(residual, rows) / spread.within_sd

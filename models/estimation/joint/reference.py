@@ -7,7 +7,7 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
-from models.estimation.joint.fit import assumed, fit_pose, foretold, learn
+from models.estimation.joint.fit import assumed, fit_pose, held_out_log_likelihood, learn
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
@@ -52,7 +52,7 @@ _TOPS_SPREAD = Spread(
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
 _SPREAD_ROUNDS = 5
 _FREEDOMS = (0.03, 0.3, 1.0)  # of the field's variation by place and direction, shares of the most
-_TELLING_GAIN = 1.0  # of the log density, for a freer field to be worth it
+_LEAST_GAIN = 1.0  # of the log likelihood, for a freer field to be worth it
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
 _DOUBT_RAD = float(np.radians(4.0))
@@ -184,7 +184,7 @@ def _suited(
 ) -> SiteReference:
     """A blank site whose speeds may vary by place and direction as much as its tracks show.
 
-    One half of the tracks must foretell the other: a field that is freer than the site needs costs
+    One half of the tracks must predict the other: a field that is freer than the site needs costs
     every estimate some of its precision.
     """
     rng = np.random.default_rng(seed)
@@ -194,22 +194,22 @@ def _suited(
         first, second = np.array_split(order, 2)
         halves += [(np.sort(first), np.sort(second)), (np.sort(second), np.sort(first))]
     at = numbers_of(prior)
-    # One spread for all, so that they differ in what they foretell alone.
+    # One spread for all, so that they differ in what they predict alone.
     spread = _learned(observations, prior, blank, 1).speeds.spread
     best, found = -np.inf, blank
     for freedom in _FREEDOMS:
         speeds = assumed(blank.speeds.field.freer(freedom), blank.speeds.spread)
         tried = replace(blank, speeds=speeds, statures=None)
-        foretelling = replace(tried, speeds=replace(tried.speeds, spread=spread))
-        told = 0.0
+        candidate_site = replace(tried, speeds=replace(tried.speeds, spread=spread))
+        log_likelihood = 0.0
         for known, unknown in halves:
-            site = _learned(of_tracks(observations, known), prior, foretelling, 0)
-            told += foretold(
+            site = _learned(of_tracks(observations, known), prior, candidate_site, 0)
+            log_likelihood += held_out_log_likelihood(
                 measure_speeds(of_tracks(observations, unknown).steps, at, prior.heading_rad),
                 site.speeds,
             )
-        if told > best + _TELLING_GAIN * len(halves):
-            best, found = told, replace(tried, statures=blank.statures)
+        if log_likelihood > best + _LEAST_GAIN * len(halves):
+            best, found = log_likelihood, replace(tried, statures=blank.statures)
     return found
 
 

@@ -64,8 +64,8 @@ def registration(learned: Learned) -> Answer:
     best = peaks[0]
     known = reference.precision(best, walkers.people, best.candidate - mean)
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    chances = np.exp([peak.value - best.value for peak in peaks])
-    covariance = covariance + elsewhere(peaks, chances)
+    odds = np.exp([peak.value - best.value for peak in peaks])
+    covariance = covariance + elsewhere(peaks, odds)
     sd = np.sqrt(np.diag(covariance))[:3]
     answer = replace(
         nothing_identifiable(case),
@@ -78,14 +78,14 @@ def registration(learned: Learned) -> Answer:
 def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
 
-    def chance(candidate: Array) -> float:
+    def log_posterior(candidate: Array) -> float:
         return float(
-            site.log_chances(walkers, candidate).sum()
+            site.track_log_likelihoods(walkers, candidate).sum()
         ) / variance_inflation + belief.log_density(candidate)
 
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
-        number: max(chance(belief.mean + node + turn) for turn in turns)
+        number: max(log_posterior(belief.mean + node + turn) for turn in turns)
         for number, node in enumerate(_NODES)
     }
     likeliest = sorted(starts, key=lambda number: -starts[number])
@@ -99,7 +99,7 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: flo
             posterior = peak.curvature / variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
-                peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+                peaks.append(replace(peak, candidate=candidate, value=log_posterior(candidate)))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

@@ -113,7 +113,7 @@ def test_a_fit_is_judged_by_its_drop():
 
 
 def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
-    """Mornings on one lane, evenings on another: four maps foretell better than one."""
+    """Mornings on one lane, evenings on another: four maps predict better than one."""
     day_s = 86_400.0
     tracks = []
     for lane, hour in ((lanes[0], 7.0), (lanes[1], 16.0)):

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from models.estimation.joint.hierarchy import (
     Spread,
     Weights,
+    composite_log_likelihoods,
     curvature,
-    goodness,
     relearn,
     reweigh,
     track_curvatures,
@@ -127,7 +127,11 @@ def test_the_spread_of_a_simulated_crowd_is_learned():
 def test_a_long_track_does_not_outvote_short_ones():
     rows = rows_of([40, 4])
     residual = np.full(44, 0.1)
-    long, short = goodness(residual, residual, np.ones(44, dtype=bool), rows, SPREAD)
+    long, short = composite_log_likelihoods(
+        residual, residual, np.ones(44, dtype=bool), rows, SPREAD
+    )
     assert long == pytest.approx(short)
     above = np.concatenate([np.zeros(40, dtype=bool), np.ones(4, dtype=bool)])
-    assert goodness(residual, residual, above, rows, SPREAD)[0] == pytest.approx(-32.0)
+    assert composite_log_likelihoods(residual, residual, above, rows, SPREAD)[0] == pytest.approx(
+        -32.0
+    )
