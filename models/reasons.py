@@ -30,7 +30,7 @@ class TracksCode(StrEnum):
     HEADING_AMBIGUOUS = "heading_ambiguous"
     HEADING_UNIDENTIFIABLE = "heading_untold"
     UNIDENTIFIABLE = "numbers_untold"
-    TOO_FEW_PARTIES = "too_few_parties"
+    TOO_FEW_GROUPS = "too_few_parties"
     SPEED_UNUSUAL = "speed_unusual"
     STATURE_UNUSUAL = "stature_unusual"
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"

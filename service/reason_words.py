@@ -126,7 +126,7 @@ def _unidentifiable(v: _Values) -> str:
     return text
 
 
-def _few_parties(v: _Values) -> str:
+def _few_groups(v: _Values) -> str:
     return (
         f"the {v['tracks']} tracks are of {v['parties']} "
         f"{'party' if v['parties'] == 1 else 'parties'} walking together, at least "
@@ -246,7 +246,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
     TracksCode.HEADING_UNIDENTIFIABLE: _heading_unidentifiable,
     TracksCode.UNIDENTIFIABLE: _unidentifiable,
-    TracksCode.TOO_FEW_PARTIES: _few_parties,
+    TracksCode.TOO_FEW_GROUPS: _few_groups,
     TracksCode.SPEED_UNUSUAL: _speed,
     TracksCode.STATURE_UNUSUAL: _stature,
     TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,

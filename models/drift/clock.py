@@ -14,7 +14,7 @@ _STILL_SIGMAS = 2.0
 _STILL_RAD = math.radians(1.0)
 _USUAL_RATE_HZ = 25.0
 _HEIGHT = 2
-_PARTIES_FOR_POSE = 24
+_GROUPS_FOR_POSE = 24
 
 
 def may_be_clock(reading: Reading) -> bool:
@@ -22,7 +22,7 @@ def may_be_clock(reading: Reading) -> bool:
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return reading.number in (_HEIGHT, CLOCK) and reading.parties < _PARTIES_FOR_POSE
+    return reading.number in (_HEIGHT, CLOCK) and reading.walking_groups < _GROUPS_FOR_POSE
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:

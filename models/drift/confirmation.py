@@ -16,8 +16,8 @@ def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
     """Whether a camera has moved from one estimate to the other.
 
     A cut must leave a pose behind it: where a number of the tracks after it is not identifiable,
-    more of them are to be waited for. The covariances know of parties and of other poses that
-    explain the tracks about as well, where a change point's own do not.
+    more of them are to be waited for. The covariances know of walking groups and of other poses
+    that explain the tracks about as well, where a change point's own do not.
     """
     if len(after.identifiable) < len(NUMBERS):
         return False

@@ -40,7 +40,7 @@ def reason_of_reading(reading: Reading) -> Reason | None:
     values: dict[str, Value] = {
         "number": number,
         "sign": reading.sign,
-        "parties": reading.parties,
+        "parties": reading.walking_groups,
         "statistic": reading.statistic,
         "level": reading.level,
     }

@@ -10,7 +10,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.numbers import IDENTIFIABLE_SD, WITH_HEADING, identifiable_of
 from models.flow.likelihood import Walkers, walkers_of
-from models.flow.path_test import loss, party_fits
+from models.flow.path_test import group_fits, loss
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
@@ -21,7 +21,7 @@ from models.reasons import Reason, TracksCode
 
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
-_FEWEST_PARTIES = 5
+_FEWEST_GROUPS = 5
 _CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three numbers
 _TRUST = 25.0
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
@@ -83,7 +83,7 @@ def fused_estimate(
     precision[:3, :3] = np.linalg.inv(joint.covariance)
     precision[3, 3] = _HEADING_SD**-2.0
     walkers = walkers_of(observations, mean)
-    if walkers.parties < _FEWEST_PARTIES:
+    if walkers.walking_groups < _FEWEST_GROUPS:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
     variance_inflation = reference.variance_inflation_for(walkers.people)
@@ -108,7 +108,7 @@ def fused_estimate(
     odds = _odds(walkers, site, belief, peaks)
     covariance = covariance + elsewhere(peaks, odds)
     covariance = covariance + _spread(walkers, site, belief, best, covariance, variance_inflation)
-    if reference.fit.has_changed(party_fits(walkers, site, values)):
+    if reference.fit.has_changed(group_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     rivals = tuple(
         float(peak.candidate[3])

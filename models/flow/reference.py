@@ -20,7 +20,7 @@ from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
 from models.packing import stored_as
 
-_RUN = 6  # parties after one another
+_RUN = 6  # walking groups after one another
 # The inflation before any is seen, and how many runs that guess is worth.
 _ASSUMED_INFLATION, _ASSUMED_INFLATION_WEIGHT = 1.3, 5.0
 _LEFT_NOISE = 0.5  # of the bias's, after what cancels
@@ -35,9 +35,9 @@ class FlowReference:
     `bias` (4,) is a person's mean score at the truth, by tilt, roll, log height and heading,
     `bias_covariance` (4, 4) how unsure that is, `spread` (4,) how much people's scores scatter.
     `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
-    peak says, and `score_variance_inflation` than curvature and the scatter of parties together
-    say, for a map of endless people; this one is of `people`. `still` and `fit` are what its two
-    tests go by.
+    peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
+    together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
+    its two tests go by.
     """
 
     flow: FlowMap
@@ -94,11 +94,12 @@ def learn_flow(
     weights: Array | None = None,
     folds: Folds | None = None,
 ) -> FlowReference | None:
-    """The flow of tracks at the prior pose; None where fewer than 12 parties walk.
+    """The flow of tracks at the prior pose; None where fewer than 12 walking groups walk.
 
-    A map knows the tracks that it is made of too well. So each quarter of the parties is held
-    against a map of the others: what their scores are on average is the bias, how much more they
-    scatter in runs of parties after one another than parties do is the inflation of their variance.
+    A map knows the tracks that it is made of too well. So each quarter of the walking groups is
+    held against a map of the others: what their scores are on average is the bias, how much more
+    they scatter in runs of walking groups after one another than walking groups do is the inflation
+    of their variance.
 
     Args:
         observations: of the tracks.
@@ -141,7 +142,7 @@ def learn_flow(
 def _scatter(crossed: CrossFit) -> tuple[float, Array]:
     """The inflation of the scores' variance, and what it is of.
 
-    That is the scatter (4, 4) of the slopes' sum if parties are independent.
+    That is the scatter (4, 4) of the slopes' sum if walking groups are independent.
     """
     centred = crossed.slopes - crossed.slopes.mean(axis=0)
     scatter = centred.T @ centred + 1e-9 * np.trace(centred.T @ centred) * np.eye(4)

@@ -67,7 +67,7 @@ class Peak:
     """Where a search ended: candidate (4,), log posterior, and what the map says there.
 
     `curvature` (4, 4) is how the log likelihood bends, `noise` (4, 4) how its slope scatters, by
-    party. Were the map the truth and parties single walkers, they would be the same.
+    walking group. Were the map the truth and walking groups single walkers, they would be the same.
     """
 
     candidate: Array
@@ -201,12 +201,12 @@ def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
 
 
 def noise_of(walkers: Walkers, scores: Array) -> Array:
-    """How the sum of scores (N, 4) scatters (4, 4): parties are independent, their people not."""
-    parties = np.zeros((walkers.tracks, 4))
-    np.add.at(parties, walkers.party_idx, scores)
-    used = int(parties.any(axis=1).sum())
-    # Where scores add up to nothing, as at a peak, four of the parties are not free.
-    return _scatter(parties) * used / max(used - 4, 1)
+    """How the sum of scores (N, 4) scatters (4, 4): groups are independent, their people not."""
+    walking_groups = np.zeros((walkers.tracks, 4))
+    np.add.at(walking_groups, walkers.group_idx, scores)
+    used = int(walking_groups.any(axis=1).sum())
+    # Where scores add up to nothing, as at a peak, four of the walking groups are not free.
+    return _scatter(walking_groups) * used / max(used - 4, 1)
 
 
 def _scatter(scores: Array) -> Array:

@@ -31,7 +31,7 @@ def learn_site(
     speed_tracks: int | None = None,
     chart: bool = True,
 ) -> CameraSite:
-    """The site of tracks at the prior pose; no map and no chart where fewer than 12 parties walk.
+    """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
 
     A map that grows is learned anew of all tracks that are known to be of the prior pose, older
     ones by less weight; how people walk there stays what the reference said, as an anchor.

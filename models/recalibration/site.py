@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from models.drift.chart import DriftChart
-from models.drift.party_scores import Usual
+from models.drift.group_scores import Usual
 from models.estimation.joint.site import SiteReference
 from models.flow.reference import FlowReference
 from models.geometry.intrinsics import Intrinsics

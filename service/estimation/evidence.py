@@ -230,7 +230,7 @@ def _read(
         alarms_a_year=evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
-        calm_parties=evidence.limits.people,
+        calm_groups=evidence.limits.people,
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
     return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)

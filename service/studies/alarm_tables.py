@@ -64,7 +64,7 @@ def _still_cells(name: str, results: Sequence[AlarmResults]) -> list[str]:
     low, high = rate_interval(results)
     return [
         name,
-        f"{np.median([result.parties for result in results]):.0f}",
+        f"{np.median([result.walking_groups for result in results]):.0f}",
         f"{years:.1f}",
         str(alarms),
         f"{alarms / years:.2f} ({low:.2f} to {high:.2f})",

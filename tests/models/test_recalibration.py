@@ -7,7 +7,7 @@ import pytest
 
 from models.drift.change_point import find_change
 from models.drift.chart_learning import learn_chart
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.drift.verdict import DriftLimits
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
@@ -120,7 +120,7 @@ def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, trac
     weights = np.linspace(0.05, 1, every.tracks)
     faded = learn_site(every, LENS, PRIOR, speeds=site.speeds, weights=weights)
     assert evenly.speeds is faded.speeds is site.speeds
-    assert evenly.chart.parties > site.chart.parties
+    assert evenly.chart.walking_groups > site.chart.walking_groups
     assert site.flow.people < evenly.flow.people
     assert faded.flow.people < evenly.flow.people
 
@@ -201,7 +201,7 @@ def refusals(site, tracks):
         "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
         "estimate_pose": lambda: estimate_pose(mixed, site),
         "read_alarm_chart": lambda: read_alarm_chart(mixed, site, ONE_A_YEAR),
-        "score_parties": lambda: score_parties(mixed, site.usual(site.flow, site.chart)),
+        "score_groups": lambda: score_groups(mixed, site.usual(site.flow, site.chart)),
         "find_change": lambda: find_change(mixed, PRIOR, site.speeds),
         "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speeds, folds, 0),
     }
@@ -213,7 +213,7 @@ def refusals(site, tracks):
         "learn_site",
         "estimate_pose",
         "read_alarm_chart",
-        "score_parties",
+        "score_groups",
         "find_change",
         "learn_chart",
     ],

@@ -114,7 +114,7 @@ def made_up(
         bound=np.diag(sd**2),
         raw=values + 0.01,
         walkers=len(evidence.tracks),
-        parties=len(evidence.tracks),
+        walking_groups=len(evidence.tracks),
         identifiable=tuple(name for name in NUMBERS if name not in unidentifiable),
         reason=as_said(missing)[0] if unidentifiable else None,
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.fit import Fit, fit_pose
-from models.estimation.joint.groups import count_parties
+from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
@@ -18,7 +18,7 @@ from models.reasons import Reason, TracksCode, Value
 
 _STARTS = 2
 _START_TRACKS = 80
-_FEWEST_PARTIES = 5
+_FEWEST_GROUPS = 5
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
 
@@ -28,7 +28,7 @@ class JointEstimate:
 
     `raw` (3,) is before that. `identifiable` names those of tilt, roll, height that the tracks
     determine; `reason` says what is missing, and is None where they determine all. `walkers` is
-    the number of tracks that were used, `parties` that of people or groups who walked
+    the number of tracks that were used, `walking_groups` that of people or groups who walked
     independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood.
     """
 
@@ -37,7 +37,7 @@ class JointEstimate:
     raw: Array
     bound: Array
     walkers: int
-    parties: int
+    walking_groups: int
     identifiable: tuple[str, ...]
     reason: Reason | None
 
@@ -59,21 +59,21 @@ def joint_estimate(
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     best = ends[0]
     covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
-    parties = count_parties(channels[0].measure(best.candidate))
-    # One party is one draw of pace and pauses, however many tracks it has.
-    covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
+    walking_groups = count_walking_groups(channels[0].measure(best.candidate))
+    # One walking group is one draw of pace and pauses, however many tracks it has.
+    covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
     identifiable = identifiable_of(NUMBERS, sd)
     reason = _reason(identifiable, sd, covariance)
-    if parties < _FEWEST_PARTIES:
+    if walking_groups < _FEWEST_GROUPS:
         identifiable = ()
         reason = Reason(
-            code=TracksCode.TOO_FEW_PARTIES,
+            code=TracksCode.TOO_FEW_GROUPS,
             values={
                 "tracks": observations.walkers,
-                "parties": int(parties),
-                "least_parties": _FEWEST_PARTIES,
+                "parties": int(walking_groups),
+                "least_parties": _FEWEST_GROUPS,
             },
         )
     return JointEstimate(
@@ -82,7 +82,7 @@ def joint_estimate(
         raw=best.candidate,
         bound=best.bound,
         walkers=observations.walkers,
-        parties=parties,
+        walking_groups=walking_groups,
         identifiable=identifiable,
         reason=reason,
     )

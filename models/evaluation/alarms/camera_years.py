@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 
 from models.drift.chart import trace
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.errors import DegenerateGeometryError
 from models.evaluation.alarms.results import DAYS, AlarmResults, Delay, knocks_of
 from models.evaluation.alarms.watch import Watch, first_alarm, watch_over
@@ -51,14 +51,14 @@ def live_year(
         day += 1
     reference = observe_feet(first[:reference_tracks], place.intrinsics)
     learned = learn_site(reference, place.intrinsics, place.prior, speed_tracks=SPEED_TRACKS)
-    watch = watch_over(learned, alarms_a_year=alarms_a_year, parties_a_day=tracks_a_day)
+    watch = watch_over(learned, alarms_a_year=alarms_a_year, groups_a_day=tracks_a_day)
     assert watch is not None
     apart = []
     for _ in range(0, days, _WEEK):
         week = [track for tracks in islice(life, _WEEK) for track in tracks]
         if week:
             seen = observe_feet(week, place.intrinsics)
-            apart.append(watch.apart(score_parties(seen, watch.usual)))
+            apart.append(watch.apart(score_groups(seen, watch.usual)))
     walked = np.concatenate(apart)
     delays = [
         delay
@@ -68,7 +68,7 @@ def live_year(
     return AlarmResults(
         name=f"site {site}",
         seed=seed,
-        parties=int(watch.chart.parties),
+        walking_groups=int(watch.chart.walking_groups),
         years=days / DAYS,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, walked).statistic.max()) / watch.level,
@@ -97,14 +97,14 @@ def _knocked(
     except DegenerateGeometryError:
         return None
     observations = observe_feet(seen[:_LONGEST_TRACKS], place.intrinsics)
-    scores = score_parties(observations, watch.usual)
+    scores = score_groups(observations, watch.usual)
     if not scores.last.size:
         return None
-    parties_a_track = observations.tracks / scores.last.size
+    groups_a_track = observations.tracks / scores.last.size
     return Delay(
         angle_deg=asked.angle_deg,
         pan=asked.pan,
-        tracks=first_alarm(watch, watch.apart(scores), parties_a_track),
+        tracks=first_alarm(watch, watch.apart(scores), groups_a_track),
     )
 
 

@@ -33,7 +33,7 @@ class AlarmResults:
 
     name: str
     seed: int
-    parties: int
+    walking_groups: int
     years: float
     false_alarms: int
     highest: float

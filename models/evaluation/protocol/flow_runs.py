@@ -53,7 +53,7 @@ def registration(learned: Learned) -> Answer:
         return nothing_identifiable(case)
     mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
-    if walkers.parties < _FEWEST:
+    if walkers.walking_groups < _FEWEST:
         return nothing_identifiable(case)
     site, variance_inflation = (
         reference.site(case.intrinsics),

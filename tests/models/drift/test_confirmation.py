@@ -16,7 +16,7 @@ def estimate(values=(0.3, 0.0, 1.8), covariance=None, unidentifiable=()):
         raw=np.array(values) + 5.0,  # before the reference's offset: nothing to go by
         bound=np.eye(3),
         walkers=40,
-        parties=40,
+        walking_groups=40,
         identifiable=tuple(name for name in NUMBERS if name not in unidentifiable),
         reason="",
     )

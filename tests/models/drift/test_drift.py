@@ -138,7 +138,7 @@ def reading(statistic, number=3):
         level=10.0,
         number=number,
         sign=1,
-        parties=20,
+        walking_groups=20,
         track_idx=0,
         suspicious=statistic > 5,
     )

@@ -69,7 +69,7 @@ def test_the_level_is_passed_about_as_often_as_it_says():
 
 def test_rarer_alarms_need_more():
     still = StillScores(
-        mean=np.zeros(4), covariance=np.eye(4), bent=np.eye(4), looks=10.0, parties=50.0
+        mean=np.zeros(4), covariance=np.eye(4), bent=np.eye(4), looks=10.0, walking_groups=50.0
     )
     # Student's t of 49 degrees of freedom, two-sided: 3.27 at 0.001 * 2, tables.
     assert still.level(0.02) == pytest.approx(3.265**2, rel=2e-3)
@@ -104,7 +104,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
 
 
 def test_a_fit_is_judged_by_its_drop():
-    fit = UsualFit(mean=-1.0, sd=1.0, parties=100.0)
+    fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
     # t of 99 degrees at 1e-4: 3.86; times sqrt(1/25 + 1/100) = 0.2236: a drop of 0.863
     assert not fit.has_changed(np.full(25, -1.85))
     assert fit.has_changed(np.full(25, -1.88))

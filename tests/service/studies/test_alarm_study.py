@@ -15,7 +15,7 @@ def results(name, alarms, tracks):
     return AlarmResults(
         name=name,
         seed=0,
-        parties=60,
+        walking_groups=60,
         years=2.0,
         false_alarms=alarms,
         highest=0.4,

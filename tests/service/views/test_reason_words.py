@@ -65,10 +65,10 @@ SAID = [
     (T.UNIDENTIFIABLE, {"tilt_sd_rad": math.radians(3.0), "alike": ["tilt", "height"]},
      "the tracks cannot tell tilt (sd 3.0 deg): people walk too much alike, one way or along one "
      "path, and tilt makes up for height"),
-    (T.TOO_FEW_PARTIES, {"tracks": 12, "parties": 1, "least_parties": 5},
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 1, "least_parties": 5},
      "the 12 tracks are of 1 party walking together, at least 5 are needed to tell the camera's "
      "drift from theirs"),
-    (T.TOO_FEW_PARTIES, {"tracks": 12, "parties": 3, "least_parties": 5},
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 3, "least_parties": 5},
      "the 12 tracks are of 3 parties walking together, at least 5 are needed to tell the camera's "
      "drift from theirs"),
     (T.SPEED_UNUSUAL, {"speed_mps": 2.994, "slow_mps": 0.7, "fast_mps": 2.0},
@@ -203,7 +203,13 @@ def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():
 @pytest.mark.parametrize(("number", "name"), [(0, "tilt"), (2, "height"), (CLOCK, "times")])
 def test_a_suspicious_reading_is_a_reason(number, name):
     reading = Reading(
-        statistic=9.0, level=8.0, number=number, sign=1, parties=20, track_idx=3, suspicious=True
+        statistic=9.0,
+        level=8.0,
+        number=number,
+        sign=1,
+        walking_groups=20,
+        track_idx=3,
+        suspicious=True,
     )
     reason = reason_of_reading(reading)
     assert reason is not None

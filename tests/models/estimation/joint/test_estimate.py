@@ -154,19 +154,19 @@ def test_what_a_path_determines_is_identifiable(square, degrees, identifiable):
     assert np.abs(off(estimate, KNOCKED)).max() < 3
 
 
-def test_one_party_is_no_crowd(site):
+def test_one_group_is_no_crowd(site):
     _, (leader,) = tracks_of(3, (PRIOR, 1), (KNOCKED, 1))
-    party = [
+    walking_group = [
         replace(leader, uv=leader.uv + [6.0 * number, 2.0 * number]) for number in range(12)
     ]  # fmt: skip
-    estimate = joint_estimate(seen(party), PRIOR, site[0])
-    assert estimate.parties == 1
+    estimate = joint_estimate(seen(walking_group), PRIOR, site[0])
+    assert estimate.walking_groups == 1
     assert estimate.identifiable == ()
     assert estimate.reason is not None
-    assert estimate.reason.code is TracksCode.TOO_FEW_PARTIES
+    assert estimate.reason.code is TracksCode.TOO_FEW_GROUPS
     assert estimate.reason.values == {"tracks": 12, "parties": 1, "least_parties": 5}
     crowd = joint_estimate(site[2], PRIOR, site[0])
-    assert crowd.parties > 80
+    assert crowd.walking_groups > 80
 
 
 def test_people_who_stand_tell_nothing(site):

@@ -1,8 +1,8 @@
-"""What a party of people says of small moves of a camera: by how they walk, and where.
+"""What a walking group says of small moves of a camera: by how they walk, and where.
 
-Each party has fourteen scores. Three are slopes of the joint estimator's likelihood along tilt,
-roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that it
-says little after a large move. Three more are the same without that: how far off a pace is, held
+Each walking group has fourteen scores. Three are slopes of the joint estimator's likelihood along
+tilt, roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that
+it says little after a large move. Three more are the same without that: how far off a pace is, held
 within bounds. Eight are how much likelier their places and ways were a little further on than a
 little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
 these tells a move, and how well, is learned of the site (`chart_learning`). The method: "The alarm"
@@ -22,7 +22,7 @@ from models.estimation.numbers import numbers_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
 from models.flow.registration import Site
-from models.flow.turn_detection import REACH, parties_in_time
+from models.flow.turn_detection import REACH, groups_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
@@ -42,17 +42,17 @@ class Usual:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PartyScores:
-    """Scores (P, 14) of parties in the order of their last tracks (P,)."""
+class GroupScores:
+    """Scores (P, 14) of walking groups in the order of their last tracks (P,)."""
 
     values: Array
     last: npt.NDArray[np.int64]
 
 
-def score_parties(
+def score_groups(
     observations: Observations, usual: Usual, walkers: Walkers | None = None
-) -> PartyScores:
-    """The scores of all parties among tracks, at the prior pose.
+) -> GroupScores:
+    """The scores of all walking groups among tracks, at the prior pose.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -60,8 +60,8 @@ def score_parties(
     check_in_time(observations)
     if walkers is None:
         walkers = walkers_of(observations, candidate_of(usual.prior))
-    _, _, last = parties_in_time(walkers)
-    return PartyScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
+    _, _, last = groups_in_time(walkers)
+    return GroupScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
 
 
 def scores_at(
@@ -76,7 +76,7 @@ def scores_at(
     By a clock whose times are longer by a factor, everybody is as much slower.
     """
     at = candidate_of(usual.prior) + beside
-    people, party_of, last = parties_in_time(walkers)
+    people, group_of, last = groups_in_time(walkers)
     if not last.size:
         return np.zeros((0, SCORES))
     numbers = numbers_of(usual.prior) + beside[:3]
@@ -92,8 +92,8 @@ def scores_at(
         axis=1,
     )
     sums = np.zeros((last.size, SCORES))
-    np.add.at(sums, party_of, scores[people])
-    return np.asarray(sums / np.bincount(party_of)[:, None])
+    np.add.at(sums, group_of, scores[people])
+    return np.asarray(sums / np.bincount(group_of)[:, None])
 
 
 def _slowed(steps: Steps, stretch: float) -> Steps:
