@@ -6,7 +6,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
-from models.estimation.numbers import WITH_HEADING
+from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode
 from service.kinds import Cause, TrainingState
 from service.reasons import ServiceCode
@@ -59,7 +59,7 @@ def _limit(v: _Values) -> str:
 
 def _numbers(v: _Values) -> str:
     said = []
-    for name in WITH_HEADING:
+    for name in PARAMETERS:
         if name == "height" and "height_m" in v:
             said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
         elif f"{name}_rad" in v:

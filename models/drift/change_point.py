@@ -7,7 +7,7 @@ import numpy as np
 from models.estimation.joint.fit import Fit, fit_pose, per_track, track_log_likelihoods
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import chi_squared_above
@@ -71,7 +71,7 @@ def _first_cut(observations: Observations, prior: CameraPose, reference: SiteRef
     The first is the better one for a small move, the second where most tracks are after it.
     """
     channels = channels_of(observations, reference, prior)
-    at_prior = numbers_of(prior) + reference.offset
+    at_prior = plane_parameters_of(prior) + reference.offset
     whole = fit_pose(channels, at_prior, pose_prior(prior)).candidate
     best, place = -np.inf, FEWEST_BESIDE
     for candidate in (at_prior, whole):
@@ -111,5 +111,5 @@ def _fit(
     observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SiteReference
 ) -> Fit:
     part = of_tracks(observations, chosen)
-    start = numbers_of(prior) + reference.offset
+    start = plane_parameters_of(prior) + reference.offset
     return fit_pose(channels_of(part, reference, prior), start, pose_prior(prior))

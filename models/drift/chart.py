@@ -5,7 +5,7 @@ and for times that are too long or too short, the chart knows how the mean score
 would
 change: it has seen the reference's people as a camera knocked so would. The statistic is the
 largest log likelihood ratio of any knock against none, over the newest 16 to 400 walking groups: a
-two-sided CUSUM for each number and size (Page 1954) in Lorden's and Lai's window-limited form,
+two-sided CUSUM for each parameter and size (Page 1954) in Lorden's and Lai's window-limited form,
 which is the same for one size and keeps its meaning where the reference is itself unsure: its noise
 is in the ratio, so that no number of new people makes a reference's own error a drift.
 """
@@ -22,7 +22,7 @@ from models.packing import stored_as
 
 FEWEST = 16  # walking groups that a move is detected by
 LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
-CLOCK = 4  # the number of times that are too long
+CLOCK = 4  # beside the four of a pose: times that are too long
 # What a site's people may do of themselves for hours on end, as moves of the camera, and of its
 # clock: by day and night, in rain and crowds they walk elsewhere, and a few percent faster.
 HABITS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
@@ -38,28 +38,28 @@ _LEAST_LEVEL = 5.4  # of a run of endless normal walking groups that is wrong on
 class Knocked:
     """A knock of the grid: of tilt, roll, log height, heading or clock (0 to 4), and how far."""
 
-    number: int
+    parameter: int
     size: float
 
     @property
     def step(self) -> Array:
         """As a move (4,) of the camera."""
         step = np.zeros(5)
-        step[self.number] = self.size
+        step[self.parameter] = self.size
         return step[:4]
 
     @property
     def stretch(self) -> float:
         """By what times are too long."""
-        return float(np.exp(self.size)) if self.number == CLOCK else 1.0
+        return float(np.exp(self.size)) if self.parameter == CLOCK else 1.0
 
 
 _ANGLES = tuple(float(np.radians(angle)) for angle in (1.0, 2.5, 6.0))
-# Of each number, the smallest first. 0.18 is 30 frames a second taken for 25.
+# Of each parameter, the smallest first. 0.18 is 30 frames a second taken for 25.
 _SIZES = (_ANGLES, _ANGLES, (0.05, 0.12, 0.3), _ANGLES, (0.08, 0.18))
 KNOCKS = tuple(
-    Knocked(number=number, size=sign * size)
-    for number, sizes in enumerate(_SIZES)
+    Knocked(parameter=parameter, size=sign * size)
+    for parameter, sizes in enumerate(_SIZES)
     for sign in (1, -1)
     for size in sizes
 )
@@ -105,14 +105,14 @@ class Reading:
 
     `statistic` is compared with `level`: where it is below by now, the highest since the chart was
     last calm for some walking groups in a row, so that it matters not after whom somebody looks.
-    `number` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
+    `parameter` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
     `walking_groups` how many say so and `track_idx` the first track of theirs. What is `suspicious`
     would be an alarm were a hundred times as many allowed.
     """
 
     statistic: float
     level: float
-    number: int
+    parameter: int
     sign: int
     walking_groups: int
     track_idx: int
@@ -161,7 +161,7 @@ def read_chart(
     return Reading(
         statistic=statistic,
         level=level,
-        number=knock.number,
+        parameter=knock.parameter,
         sign=1 if knock.size > 0 else -1,
         walking_groups=walking_groups,
         track_idx=int(scores.last[-most:][at + 1 - walking_groups]),
@@ -199,7 +199,7 @@ class Trace:
 
 def ratios_of(chart: DriftChart) -> Ratios:
     """The weights of a chart for each number of newest walking groups."""
-    slopes = np.stack([_slope(chart, number) for number in range(len(_SIZES))], axis=1)
+    slopes = np.stack([_slope(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
     habits = (slopes * HABITS) @ (slopes * HABITS).T
     weights, strengths = [], []
     for length in LENGTHS:
@@ -231,10 +231,10 @@ def trace(ratios: Ratios, apart: Array) -> Trace:
     return Trace(statistic=statistic, knock_idx=knock_idx, walking_groups=walking_groups)
 
 
-def _slope(chart: DriftChart, number: int) -> Array:
-    """The response (14,) to a unit of a number, by its smallest knocks both ways."""
-    size = _SIZES[number][0]
-    on, back = (KNOCKS.index(Knocked(number=number, size=sign * size)) for sign in (1, -1))
+def _slope(chart: DriftChart, parameter: int) -> Array:
+    """The response (14,) to a unit of a parameter, by its smallest knocks both ways."""
+    size = _SIZES[parameter][0]
+    on, back = (KNOCKS.index(Knocked(parameter=parameter, size=sign * size)) for sign in (1, -1))
     return np.asarray((chart.responses[:, on] - chart.responses[:, back]) / (2 * size))
 
 

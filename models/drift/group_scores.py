@@ -18,7 +18,7 @@ from models.estimation.joint.fit import Learned, per_track
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, Steps, check_in_time
 from models.estimation.joint.site import SiteReference, channels_of
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
 from models.flow.registration import Site
@@ -79,14 +79,14 @@ def scores_at(
     people, group_of, last = groups_in_time(walkers)
     if not last.size:
         return np.zeros((0, SCORES))
-    numbers = numbers_of(usual.prior) + beside[:3]
+    parameters = plane_parameters_of(usual.prior) + beside[:3]
     observations = replace(observations, steps=_slowed(observations.steps, stretch))
     walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
-    slopes = per_track(channels_of(observations, usual.paces, usual.prior), numbers).gradient
+    slopes = per_track(channels_of(observations, usual.paces, usual.prior), parameters).gradient
     scores = np.concatenate(
         [
             -slopes,
-            _bounded(observations, walkers, usual, numbers),
+            _bounded(observations, walkers, usual, parameters),
             *(_along_paths(walkers, usual.paths, at, step) for step in _STEPS),
         ],
         axis=1,
@@ -100,13 +100,15 @@ def _slowed(steps: Steps, stretch: float) -> Steps:
     return replace(steps, seconds=steps.seconds * stretch)
 
 
-def _bounded(observations: Observations, walkers: Walkers, usual: Usual, numbers: Array) -> Array:
+def _bounded(
+    observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
+) -> Array:
     """How far off paces are, and statures where boxes tell them, times what would mend it."""
     heading, paces = usual.prior.heading_rad, usual.paces
-    speeds = measure_speeds(walkers.steps, numbers, heading)
+    speeds = measure_speeds(walkers.steps, parameters, heading)
     scores = _off(speeds, paces.speeds, walkers.tracks) / _PACE_SD**2
     if paces.statures is not None:
-        tops = measure_statures(observations.tops, numbers, heading)
+        tops = measure_statures(observations.tops, parameters, heading)
         scores = scores + _off(tops, paces.statures, walkers.tracks) / _STATURE_SD**2
     return scores
 
@@ -124,7 +126,7 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
 
 
 def _along_paths(walkers: Walkers, paths: Site, at: Array, share: float) -> Array:
-    """How much likelier tracks (N, 4) are a step on than a step back, along each number."""
+    """How much likelier tracks (N, 4) are a step on than a step back, along each parameter."""
     return np.stack(
         [
             paths.track_log_likelihoods(walkers, at + step)

@@ -1,13 +1,13 @@
-"""What a verdict and a chart give as their reason: codes and numbers."""
+"""What a verdict and a chart give as their reason: codes and values."""
 
 from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
-from models.estimation.numbers import WITH_HEADING
+from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode, Value
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
-    """The identifiable numbers against the prior pose and the limits; None where none is."""
+    """The identifiable parameters against the prior pose and the limits; None where none is."""
     values: dict[str, Value] = {
         "sigmas": limits.sigmas,
         "floor_rad": limits.floor_rad,
@@ -32,13 +32,14 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
 def reason_of_reading(reading: Reading) -> Reason | None:
     """Which way the drift chart says that a camera has moved; None where it says nothing.
 
-    `number` is one of a pose, or `times` where all were too long (`sign` 1) or too short (-1).
+    Its `number` is a parameter of a pose, or `times` where all were too long (`sign` 1) or too
+    short (-1).
     """
     if not reading.suspicious:
         return None
-    number = "times" if reading.number == CLOCK else WITH_HEADING[reading.number]
+    parameter = "times" if reading.parameter == CLOCK else PARAMETERS[reading.parameter]
     values: dict[str, Value] = {
-        "number": number,
+        "number": parameter,
         "sign": reading.sign,
         "parties": reading.walking_groups,
         "statistic": reading.statistic,

@@ -20,7 +20,7 @@ class CrossFit:
     `slopes` (P, 4) are sums of a walking group's scores of `people` (P,) in it, `curvature` (4, 4)
     is of all. `scores` (P, 4), of the score test, and `fits` (P,) are of walking groups; slopes and
     scores are in the order of time. `bent` (4, 4) has in a column how the mean score of a camera
-    that has moved differs, for each number.
+    that has moved differs, for each parameter.
     """
 
     slopes: Array

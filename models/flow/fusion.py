@@ -8,21 +8,21 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import IDENTIFIABLE_SD, WITH_HEADING, identifiable_of
+from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.path_test import group_fits, loss
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Belief, Peak, Site, register, settled
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode
 
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
 _FEWEST_GROUPS = 5
-_CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three numbers
+_CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three parameters
 _TRUST = 25.0
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 
@@ -119,7 +119,7 @@ def fused_estimate(
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        identifiable=identifiable_of(WITH_HEADING, sd),
+        identifiable=identifiable_of(PARAMETERS, sd),
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
@@ -180,7 +180,7 @@ def _spread(
 ) -> Array:
     """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
 
-    Looked at along the heading, the other numbers following as they do around the peak.
+    Looked at along the heading, the other parameters following as they do around the peak.
     """
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])

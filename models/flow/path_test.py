@@ -70,7 +70,7 @@ def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
 
 
 def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
-    """The fit (tracks,) of each walking group at its own number; NaN of those on unknown ground."""
+    """The fit (tracks,) of each walking group at its own index; NaN of those on unknown ground."""
     flow = site.flow
     placed = place_steps(walkers.steps, candidate)
     rows = walkers.steps.rows

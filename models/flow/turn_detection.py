@@ -31,8 +31,8 @@ _BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's
 class StillScores:
     """What scores are like while a camera stands: mean (4,) and covariance (4, 4) of a group's.
 
-    `bent` (4, 4) has in a column how the mean moves with each number. `looks` is how many
-    independent looks at a number the test of a window is worth; `walking_groups` made the
+    `bent` (4, 4) has in a column how the mean moves with each parameter. `looks` is how many
+    independent looks at a parameter the test of a window is worth; `walking_groups` made the
     reference.
     """
 
@@ -90,7 +90,7 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
 
     Args:
         scores: each scored by a map that its people have no part in.
-        bent: how the mean score changes with each number (4, 4): a column for a number.
+        bent: how the mean score changes with each parameter (4, 4): a column for a parameter.
         seed: of the bootstrap.
     """
     count = len(scores)
@@ -140,7 +140,7 @@ def moved_within(
 def _squares(
     scores: Array, mean: Array, covariance: Array, bent: Array, walking_groups: float
 ) -> Array:
-    """Squared standard scores (W, 4) of the newest 8, 9, ... groups' means, for each number."""
+    """Squared standard scores (W, 4) of the newest 8, 9, ... groups' means, for each parameter."""
     directions, variance = _directions(covariance, bent)
     along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
     count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
@@ -149,7 +149,7 @@ def _squares(
 
 
 def _directions(covariance: Array, bent: Array) -> tuple[Array, Array]:
-    """Rows (4, 4) to look along, to see each number best against the scatter; variances (4,)."""
+    """Rows (4, 4) to look along, to see each parameter best against the scatter; variances (4,)."""
     ridge = covariance + _RIDGE * np.diag(np.diag(covariance)) + 1e-9 * np.eye(4)
     directions = np.linalg.solve(ridge, bent).T
     return np.asarray(directions), np.einsum("ki,ij,kj->k", directions, ridge, directions)

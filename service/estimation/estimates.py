@@ -14,7 +14,7 @@ from models.drift.verdict import (
     judge,
     pose_after,
 )
-from models.estimation.numbers import NUMBERS
+from models.estimation.parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
 from models.reasons import Reason
 from models.recalibration import drift_of
@@ -95,7 +95,7 @@ def _judge(
     if firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
         # An alert of before this reference stands until what is seen after it ends it.
         before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
-        drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
+        drifted = PLANE_PARAMETERS if before is None else tuple(before.drifted) or PLANE_PARAMETERS
     if last is not None:
         since = last.drift_since
     limits = drift_limits(settings)
@@ -126,12 +126,12 @@ def _judge(
         training,
         None if finding.reading is None else reason_of_reading(finding.reading),
         finding.fused.reason,
-        None if set(NUMBERS) <= set(drift.identifiable) else finding.joint.reason,
+        None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
         *finding.lacks,
     )
     charted = reading is not None and reading.moved
-    if charted and clock is None and reading is not None and reading.number == CLOCK:
+    if charted and clock is None and reading is not None and reading.parameter == CLOCK:
         clock = reason_of_reading(reading)
     _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 

@@ -14,7 +14,7 @@ from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
 from prometheus_client.registry import Collector
 
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from service.kinds import AlertKind, PoseState, Severity, TrainingState
 from service.views.metrics import Figures
 

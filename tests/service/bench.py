@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
-from models.estimation.numbers import NUMBERS
+from models.estimation.parameters import PLANE_PARAMETERS
 from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
@@ -115,7 +115,7 @@ def made_up(
         raw=values + 0.01,
         walkers=len(evidence.tracks),
         walking_groups=len(evidence.tracks),
-        identifiable=tuple(name for name in NUMBERS if name not in unidentifiable),
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name not in unidentifiable),
         reason=as_said(missing)[0] if unidentifiable else None,
     )
     fused = by_speeds_alone(joint, evidence.prior)

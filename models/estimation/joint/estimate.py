@@ -10,7 +10,7 @@ from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
-from models.estimation.numbers import NUMBERS, identifiable_of, numbers_of
+from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of, plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
@@ -28,7 +28,7 @@ class JointEstimate:
 
     `raw` (3,) is before that. `identifiable` names those of tilt, roll, height that the tracks
     determine; `reason` says what is missing, and is None where they determine all. `walkers` is
-    the number of tracks that were used, `walking_groups` that of people or groups who walked
+    the parameter of tracks that were used, `walking_groups` that of people or groups who walked
     independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood.
     """
 
@@ -54,7 +54,7 @@ def joint_estimate(
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
     few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-    begin = starts(few, numbers_of(prior), _STARTS)
+    begin = starts(few, plane_parameters_of(prior), _STARTS)
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     best = ends[0]
@@ -64,7 +64,7 @@ def joint_estimate(
     covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
-    identifiable = identifiable_of(NUMBERS, sd)
+    identifiable = identifiable_of(PLANE_PARAMETERS, sd)
     reason = _reason(identifiable, sd, covariance)
     if walking_groups < _FEWEST_GROUPS:
         identifiable = ()
@@ -114,15 +114,17 @@ def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
 
 
 def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
-    """What is not identifiable; `alike` names two numbers that make up for one another."""
-    missing = [name for name in NUMBERS if name not in identifiable]
+    """What is not identifiable; `alike` names two parameters that make up for one another."""
+    missing = [name for name in PLANE_PARAMETERS if name not in identifiable]
     if not missing:
         return None
     said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
-    values: dict[str, Value] = {said[name]: float(sd[NUMBERS.index(name)]) for name in missing}
+    values: dict[str, Value] = {
+        said[name]: float(sd[PLANE_PARAMETERS.index(name)]) for name in missing
+    }
     together = covariance / np.outer(sd, sd)
     pairs = [(0, 2), (1, 2), (0, 1)]
     first, second = max(pairs, key=lambda pair: abs(together[pair]))
     if abs(together[first, second]) > 0.9:
-        values["alike"] = [NUMBERS[first], NUMBERS[second]]
+        values["alike"] = [PLANE_PARAMETERS[first], PLANE_PARAMETERS[second]]
     return Reason(code=TracksCode.UNIDENTIFIABLE, values=values)

@@ -18,7 +18,7 @@ from models.estimation.joint.site import (
     channels_of,
     pose_prior,
 )
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
@@ -78,7 +78,7 @@ def assumed_reference(
             f"tracks: at least {FEWEST_WALKERS} that walk for a few seconds inside the image are "
             f"needed, got {observations.walkers}"
         )
-    at = numbers_of(prior)
+    at = plane_parameters_of(prior)
     relative_sd = walk.speed_sd_mps / walk.speed_mean_mps
     shape = FieldShape(
         level=float(np.log(walk.speed_mean_mps)),
@@ -117,8 +117,10 @@ def learn_reference(
     blank = assumed_reference(observations, prior, walk)
     blank = _suited(observations, prior, blank, seed)
     site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
-    whole = fit_pose(channels_of(observations, site, prior), numbers_of(prior), pose_prior(prior))
-    offset = whole.candidate - numbers_of(prior)
+    whole = fit_pose(
+        channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
+    )
+    offset = whole.candidate - plane_parameters_of(prior)
     inflation = _pose_variance_inflation(
         observations, prior, _with_spreads(blank, site), offset, seed
     )
@@ -170,7 +172,7 @@ def _doubt(
         )
     inflated = replace(blank, pose_variance_inflation=site.pose_variance_inflation)
     free = joint_estimate(observations, prior, inflated)
-    apart = (free.raw - numbers_of(prior))[:2]
+    apart = (free.raw - plane_parameters_of(prior))[:2]
     sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
     if ((np.abs(apart) > _DOUBT_RAD) & (sigmas > _DOUBT_SIGMAS)).any():
         tilt, roll = (float(angle) for angle in apart)
@@ -193,7 +195,7 @@ def _suited(
         order = rng.permutation(observations.tracks)
         first, second = np.array_split(order, 2)
         halves += [(np.sort(first), np.sort(second)), (np.sort(second), np.sort(first))]
-    at = numbers_of(prior)
+    at = plane_parameters_of(prior)
     # One spread for all, so that they differ in what they predict alone.
     spread = _learned(observations, prior, blank, 1).speeds.spread
     best, found = -np.inf, blank
@@ -216,7 +218,7 @@ def _suited(
 def _learned(
     observations: Observations, prior: CameraPose, blank: SiteReference, rounds: int
 ) -> SiteReference:
-    at = numbers_of(prior)
+    at = plane_parameters_of(prior)
     speeds = learn(
         measure_speeds(observations.steps, at, prior.heading_rad),
         blank.speeds,
@@ -247,7 +249,7 @@ def _pose_variance_inflation(
 ) -> float:
     """How much larger squared errors are than predicted, by halves of the reference itself."""
     rng = np.random.default_rng(seed)
-    at = numbers_of(prior)
+    at = plane_parameters_of(prior)
     ratios = []
     for _ in range(_FOLDS):
         order = rng.permutation(observations.tracks)

@@ -7,7 +7,7 @@ import numpy as np
 from models.estimation.joint.fit import Channel, Learned, PosePrior
 from models.estimation.joint.measures import measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.packing import stored_as
@@ -72,4 +72,4 @@ def channels_of(
 
 def pose_prior(prior: CameraPose) -> PosePrior:
     """The weak prior around a prior pose: it holds what the tracks leave free, no more."""
-    return PosePrior(mean=numbers_of(prior), sd=_PRIOR_SD)
+    return PosePrior(mean=plane_parameters_of(prior), sd=_PRIOR_SD)

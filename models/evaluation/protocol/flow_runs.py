@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.numbers import NUMBERS, identifiable_of
+from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of
 from models.evaluation.protocol.cases import Answer, nothing_identifiable
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.protocol.served import served_pose
@@ -37,7 +37,7 @@ def served_answer(seen: Observations, site: CameraSite) -> Answer:
         values=pose.values[:3],
         covariance=pose.covariance[:3, :3],
         tracks=found.joint.walkers,
-        identifiable=tuple(name for name in NUMBERS if name in pose.identifiable),
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name in pose.identifiable),
     )
     return (
         _with_heading(answer, pose.values, pose.covariance)
@@ -70,7 +70,7 @@ def registration(learned: Learned) -> Answer:
     answer = replace(
         nothing_identifiable(case),
         tracks=int(walkers.people),
-        identifiable=identifiable_of(NUMBERS, sd),
+        identifiable=identifiable_of(PLANE_PARAMETERS, sd),
     )
     return _with_heading(answer, values, covariance)
 

@@ -6,7 +6,7 @@ from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
 from models.estimation.joint.reference import assumed_reference, learn_reference
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.evaluation.protocol.cases import (
     KNOCKED,
     Answer,
@@ -71,7 +71,7 @@ def track_errors(
             break
         some: Observations = of_tracks(seen, np.sort(order[:count]))
         estimate = joint_estimate(some, case.prior_pose, reference)
-        error = np.degrees(estimate.values - numbers_of(case.true_pose))[:2]
+        error = np.degrees(estimate.values - plane_parameters_of(case.true_pose))[:2]
         bound = np.degrees(np.sqrt(np.trace(estimate.bound[:2, :2])))
         found.append((count, float(np.hypot(*error)), float(bound)))
     return found

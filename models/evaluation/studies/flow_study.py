@@ -13,7 +13,7 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import Observations, of_tracks
-from models.evaluation.protocol.cases import angle_deg, pose_of_numbers
+from models.evaluation.protocol.cases import angle_deg, pose_of_plane_parameters
 from models.evaluation.scenes import Knock
 from models.evaluation.studies.study_site import (
     LearnedPlace,
@@ -206,4 +206,4 @@ def _printed(errors: Array) -> tuple[float, ...]:
 
 
 def _pose(values: Array, like: CameraPose) -> CameraPose:
-    return replace(pose_of_numbers(values[:3], like), heading_rad=float(values[3]))
+    return replace(pose_of_plane_parameters(values[:3], like), heading_rad=float(values[3]))

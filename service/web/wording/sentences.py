@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from models.quantiles import Z90
 from service.cameras.standing import MOVED
 from service.kinds import AlertKind, PoseState

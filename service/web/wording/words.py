@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from babel.dates import format_timedelta
 
 from models.drift.verdict import Drift
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from service.kinds import AlertKind, PoseState
 from service.views.fleet import FleetCamera
 

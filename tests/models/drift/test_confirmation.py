@@ -5,7 +5,7 @@ import pytest
 
 from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import JointEstimate
-from models.estimation.numbers import NUMBERS
+from models.estimation.parameters import PLANE_PARAMETERS
 
 
 def estimate(values=(0.3, 0.0, 1.8), covariance=None, unidentifiable=()):
@@ -17,7 +17,7 @@ def estimate(values=(0.3, 0.0, 1.8), covariance=None, unidentifiable=()):
         bound=np.eye(3),
         walkers=40,
         walking_groups=40,
-        identifiable=tuple(name for name in NUMBERS if name not in unidentifiable),
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name not in unidentifiable),
         reason="",
     )
 

@@ -132,11 +132,11 @@ def test_the_second_look_is_asked_for_where_a_verdict_may_change():
     assert not asks_again(drift(1.5), LIMITS, drifting=True)
 
 
-def reading(statistic, number=3):
+def reading(statistic, parameter=3):
     return Reading(
         statistic=statistic,
         level=10.0,
-        number=number,
+        parameter=parameter,
         sign=1,
         walking_groups=20,
         track_idx=0,

@@ -91,7 +91,7 @@ def plain(walking_groups=1e9, responses=None, typical=0.0):
 def far_heading():
     """A chart that knows one knock alone: 6 deg of heading adds 1 to the last score."""
     responses = np.zeros((SCORES, len(KNOCKS)))
-    responses[-1, KNOCKS.index(Knocked(number=3, size=math.radians(6)))] = 1.0
+    responses[-1, KNOCKS.index(Knocked(parameter=3, size=math.radians(6)))] = 1.0
     return responses
 
 
@@ -101,7 +101,7 @@ def test_the_ratio_is_that_of_a_shift_by_hand():
     apart[:, -1] = 1.5
     path = trace(ratios_of(plain(responses=far_heading())), apart)
     assert path.statistic[-1] == pytest.approx(18.0)
-    assert KNOCKS[path.knock_idx[-1]].number == 3
+    assert KNOCKS[path.knock_idx[-1]].parameter == 3
     # A reference of 16 walking groups, counted one and a half times, is more unsure than they are.
     path = trace(ratios_of(plain(walking_groups=16.0, responses=far_heading())), apart)
     assert path.statistic[-1] == pytest.approx(18.0 / 2.5)
@@ -130,7 +130,7 @@ def test_the_newest_groups_count_and_say_since_when():
     values = np.zeros((100, SCORES))
     values[70:, -1] = 2.0
     reading = read_chart(chart, GroupScores(values=values, last=np.arange(100) * 3), ONE_A_YEAR)
-    assert (reading.number, reading.sign, reading.moved) == (3, 1, True)
+    assert (reading.parameter, reading.sign, reading.moved) == (3, 1, True)
     assert reading.walking_groups in LENGTHS
     assert reading.track_idx == pytest.approx(210, abs=15)
     few = GroupScores(values=values[:15], last=np.arange(15))
@@ -206,11 +206,11 @@ def test_bytes_give_the_chart_back_and_others_are_refused(learned):
         ({"roll": -4}, 1, -1),
     ],
 )
-def test_a_knock_is_found_with_its_sign_within_sixty_tracks(lanes, learned, move, number, sign):
+def test_a_knock_is_found_with_its_sign_within_sixty_tracks(lanes, learned, move, parameter, sign):
     chart, usual = learned
     reading = read_chart(chart, score_groups(walk(lanes, turned(**move), 60, 5), usual), ONE_A_YEAR)
     assert reading.moved
-    assert (reading.number, reading.sign) == (number, sign)
+    assert (reading.parameter, reading.sign) == (parameter, sign)
 
 
 def test_a_still_camera_is_not_taken_for_moved(lanes, learned):
@@ -235,7 +235,7 @@ def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
     slow = feet([replace(t, time_s=t.time_s[0] + (t.time_s - t.time_s[0]) * 1.2) for t in fast])
     reading = read_chart(chart, score_groups(slow, usual), ONE_A_YEAR)
     assert reading.moved
-    assert (reading.number, reading.sign) == (CLOCK, 1)
+    assert (reading.parameter, reading.sign) == (CLOCK, 1)
     assert not may_be_clock(reading)  # by now a pose can tell
     early = read_chart(chart, score_groups(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
     assert may_be_clock(early)

@@ -15,7 +15,7 @@ from models.evaluation.protocol.cases import (
     Answer,
     draw_case,
     judge_answer,
-    pose_of_numbers,
+    pose_of_plane_parameters,
 )
 from models.evaluation.scenes import load_scene
 from models.flow.packing import flow_from_bytes, flow_to_bytes
@@ -50,7 +50,7 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     stored = flow_from_bytes(flow_to_bytes(site.flow))
     found = estimate_pose(seen, replace(site, flow=stored))
     offline = found.fused
-    pose = pose_of_numbers(offline.values[:3], case.prior_pose)
+    pose = pose_of_plane_parameters(offline.values[:3], case.prior_pose)
     body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()
     sd = np.sqrt(np.diag(offline.covariance))
     expected = {

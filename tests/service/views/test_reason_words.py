@@ -205,7 +205,7 @@ def test_a_suspicious_reading_is_a_reason(number, name):
     reading = Reading(
         statistic=9.0,
         level=8.0,
-        number=number,
+        parameter=number,
         sign=1,
         walking_groups=20,
         track_idx=3,

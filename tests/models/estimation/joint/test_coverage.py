@@ -7,7 +7,7 @@ import pytest
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.reference import learn_reference
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.evaluation.scenes import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import PRIOR, seen, tracks_of
@@ -30,7 +30,7 @@ def test_intervals_cover_and_errors_fall_as_their_bound_does():
         reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
         for place, tracks in enumerate((few, many)):
             estimate = joint_estimate(seen(tracks), PRIOR, reference)
-            errors[site, place] = estimate.values - numbers_of(knocked)
+            errors[site, place] = estimate.values - plane_parameters_of(knocked)
             sds[site, place] = np.sqrt(np.diag(estimate.covariance))
             bounds[site, place] = np.sqrt(np.diag(estimate.bound))
     # 90 % is stated; 180 intervals of three times 30 sites that share much.

@@ -11,7 +11,7 @@ from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
 from models.estimation.joint.reference import assumed_reference, learn_reference
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
 from models.simulation.site import Lane, SiteConfig, walk_site
@@ -34,7 +34,7 @@ def site():
 
 def off(estimate, pose):
     """How far an estimate is off, in its own standard deviations."""
-    return (estimate.values - numbers_of(pose)) / np.sqrt(np.diag(estimate.covariance))
+    return (estimate.values - plane_parameters_of(pose)) / np.sqrt(np.diag(estimate.covariance))
 
 
 @pytest.mark.parametrize(("place", "pose"), [(2, KNOCKED), (3, FAR)])
@@ -181,7 +181,7 @@ def test_people_who_stand_tell_nothing(site):
 def test_no_tracks_tell_nothing(site):
     estimate = joint_estimate(seen([]), PRIOR, site[0])
     assert estimate.identifiable == ()
-    assert_allclose(estimate.values + site[0].offset, numbers_of(PRIOR), atol=1e-9)
+    assert_allclose(estimate.values + site[0].offset, plane_parameters_of(PRIOR), atol=1e-9)
     assert math.sqrt(estimate.covariance[0, 0]) > math.radians(10)
     with pytest.raises(TooFewTrajectoriesError, match="at least 5 .* got 0"):
         learn_reference(seen([]), PRIOR, WalkConfig(), 0)

@@ -1,7 +1,7 @@
 """The numbers of a pose as API, events, messages and pages tell them, digit by digit.
 
-`tests/golden/pose_numbers.json` is what was told when degrees were kept in the store; `told` made
-it, of what `lived` went through.
+`tests/golden/pose_parameters.json` is what was told when degrees were kept in the store; `told`
+made it, of what `lived` went through.
 """
 
 import html
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.service.bench import moved
 
-GOLDEN = Path(__file__).parent.parent.parent / "golden" / "pose_numbers.json"
+GOLDEN = Path(__file__).parent.parent.parent / "golden" / "pose_parameters.json"
 POSE = ("state", "pose", "estimated", "sd", "drift", "estimates")
 POINT = ("height_m", "tilt_deg", "roll_deg", "heading_deg", "sd", "drift")
 
