@@ -196,7 +196,7 @@ def test_bytes_give_the_chart_back_and_others_are_refused(learned):
 
 
 @pytest.mark.parametrize(
-    ("move", "number", "sign"),
+    ("move", "parameter", "sign"),
     [
         ({"heading": 5}, 3, 1),
         ({"heading": -5}, 3, -1),
