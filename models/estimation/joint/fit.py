@@ -107,13 +107,13 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
             spread = relearn(
                 residual, measured.value, measured.valid, measured.rows, weights, spread
             )
-    usual = weights.usual
+    inlier = weights.inlier
     return Learned(
         field=start.field,
         mean=mean,
         covariance=covariance,
         spread=spread,
-        usual=float((usual * (features @ mean)).sum() / max(float(usual.sum()), 1e-9)),
+        usual=float((inlier * (features @ mean)).sum() / max(float(inlier.sum()), 1e-9)),
     )
 
 

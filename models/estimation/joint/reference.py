@@ -36,18 +36,18 @@ _SPEED_SPREAD = Spread(
     trend_sd=0.05,
     within_sd=0.11,
     correlation=0.45,
-    other_share=0.2,
-    other_mean=float(np.log(0.2)),
-    other_sd=1.0,
+    outlier_share=0.2,
+    outlier_mean=float(np.log(0.2)),
+    outlier_sd=1.0,
 )
 _TOPS_SPREAD = Spread(
     between_sd=0.06,
     trend_sd=0.02,
     within_sd=0.04,
     correlation=0.5,
-    other_share=0.05,
-    other_mean=float(np.log(1.4)),
-    other_sd=0.5,
+    outlier_share=0.05,
+    outlier_mean=float(np.log(1.4)),
+    outlier_sd=0.5,
 )
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
 _SPREAD_ROUNDS = 5

@@ -22,9 +22,9 @@ SPREAD = Spread(
     trend_sd=0.05,
     within_sd=0.1,
     correlation=0.3,
-    other_share=0.1,
-    other_mean=-2.0,
-    other_sd=0.8,
+    outlier_share=0.1,
+    outlier_mean=-2.0,
+    outlier_sd=0.8,
 )
 
 

@@ -13,9 +13,9 @@ SPREAD = Spread(
     trend_sd=0.1,
     within_sd=0.1,
     correlation=0.0,
-    other_share=0.1,
-    other_mean=-2.0,
-    other_sd=0.8,
+    outlier_share=0.1,
+    outlier_mean=-2.0,
+    outlier_sd=0.8,
 )
 MATRIX = np.array([[9.0, 2.0, 1.0], [2.0, 6.0, -1.0], [1.0, -1.0, 4.0]])
 
@@ -47,7 +47,7 @@ def weights_of(measured, row=1.0):
     return Weights(
         row=np.full(len(rows), row),
         track=np.ones(rows.owners),
-        usual=np.ones(len(rows)),
+        inlier=np.ones(len(rows)),
         own=np.zeros((rows.owners, 2)),
         own_covariance=np.zeros((rows.owners, 2, 2)),
     )
