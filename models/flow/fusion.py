@@ -1,4 +1,7 @@
-"""The fused pose: the joint estimate's speeds and the flow map's places, in one posterior."""
+"""The fused pose: the joint estimate's speeds and the flow map's places, in one posterior.
+
+Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the map / variance inflation.
+"""
 
 import math
 from dataclasses import dataclass

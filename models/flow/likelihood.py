@@ -1,4 +1,8 @@
-"""What a set of tracks says of a pose by the flow map: a log likelihood and its score by track."""
+"""What a set of tracks says of a pose by the flow map: a log likelihood and its score by track.
+
+Ours: log p(image) = log f(place, direction) + log |d(place, direction) / d(image)| - log share,
+where the share is that of the map which the camera sees; a track's steps count for two at the most.
+"""
 
 from dataclasses import dataclass
 

@@ -2,6 +2,8 @@
 
 A camera that moves takes all paths along, and some pose puts people back on them. Where no pose
 does, the paths themselves have changed, and the map says nothing true of the camera.
+
+Ours: a one-sided t test of the mean over groups of log f - E log f, E by the map over what is seen.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""Learn a site's flow from tracks at a known pose, and how registration errs there."""
+"""Learn a site's flow from tracks at a known pose, and how registration errs there.
+
+Source: Godambe 1960, the information of an estimating function, H J^-1 H, whose J has the scatter
+of walking groups here, the noise of the map and what is not known of the bias.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,8 @@
-"""Registration: the pose, heading too, that puts walkers back on the site's paths."""
+"""Registration: the pose, heading too, that puts walkers back on the site's paths.
+
+Source: Berndt, Hall, Hall and Hausman 1974, steps by the scores' outer product; damped as by
+Levenberg 1944. The curvature by differences of the scores is ours.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

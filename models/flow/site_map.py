@@ -1,4 +1,7 @@
-"""From walkers at a known pose to a map that others can be registered to."""
+"""From walkers at a known pose to a map that others can be registered to.
+
+Source: Duin 1976, the width of a kernel by the likelihood of who was left out.
+"""
 
 from dataclasses import replace
 

@@ -4,6 +4,8 @@ At the pose where a camera is taken to be, each person's places and directions h
 along tilt, roll, log height and heading: how much likelier they were from a little further on. Of
 a still camera the scores are on average what they were in the reference; of one that has moved
 they are not, by as much as it has.
+
+Source: Rao 1948, the score test, of finite steps here; Künsch 1989, the block bootstrap.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""The joint estimate: one pose for all tracks, with a covariance, and what it leaves open."""
+"""The joint estimate: one pose for all tracks, with a covariance, and what it leaves open.
+
+Ours: covariance = variance inflation * H^-1 + spread of other modes + what is not known of the
+offset; the modes are a mixture, weighed by their posterior at their ends.
+"""
 
 import math
 from dataclasses import dataclass

@@ -1,10 +1,18 @@
-"""Gauss-Newton on one pose for all tracks, with the site's own mean as a nuisance."""
+"""Gauss-Newton on one pose for all tracks, with the site's own mean as a nuisance.
+
+The coefficients beta of the site's field are eliminated from the normal equations,
+H = A - B C^-1 B', as a Schur complement.
+
+Source: Triggs, McLauchlan, Hartley and Fitzgibbon 2000, Bundle Adjustment, for the elimination; the
+weights of each round are those of `hierarchy`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.estimation.joint.direction_noise import corrected_covariance, noise_information
 from models.estimation.joint.field import Field
 from models.estimation.joint.hierarchy import (
     FISHER,
@@ -19,7 +27,6 @@ from models.estimation.joint.hierarchy import (
     track_curvatures,
 )
 from models.estimation.joint.measures import Measured
-from models.estimation.joint.sway import faked, honest_covariance
 from models.geometry.rotation import Array
 
 _MOST_ROUNDS = 40
@@ -148,7 +155,7 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
             both = np.linalg.solve(own, np.column_stack([cross.T, own_gradient]))
             matrix += sums.matrix[:3, :3] - cross @ both[:, :3]
             gradient += sums.gradient[:3] - cross @ both[:, 3]
-            noise += faked(measured, weights, spread)
+            noise += noise_information(measured, weights, spread)
             solved.append(both)
         move = -np.linalg.solve(matrix, gradient)
         share = min(1.0, 1 / max(float((np.abs(move) / _LONGEST_MOVE).max()), 1e-12))
@@ -164,7 +171,7 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
         score += float(_log_likelihoods(channel, candidate, mean).sum())
     return Fit(
         candidate=candidate,
-        covariance=honest_covariance(matrix, noise),
+        covariance=corrected_covariance(matrix, noise),
         bound=FISHER * np.asarray(np.linalg.inv(matrix)),
         score=score,
     )

@@ -1,4 +1,8 @@
-"""People who walk together: how many independent walking groups there are among the tracks."""
+"""People who walk together: how many independent walking groups there are among the tracks.
+
+Ours: two tracks are one group where they are within 4 m and 37 deg of one another for 60 % of the
+shorter; groups are the connected components of such pairs.
+"""
 
 from collections import Counter
 from itertools import combinations

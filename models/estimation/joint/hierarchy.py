@@ -25,7 +25,7 @@ from models.packing import stored_as
 
 _FREEDOM = 4.0  # of both Student-t
 # The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
-# average, say 1. Source: Lange, Little and Taylor 1989, appendix B.
+# average, say 1. Source: Lange, Little and Taylor 1989.
 FISHER = (_FREEDOM + 3) / (_FREEDOM + 1)
 _ODDS_CLIP = 30.0
 _SHARE_WEIGHT = 2.0  # rows that the site's share counts for in a track's own
@@ -226,7 +226,7 @@ def _by_track(values: Array, rows: Rows) -> tuple[npt.NDArray[np.int64], Array]:
 def composite_log_likelihoods(
     residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread
 ) -> Array:
-    """The composite log likelihood (N,) of each track: of its rows apart, long tracks as short ones.
+    """The composite log likelihood (N,) of each track, by its rows apart; long ones are as short.
 
     For comparing candidates far apart; a row above the horizon counts as all but impossible.
     Source: Varin, Reid and Firth 2011, an independence likelihood; its weights are ours.
@@ -262,7 +262,7 @@ def relearn(
 ) -> Spread:
     """The spread that explains residuals best, given the weights: a step of EM.
 
-    Source: Laird and Ware 1982, section 4, with the weights of Lange, Little and Taylor 1989; the
+    Source: Laird and Ware 1982, with the weights of Lange, Little and Taylor 1989; the
     correlation is by moments.
     """
     inlier_rows = np.bincount(rows.owner_idx, weights.inlier, rows.owners)

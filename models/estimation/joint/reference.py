@@ -1,4 +1,8 @@
-"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there."""
+"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there.
+
+Ours: the offset is shrunk by its own noise, K = P (P + S)^-1 for a plausible P and its covariance
+S; the variance inflation is the mean of e' S^-1 e / 3 over halves of the reference, held out.
+"""
 
 from dataclasses import replace
 

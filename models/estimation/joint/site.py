@@ -1,4 +1,7 @@
-"""The reference as a value: what is usual at a site, and how the joint estimator errs there."""
+"""The reference as a value: what is usual at a site, and how the joint estimator errs there.
+
+Ours: pose = estimate - offset, which is learned while the pose is known.
+"""
 
 from dataclasses import dataclass
 

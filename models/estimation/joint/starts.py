@@ -1,4 +1,8 @@
-"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us."""
+"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us.
+
+Ours: at each tilt and roll of a grid, log height = usual log speed - quantile of log speed at
+height 1.
+"""
 
 from collections.abc import Sequence
 

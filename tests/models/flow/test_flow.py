@@ -37,7 +37,7 @@ def step_between(start: np.ndarray, end: np.ndarray) -> Steps:
     rays = [np.array([[*ray, 1.0]]) for ray in (start, end)]
     some = seen(tracks_of(3, (PRIOR, 1))[0]).steps
     return replace(
-        some, start_rays=rays[0], end_rays=rays[1], swayed_rays=rays[1], seconds=np.ones(1)
+        some, start_rays=rays[0], end_rays=rays[1], noisy_end_rays=rays[1], seconds=np.ones(1)
     )
 
 

@@ -121,7 +121,7 @@ def test_who_stands_or_is_not_on_the_ground_is_not_counted():
         d_value=np.zeros((40, 3)),
         d_place=np.zeros((40, 2, 3)),
         d_direction=None,
-        d_sway=np.zeros((40, 3)),
+        d_direction_noise=np.zeros((40, 3)),
         rows=Rows(
             owner_idx=np.repeat(np.arange(4), 10),
             linked=np.zeros(40, dtype=bool),

@@ -52,7 +52,7 @@ def site(truth, valid=lambda candidate: True, tracks=TRACKS):
             d_value=np.zeros((count, 3)),
             d_place=np.zeros((count, 2, 3)),
             d_direction=None,
-            d_sway=np.zeros((count, 3)),
+            d_direction_noise=np.zeros((count, 3)),
             rows=rows,
         )
 
