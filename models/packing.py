@@ -99,7 +99,7 @@ def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
     """
     made, known = dict(given), set()
     hints = get_type_hints(kind)
-    for each in fields(kind):
+    for each in fields(cast(Any, kind)):
         if each.name in given:
             continue
         name, hint = each.metadata.get(_STORED, each.name), hints[each.name]

@@ -11,7 +11,7 @@ from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.poses import PoseView, view_pose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
-from service.kinds import Act, AlertState, Answer, Origin, Outcome
+from service.kinds import Activity, AlertState, Answer, Origin, Outcome
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables.alerts import AlertRecord
@@ -38,7 +38,7 @@ def accept_pose(
     if not view.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     close_pose_alerts(session, camera_id, Outcome.ACCEPTED, by, note)
-    note_activity(session, Act.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)
+    note_activity(session, Activity.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)
     from_s = tracks.newest_end_s(session, camera_id)
     renew_prior_pose(
         session, queue, settings, camera_id, view.pose, Origin.ACCEPTED, from_s=from_s, by=by
@@ -79,7 +79,7 @@ def learn_anew(
     """
     require_camera(session, camera_id)
     close_pose_alerts(session, camera_id, Outcome.PUT_BACK, by, note)
-    note_activity(session, Act.REFERENCE_RESET, by=by, camera_id=camera_id, text=note)
+    note_activity(session, Activity.REFERENCE_RESET, by=by, camera_id=camera_id, text=note)
     from_s = tracks.newest_end_s(session, camera_id)
     begin_reference(session, camera_id, Origin.RESET, from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)
@@ -138,7 +138,7 @@ def _answer(
 ) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
     close_pose_alerts(session, camera_id, Outcome(answer), by, note)
-    act = Act.POSE_PUT_BACK if answer == Answer.PUT_BACK else Act.POSE_FALSE_ALARM
-    note_activity(session, act, by=by, camera_id=camera_id, text=note)
+    what = Activity.POSE_PUT_BACK if answer == Answer.PUT_BACK else Activity.POSE_FALSE_ALARM
+    note_activity(session, what, by=by, camera_id=camera_id, text=note)
     keep_answer(session, camera_id, answer, by)
     request_estimate(session, queue, camera_id)

@@ -180,7 +180,7 @@ def _is_explained(
 def _is_spoilt(
     kept: FlowMapRecord, reference_to_s: float, past: tuple[Doubt, ...], attended: Attendance
 ) -> bool:
-    if attended.told_late(kept.learned_at, kept.to_s):
+    if attended.announced_late(kept.learned_at, kept.to_s):
         return True
     return kept.to_s > reference_to_s and any(
         doubt.excluded and doubt.from_s <= kept.to_s and doubt.resolved_at > kept.learned_at

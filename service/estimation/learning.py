@@ -19,7 +19,7 @@ from service.access.activity import note
 from service.alerting.alerts import open_alert
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
-from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.kinds import Activity, AlertKind, AlertSource, Severity
 from service.reasons import some
 from service.settings import Settings
 from service.store import cameras, maintenance, references
@@ -121,7 +121,7 @@ def save_reference(
     record.doubts = some(site.doubt)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
-    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
+    note(session, Activity.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,

@@ -20,7 +20,7 @@ from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.store.alerts import POSE_KINDS
 from service.store.tables.alerts import AlertRecord
-from tests.service.life_acts import LifeActs
+from tests.service.life_activity import LifeActs
 from tests.service.life_events import (
     MOVED,
     NUMBERS,
@@ -30,7 +30,7 @@ STEPS = int(os.environ.get("SUREFOOT_TEST_LIFE_STEPS", "0"))
 
 
 class LifeOfCameras(LifeActs):
-    """What holds after every act."""
+    """What holds after every activity."""
 
     @invariant()
     def history_only_grows(self) -> None:

@@ -243,10 +243,7 @@ def composite_log_likelihoods(
 def hierarchical_log_likelihood(
     residual: Array, weights: Weights, rows: Rows, spread: Spread
 ) -> float:
-    """The log likelihood of deviations, levels and trends, but for what the spread alone decides.
-
-    Source: Lee and Nelder 1996, the h-likelihood.
-    """
+    """The h-likelihood (Lee and Nelder 1996), but for what the spread alone decides."""
     half = (_FREEDOM + 1) / 2
     scaled = weights.deviation(residual, rows) / spread.within_sd
     within = (weights.inlier * np.log1p(scaled**2 / _FREEDOM)).sum()
@@ -260,11 +257,7 @@ def hierarchical_log_likelihood(
 def relearn(
     residual: Array, value: Array, valid: Mask, rows: Rows, weights: Weights, spread: Spread
 ) -> Spread:
-    """The spread that explains residuals best, given the weights: a step of EM.
-
-    Source: Laird and Ware 1982, with the weights of Lange, Little and Taylor 1989; the
-    correlation is by moments.
-    """
+    """The spread that explains residuals best, given the weights: a step of EM."""
     inlier_rows = np.bincount(rows.owner_idx, weights.inlier, rows.owners)
     seen = inlier_rows > 1.5
     if seen.sum() < 3:

@@ -1,10 +1,6 @@
 """What the joint estimator reads of tracks: steps of walkers and the tops of their boxes.
 
-Nothing here depends on the pose, so it is worked out once for all poses that are tried.
-
-Source: Cleveland 1979, local straight lines; here with a triangular kernel and at nodes a step
-apart. A node's noise is the median absolute second difference over the root of 6: Gasser, Sroka and
-Jennen-Steinmetz 1986, made robust.
+Nothing here depends on the pose. Source of the smoothing: Cleveland 1979, local straight lines.
 """
 
 from collections.abc import Sequence
@@ -109,10 +105,10 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             if time_s.size < 2 or not valid.all():
                 continue
             run += 1
-            start, end, direction_noise = _steps(rays)
+            start, end, noisy_end = _steps(rays)
             starts.append(start)
             ends.append(end)
-            noisy_ends.append(direction_noise)
+            noisy_ends.append(noisy_end)
             seconds.append(np.diff(time_s))
             step_owners += [owner] * (time_s.size - 1)
             step_runs += [run] * (time_s.size - 1)
@@ -237,8 +233,8 @@ def _steps(rays: Array) -> tuple[Array, Array, Array]:
     middle = (rays[1:] + rays[:-1]) / 2
     half = np.maximum(along, _LEAST_CHORD)[:, None] / 2
     aside = np.stack([-way[:, 1], way[:, 0], np.zeros(len(way))], axis=1)
-    direction_noise = np.minimum(_noise(rays, aside) / lever, _LARGEST_DIRECTION_NOISE)[:, None]
-    return middle - half * way, middle + half * way, middle + half * (way + direction_noise * aside)
+    noise = np.minimum(_noise(rays, aside) / lever, _LARGEST_DIRECTION_NOISE)[:, None]
+    return middle - half * way, middle + half * way, middle + half * (way + noise * aside)
 
 
 def _ways(rays: Array) -> tuple[Array, Array]:
@@ -257,7 +253,7 @@ def _ways(rays: Array) -> tuple[Array, Array]:
 
 
 def _noise(rays: Array, aside: Array) -> float:
-    """Standard deviation of a node of one run, sideways, by second differences."""
+    """Standard deviation of a node of a run, sideways, by differences (Gasser et al. 1986)."""
     if len(rays) < 3:
         return 0.0  # two nodes make one step, and one step has no track to differ from
     bend = ((rays[2:] - 2 * rays[1:-1] + rays[:-2]) * aside[1:]).sum(axis=1)

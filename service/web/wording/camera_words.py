@@ -1,4 +1,4 @@
-"""The rest of a camera's page in words: numbers of the pose, deeds, what a move means, flags."""
+"""The rest of a camera's page in words: numbers of the pose, activity, what a move means, flags."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The page of a camera out of the store: the one sentence, drawings, flags, deeds, the script."""
+"""A camera's page out of the store: the sentence, drawings, flags, activity, the script."""
 
 import gzip
 import html
