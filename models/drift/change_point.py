@@ -6,7 +6,7 @@ import numpy as np
 
 from models.estimation.joint.fit import Fit, fit_pose, per_track, track_log_likelihoods
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -28,7 +28,7 @@ class ChangePoint:
 
 
 def find_change(
-    observations: Observations, prior: CameraPose, reference: SiteReference
+    observations: Observations, prior: CameraPose, reference: SpeedReference
 ) -> ChangePoint | None:
     """The move within tracks; None where one pose explains them all.
 
@@ -65,7 +65,7 @@ def find_change(
     return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None
 
 
-def _first_cut(observations: Observations, prior: CameraPose, reference: SiteReference) -> int:
+def _first_cut(observations: Observations, prior: CameraPose, reference: SpeedReference) -> int:
     """The cut with the highest likelihood ratio, by scores at the prior pose or at one for all.
 
     The first is the better one for a small move, the second where most tracks are after it.
@@ -108,7 +108,7 @@ def _best_cut(gain: Array) -> int:
 
 
 def _fit(
-    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SiteReference
+    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SpeedReference
 ) -> Fit:
     part = of_tracks(observations, chosen)
     start = plane_parameters_of(prior) + reference.offset

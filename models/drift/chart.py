@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.drift.group_scores import GroupScores
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.rotation import Array
 from models.packing import stored_as
 
@@ -73,10 +73,11 @@ class DriftChart:
     (14,) and `covariance` (14, 14) are of the `walking_groups` of the reference and `responses`
     (14, K) are what is added to the mean by each knock of the grid. `typical` and `tail` say how
     high the statistic gets in runs of 1000 walking groups: its median, and its mean excess over
-    that. `paces` is how people walk by the same tracks; a flow map of these goes with a chart.
+    that. `speed_reference` is how people walk by the same tracks; a flow map of these goes with a
+    chart.
     """
 
-    paces: SiteReference
+    speed_reference: SpeedReference = stored_as("paces")
     middle: Array
     width: Array
     mean: Array

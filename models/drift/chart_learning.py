@@ -16,7 +16,7 @@ from models.drift.chart import (
 from models.drift.group_scores import SCORES, Usual, scores_at
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.reference import relearned
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.folds import Fold, Folds
 from models.flow.turn_detection import groups_in_time
 from models.geometry.pose import CameraPose
@@ -42,7 +42,7 @@ class _Asked:
 def learn_chart(
     observations: Observations,
     prior: CameraPose,
-    site: SiteReference,
+    site: SpeedReference,
     folds: Folds,
     seed: int,
 ) -> DriftChart | None:
@@ -76,7 +76,7 @@ def learn_chart(
     middle = np.median(scores, axis=0)
     width = SD_OF_MEDIAN_DEVIATION * np.median(np.abs(scores - middle), axis=0) + 1e-9
     chart = DriftChart(
-        paces=relearned(observations, prior, site),
+        speed_reference=relearned(observations, prior, site),
         middle=middle,
         width=width,
         mean=np.zeros(SCORES),
@@ -108,14 +108,14 @@ def learn_chart(
 def _asked(
     observations: Observations,
     prior: CameraPose,
-    site: SiteReference,
+    site: SpeedReference,
     fold: Fold,
     *,
     answers: bool,
 ) -> _Asked:
     seen = of_tracks(observations, fold.asked)
-    paces = relearned(of_tracks(observations, fold.known), prior, site)
-    usual = Usual(prior=prior, paces=paces, paths=fold.site)
+    speed_reference = relearned(of_tracks(observations, fold.known), prior, site)
+    usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.site)
     _, _, last = groups_in_time(fold.walkers)
     knocked = None
     if answers:

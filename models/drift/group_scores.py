@@ -17,7 +17,7 @@ import numpy.typing as npt
 from models.estimation.joint.fit import Learned, per_track
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, Steps, check_in_time
-from models.estimation.joint.site import SiteReference, channels_of
+from models.estimation.joint.speed_reference import SpeedReference, channels_of
 from models.estimation.parameters import plane_parameters_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
@@ -37,7 +37,7 @@ class Usual:
     """What is usual before a camera: how people walk, and where, seen from the prior pose."""
 
     prior: CameraPose
-    paces: SiteReference
+    speed_reference: SpeedReference
     paths: Site
 
 
@@ -82,7 +82,9 @@ def scores_at(
     parameters = plane_parameters_of(usual.prior) + beside[:3]
     observations = replace(observations, steps=_slowed(observations.steps, stretch))
     walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
-    slopes = per_track(channels_of(observations, usual.paces, usual.prior), parameters).gradient
+    slopes = per_track(
+        channels_of(observations, usual.speed_reference, usual.prior), parameters
+    ).gradient
     scores = np.concatenate(
         [
             -slopes,
@@ -104,12 +106,12 @@ def _bounded(
     observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
 ) -> Array:
     """How far off paces are, and statures where boxes tell them, times what would mend it."""
-    heading, paces = usual.prior.heading_rad, usual.paces
+    heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
     speeds = measure_speeds(walkers.steps, parameters, heading)
-    scores = _off(speeds, paces.speeds, walkers.tracks) / _PACE_SD**2
-    if paces.statures is not None:
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2
+    if speed_reference.statures is not None:
         tops = measure_statures(observations.tops, parameters, heading)
-        scores = scores + _off(tops, paces.statures, walkers.tracks) / _STATURE_SD**2
+        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / _STATURE_SD**2
     return scores
 
 

@@ -76,7 +76,7 @@ def estimate_pose(
     check_in_time(tracks)
     prior = site.prior
     if not site.learned:
-        joint = joint_estimate(tracks, prior, site.speeds)
+        joint = joint_estimate(tracks, prior, site.speed_reference)
         return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
     lacks: list[Lack] = []
     searched = None
@@ -136,4 +136,4 @@ def _look_again(
     if walkers.size < limits.people + FEWEST_WALKERS:
         return None
     older = of_tracks(tracks, np.arange(walkers[-limits.people]))
-    return _fused(older, joint_estimate(older, site.prior, site.speeds), site)
+    return _fused(older, joint_estimate(older, site.prior, site.speed_reference), site)

@@ -107,7 +107,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         period.intrinsics,
         period.prior,
         seed=seed,
-        speeds=reference_from_bytes(period.site),
+        speed_reference=reference_from_bytes(period.site),
         weights=period.weights,
     )
     return paths_of(grown)

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.packing import reference_to_bytes
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
@@ -54,7 +54,7 @@ class ReferencePeriod:
 class LearnedReference:
     """What a reference has come to; `paths` are None where too few people walk."""
 
-    site: SiteReference
+    site: SpeedReference
     paths: LearnedPaths | None
 
 
@@ -93,7 +93,7 @@ def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | 
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    return LearnedReference(site=site.speeds, paths=paths_of(site))
+    return LearnedReference(site=site.speed_reference, paths=paths_of(site))
 
 
 def save_reference(

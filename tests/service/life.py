@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from models.estimation.joint.observations import observe
-from models.estimation.joint.reference import learn_reference
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
@@ -198,10 +198,10 @@ class Life:
 
 
 @lru_cache(maxsize=1)
-def some_site() -> SiteReference:
+def some_site() -> SpeedReference:
     """A reference that was really learned."""
     observations = observe(walks_of("prior"), LENS)
-    return learn_reference(observations, PRIOR, WalkConfig(speed_sd_mps=0.2), 0)
+    return learn_speed_reference(observations, PRIOR, WalkConfig(speed_sd_mps=0.2), 0)
 
 
 @lru_cache(maxsize=8)

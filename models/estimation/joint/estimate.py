@@ -12,7 +12,7 @@ import numpy as np
 from models.estimation.joint.fit import Fit, fit_pose
 from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
 from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of, plane_parameters_of
 from models.geometry.pose import CameraPose
@@ -52,7 +52,7 @@ class JointEstimate:
 
 
 def joint_estimate(
-    observations: Observations, prior: CameraPose, reference: SiteReference
+    observations: Observations, prior: CameraPose, reference: SpeedReference
 ) -> JointEstimate:
     """The pose that explains all tracks best, whatever it was before."""
     channels = channels_of(observations, reference, prior)
@@ -108,7 +108,7 @@ def _distinct(ends: list[Fit]) -> list[Fit]:
     return distinct
 
 
-def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
+def _elsewhere(ends: list[Fit], reference: SpeedReference) -> Array:
     """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
     best = ends[0]
     odds = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])

@@ -15,10 +15,10 @@ from models.estimation.joint.fit import assumed, fit_pose, held_out_log_likeliho
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import (
+from models.estimation.joint.speed_reference import (
     USUAL_SPEEDS_MPS,
     USUAL_STATURES_M,
-    SiteReference,
+    SpeedReference,
     channels_of,
     pose_prior,
 )
@@ -69,9 +69,9 @@ _ASSUMED_INFLATION_WEIGHT = 6.0
 _LARGEST_RATIO = 9.0
 
 
-def assumed_reference(
+def assumed_speed_reference(
     observations: Observations, prior: CameraPose, walk: WalkConfig
-) -> SiteReference:
+) -> SpeedReference:
     """A site of which nothing is known but an assumed walking speed.
 
     Raises:
@@ -95,7 +95,7 @@ def assumed_reference(
     tops = measure_statures(observations.tops, at, prior.heading_rad)
     usable, words = _judge_boxes(tops)
     statures = assumed(field_over(tops, _TOPS_SHAPE), _TOPS_SPREAD) if usable else None
-    return SiteReference(
+    return SpeedReference(
         speeds=assumed(field_over(speeds, shape), _SPEED_SPREAD),
         statures=statures,
         offset=np.zeros(3),
@@ -106,9 +106,9 @@ def assumed_reference(
     )
 
 
-def learn_reference(
+def learn_speed_reference(
     observations: Observations, prior: CameraPose, walk: WalkConfig, seed: int
-) -> SiteReference:
+) -> SpeedReference:
     """What is usual at a site whose camera stands at its prior pose, and our own bias there.
 
     The bias is what the estimator says of the very tracks that the site was learned from; how far
@@ -118,7 +118,7 @@ def learn_reference(
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
-    blank = assumed_reference(observations, prior, walk)
+    blank = assumed_speed_reference(observations, prior, walk)
     blank = _suited(observations, prior, blank, seed)
     site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
     whole = fit_pose(
@@ -142,7 +142,9 @@ def learn_reference(
     return replace(site, doubt=_doubt(observations, prior, blank, site))
 
 
-def relearned(observations: Observations, prior: CameraPose, site: SiteReference) -> SiteReference:
+def relearned(
+    observations: Observations, prior: CameraPose, site: SpeedReference
+) -> SpeedReference:
     """A site whose fields are learned of other tracks at the prior pose, by the spread it has.
 
     What was doubted of the first tracks is not said of these.
@@ -159,7 +161,7 @@ def relearned(observations: Observations, prior: CameraPose, site: SiteReference
 
 
 def _doubt(
-    observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
+    observations: Observations, prior: CameraPose, blank: SpeedReference, site: SpeedReference
 ) -> Reason | None:
     """What of a reference is too far off to be a bias; None where nothing is."""
     slow, fast = USUAL_SPEEDS_MPS
@@ -186,8 +188,8 @@ def _doubt(
 
 
 def _suited(
-    observations: Observations, prior: CameraPose, blank: SiteReference, seed: int
-) -> SiteReference:
+    observations: Observations, prior: CameraPose, blank: SpeedReference, seed: int
+) -> SpeedReference:
     """A blank site whose speeds may vary by place and direction as much as its tracks show.
 
     One half of the tracks must predict the other: a field that is freer than the site needs costs
@@ -220,8 +222,8 @@ def _suited(
 
 
 def _learned(
-    observations: Observations, prior: CameraPose, blank: SiteReference, rounds: int
-) -> SiteReference:
+    observations: Observations, prior: CameraPose, blank: SpeedReference, rounds: int
+) -> SpeedReference:
     at = plane_parameters_of(prior)
     speeds = learn(
         measure_speeds(observations.steps, at, prior.heading_rad),
@@ -235,7 +237,7 @@ def _learned(
     return replace(blank, speeds=speeds, statures=statures)
 
 
-def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
+def _with_spreads(blank: SpeedReference, site: SpeedReference) -> SpeedReference:
     """The blank site's fields with the learned site's spreads."""
     statures = None
     if blank.statures is not None and site.statures is not None:
@@ -247,7 +249,7 @@ def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
 def _pose_variance_inflation(
     observations: Observations,
     prior: CameraPose,
-    blank: SiteReference,
+    blank: SpeedReference,
     offset: Array,
     seed: int,
 ) -> float:

@@ -5,7 +5,7 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
-from models.estimation.joint.reference import assumed_reference, learn_reference
+from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
 from models.evaluation.protocol.cases import (
     KNOCKED,
@@ -23,19 +23,23 @@ _SEED = 0
 
 def joint(learned: Learned) -> Answer:
     """By speeds alone: the site learned from the reference, boxes where they tell something."""
-    return joint_answer(joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speeds))
+    return joint_answer(
+        joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speed_reference)
+    )
 
 
 def joint_feet(learned: Learned) -> Answer:
     """Without boxes."""
-    return joint_answer(joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speeds))
+    return joint_answer(
+        joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speed_reference)
+    )
 
 
 def joint_assumed(learned: Learned) -> Answer:
     """Without a reference: people are assumed to walk at 1.4 m/s, everywhere alike."""
     prior = learned.case.prior_pose
     try:
-        reference = assumed_reference(learned.seen, prior, WalkConfig())
+        reference = assumed_speed_reference(learned.seen, prior, WalkConfig())
     except TooFewTrajectoriesError:
         return nothing_identifiable(learned.case)
     return joint_answer(joint_estimate(learned.seen, prior, reference))
@@ -60,7 +64,7 @@ def track_errors(
     variances of tilt and roll.
     """
     case = draw_case(scene, seed, knock_range)
-    reference = learn_reference(
+    reference = learn_speed_reference(
         observe(case.reference, case.intrinsics), case.prior_pose, WalkConfig(), _SEED
     )
     seen = observe(case.seen, case.intrinsics)

@@ -22,7 +22,7 @@ from models.drift.clock import may_be_clock
 from models.drift.group_scores import SCORES, GroupScores, Usual, score_groups
 from models.errors import CheckpointError
 from models.estimation.joint.observations import observe, of_tracks
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.folds import fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
@@ -57,11 +57,11 @@ def walk(lanes, pose, count, seed, config=CONFIG):
 def learned(lanes):
     """A chart of 200 people, and what is usual by the same."""
     known = walk(lanes, PRIOR, 200, 4)
-    site = learn_reference(known, PRIOR, WalkConfig(), 0)
+    site = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     folds = fold_maps(known, LENS, AT, 0)
     flow = learn_flow(known, LENS, PRIOR, 0, folds=folds)
     chart = learn_chart(known, PRIOR, site, folds, 0)
-    return chart, Usual(prior=PRIOR, paces=chart.paces, paths=flow.site(LENS))
+    return chart, Usual(prior=PRIOR, speed_reference=chart.speed_reference, paths=flow.site(LENS))
 
 
 def turned(**by):
@@ -76,7 +76,7 @@ def plain(walking_groups=1e9, responses=None, typical=0.0):
     if responses is None:
         responses = np.zeros((SCORES, len(KNOCKS)))
     return DriftChart(
-        paces=None,
+        speed_reference=None,
         middle=np.zeros(SCORES),
         width=np.ones(SCORES),
         mean=np.zeros(SCORES),
@@ -183,7 +183,9 @@ def test_bytes_give_the_chart_back_and_others_are_refused(learned):
     chart, _ = learned
     again = chart_from_bytes(chart_to_bytes(chart))
     np.testing.assert_array_equal(again.responses, chart.responses)
-    np.testing.assert_array_equal(again.paces.speeds.mean, chart.paces.speeds.mean)
+    np.testing.assert_array_equal(
+        again.speed_reference.speeds.mean, chart.speed_reference.speeds.mean
+    )
     assert (again.typical, again.tail, again.walking_groups) == (
         chart.typical,
         chart.tail,

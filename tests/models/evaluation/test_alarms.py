@@ -41,7 +41,7 @@ def watch():
     responses = np.zeros((SCORES, len(KNOCKS)))
     responses[-1, KNOCKS.index(Knocked(number=3, size=math.radians(6)))] = 2.0
     chart = DriftChart(
-        paces=None,
+        speed_reference=None,
         middle=np.zeros(SCORES),
         width=np.ones(SCORES),
         mean=np.zeros(SCORES),

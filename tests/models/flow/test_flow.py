@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Steps
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import likelihood, walkers_of
 from models.flow.map.flow_map import DIRECTIONS
@@ -27,7 +27,7 @@ SITE = SiteConfig(aside_m=0.8, standing_share=0.0)
 def site():
     known, after, still = tracks_of(3, (PRIOR, 200), (TURNED, 100), (PRIOR, 100), config=SITE)
     reference = learn_flow(seen(known), LENS, PRIOR, 0)
-    speeds = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     assert reference is not None
     return reference, speeds, seen(after), seen(still), seen(known)
 

@@ -8,7 +8,7 @@ import pytest
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import observe
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import walkers_of
 from models.flow.path_test import UsualFit
@@ -92,7 +92,7 @@ def test_a_move_is_found_where_it_happened_and_not_twice(lanes, flow):
 
 def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     rng = np.random.default_rng(11)
-    speeds = learn_reference(known, PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
@@ -154,7 +154,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     known = feet(walk_site(LENS, PRIOR, visible, walked, 200, rng))
     flow = learn_flow(known, LENS, PRIOR, 0)
     assert flow is not None
-    speeds = learn_reference(known, PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
     fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)

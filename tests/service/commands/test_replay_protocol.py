@@ -82,7 +82,9 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     assert off in done.stdout
     assert body["tracks"] == len(case.seen)
     assert body["reference"]["tracks"] == len(case.reference)
-    assert body["reference"]["walking_speed_mps"] == pytest.approx(site.speeds.walking_speed_mps)
+    assert body["reference"]["walking_speed_mps"] == pytest.approx(
+        site.speed_reference.walking_speed_mps
+    )
     assert body["state"] == "drifting"
 
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
-from models.estimation.joint.reference import assumed_reference, learn_reference
+from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
@@ -28,7 +28,7 @@ FAR = CameraPose(
 @pytest.fixture(scope="module")
 def site():
     known, after, far = tracks_of(3, (PRIOR, 150), (KNOCKED, 100), (FAR, 100))
-    reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     return reference, seen(known), seen(after), seen(far)
 
 
@@ -50,7 +50,7 @@ def test_a_knock_is_told_in_full(site, place, pose):
 def test_many_noisy_tracks_do_not_agree_on_a_wrong_pose():
     # Noise in a speed's derivative once made 400 tracks sure of a height 50 % off, on this site.
     known, after = tracks_of(16, (PRIOR, 200), (KNOCKED, 400))
-    reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     estimate = joint_estimate(seen(after), PRIOR, reference)
     assert np.abs(off(estimate, KNOCKED)).max() < 3
     assert np.abs(reference.offset[:2]).max() < math.radians(0.2)
@@ -75,7 +75,7 @@ def test_a_reference_says_the_same_after_storage(site):
 
 
 def test_without_a_reference_the_height_is_as_sure_as_an_assumed_speed(site):
-    guess = assumed_reference(site[2], PRIOR, WalkConfig())
+    guess = assumed_speed_reference(site[2], PRIOR, WalkConfig())
     estimate = joint_estimate(site[2], PRIOR, guess)
     assert math.sqrt(estimate.covariance[2, 2]) > 0.12
     assert "height" not in estimate.identifiable
@@ -88,13 +88,13 @@ def test_without_a_reference_the_height_is_as_sure_as_an_assumed_speed(site):
 
 def test_boxes_of_people_pin_the_pose():
     known, after = tracks_of(4, (PRIOR, 100), (KNOCKED, 60), boxes=True)
-    with_boxes = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    with_boxes = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     assert "people are 1.7" in with_boxes.boxes
     estimate = joint_estimate(seen(after), PRIOR, with_boxes)
     assert np.abs(off(estimate, KNOCKED)).max() < 3
     bare = [[replace(track, top_v=None) for track in tracks] for tracks in (known, after)]
     feet_only = joint_estimate(
-        seen(bare[1]), PRIOR, learn_reference(seen(bare[0]), PRIOR, WalkConfig(), 0)
+        seen(bare[1]), PRIOR, learn_speed_reference(seen(bare[0]), PRIOR, WalkConfig(), 0)
     )
     shrunk = np.diag(estimate.covariance) / np.diag(feet_only.covariance)
     assert np.sqrt(shrunk).max() < 0.5
@@ -103,7 +103,7 @@ def test_boxes_of_people_pin_the_pose():
 def test_boxes_of_one_size_are_noticed_and_not_used():
     config = SiteConfig(stature_sd=0.0, noise_px=0.5)
     known, after = tracks_of(5, (PRIOR, 80), (KNOCKED, 40), config=config, boxes=True)
-    reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     assert "boxes are all of one size (1.72 m" in reference.boxes
     assert reference.statures is None
     bare = [replace(track, top_v=None) for track in after]
@@ -127,7 +127,7 @@ def on_one_path(pose, count, seed, degrees):
 def square():
     """A reference of people who walk in all directions."""
     (known,) = tracks_of(11, (PRIOR, 150), config=SiteConfig(lanes=9, aside_m=4.0))
-    return learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    return learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
 
 
 @pytest.mark.parametrize("degrees", [30, 60])
@@ -184,7 +184,7 @@ def test_no_tracks_tell_nothing(site):
     assert_allclose(estimate.values + site[0].offset, plane_parameters_of(PRIOR), atol=1e-9)
     assert math.sqrt(estimate.covariance[0, 0]) > math.radians(10)
     with pytest.raises(TooFewTrajectoriesError, match="at least 5 .* got 0"):
-        learn_reference(seen([]), PRIOR, WalkConfig(), 0)
+        learn_speed_reference(seen([]), PRIOR, WalkConfig(), 0)
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_no_tracks_tell_nothing(site):
     ],
 )
 def test_a_wrong_prior_pose_is_doubted(site, wrong, code, value):
-    reference = learn_reference(site[1], wrong, WalkConfig(), 0)
+    reference = learn_speed_reference(site[1], wrong, WalkConfig(), 0)
     doubt = reference.doubt
     assert doubt is not None
     assert reference_from_bytes(reference_to_bytes(reference)).doubt is None  # told once
@@ -217,5 +217,5 @@ def test_a_field_is_as_free_as_its_site_needs(site):
         tracks_of(seed, (PRIOR, 80), config=SiteConfig(lanes=1, speed_mean_mps=speed))[0]
         for seed, speed in ((3, 1.0), (8, 1.6))
     )
-    mixed = learn_reference(seen([*slow, *fast]), PRIOR, WalkConfig(), 0)
+    mixed = learn_speed_reference(seen([*slow, *fast]), PRIOR, WalkConfig(), 0)
     assert freedom(mixed) > 0.02

@@ -22,7 +22,7 @@ _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log h
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SiteReference:
+class SpeedReference:
     """What is usual at a site, and how the joint estimator errs there.
 
     `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth, with
@@ -52,7 +52,7 @@ class SiteReference:
 
 
 def channels_of(
-    observations: Observations, reference: SiteReference, prior: CameraPose
+    observations: Observations, reference: SpeedReference, prior: CameraPose
 ) -> list[Channel]:
     """The evidence in a set of tracks: speeds, and statures where boxes tell them."""
     heading = prior.heading_rad
