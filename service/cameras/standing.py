@@ -17,7 +17,7 @@ from service.alerting.presence import is_no_data
 from service.delivery.outbox import is_silenced
 from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.settings import Settings
-from service.store import figures, fleet
+from service.store import fleet, metrics
 from service.store.alerts import POSE_KINDS
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.estimates import EstimateRecord
@@ -78,9 +78,9 @@ def standings(
 ) -> dict[str, Standing]:
     """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
     now = datetime.now(UTC)
-    references = figures.newest_references(session, ids)
-    newest = figures.newest_estimates(session, ids)
-    ended_s = figures.last_tracks_s(session, ids)
+    references = metrics.newest_references(session, ids)
+    newest = metrics.newest_estimates(session, ids)
+    ended_s = metrics.last_tracks_s(session, ids)
     windows = fleet.maintenance_windows(session, ids)
     rhythms = fleet.rhythm_profiles(session, ids)
     firing: dict[str, list[AlertRecord]] = defaultdict(list)
@@ -88,7 +88,7 @@ def standings(
         firing[str(alert.camera_id)].append(alert)
     held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
     without = [i for i in held if i in newest and not newest[i].identifiable]
-    before = figures.newest_identifiable_estimates(session, without) if without else {}
+    before = metrics.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, last_s in ended_s.items():
         known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None

@@ -20,7 +20,7 @@ from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
-from service.store.figures import Ids, among, newest_of
+from service.store.metrics import Ids, among, newest_of
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
 from service.store.tables.cameras import CameraRecord
