@@ -134,7 +134,7 @@ def judge(
     """The verdict on a window, given what had drifted before.
 
     Drifting begins at once where the chart is beyond its level, and where an identifiable parameter
-    is beyond its limit, by the window and by the same without its newest `people`: one freak person
+    is beyond its limit, by the window and by the same without its newest `people`: one outlier
     does not do it, and it matters not how many jobs have looked meanwhile. The chart's level is of
     a rate of false alarms already, and far moves, which the chart is not made for, are seen in the
     pose. It ends where both, and the chart, are below `clear_ratio`. A parameter that is not

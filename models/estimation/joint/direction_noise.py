@@ -2,8 +2,8 @@
 
 A direction's noise is in the derivative of a step's log speed by the pose, and there its square
 looks like information. Where people walk many ways it is a few per cent of what there is; on a
-single path, where there is hardly any, it would make sure of a pose that nobody can tell. Measured
-that way, 240 tracks of one path were 13 deg off in tilt and gave 1 deg as its deviation.
+single path, where there is hardly any, it would make sure of a pose that is not identifiable.
+Measured that way, 240 tracks of one path were 13 deg off in tilt and gave 1 deg as its deviation.
 
 Source: Fuller 1987, Measurement Error Models: of regressors with noise of a known covariance the
 moments less that noise, (M - N)^-1 M (M - N)^-1. What N is, and that at most 95 % of M are called
