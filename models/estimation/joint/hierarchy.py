@@ -104,13 +104,13 @@ def reweigh(
     """Weights at given residuals (M,); rows that are not valid count for nothing."""
     inlier, outlier = log_density(residual, value, spread)
     odds = np.exp(np.clip(outlier - inlier, -_ODDS_CLIP, _ODDS_CLIP))
-    inlier = _inlier_probabilities(odds, valid, rows, spread)
+    probability = _inlier_probabilities(odds, valid, rows, spread)
     # Correlated rows count as fewer.
     precision = (1 - spread.correlation) / (1 + spread.correlation) / spread.within_sd**2
     weights = Weights(
-        row=inlier,
+        row=probability,
         track=np.ones(rows.owners),
-        inlier=inlier,
+        inlier=probability,
         own=np.zeros((rows.owners, 2)),
         own_covariance=np.zeros((rows.owners, 2, 2)),
     )
