@@ -1,6 +1,7 @@
 """The served pose out of the store: findings in, pose, reason, history and reference out."""
 
 import math
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from fastapi.testclient import TestClient
@@ -91,6 +92,21 @@ def test_the_etag_changes_with_the_answer_only(bench):
     after = bench.http.get("/cameras/corner/pose", headers={"If-None-Match": first.headers["ETag"]})
     assert after.status_code == 200
     assert after.headers["ETag"] != first.headers["ETag"]
+
+
+def test_maintenance_that_ends_half_a_second_later_has_an_etag_of_its_own(bench):
+    begins = datetime.now(UTC).replace(second=0, microsecond=0)
+    answers = []
+    for moment in (100_000, 600_000):
+        until = (begins + timedelta(hours=1)).replace(microsecond=moment)
+        plan = {"from": begins.isoformat(), "to": until.isoformat(), "reason": "cleaning"}
+        planned = bench.http.post("/cameras/corner/maintenance", json=plan)
+        planned.raise_for_status()
+        answers.append(bench.http.get("/cameras/corner/pose"))
+        url = f"/cameras/corner/maintenance/{planned.json()['id']}"
+        bench.http.delete(url).raise_for_status()
+    assert answers[0].json()["reason_values"] != answers[1].json()["reason_values"]
+    assert answers[0].headers["ETag"] != answers[1].headers["ETag"]
 
 
 def test_a_refresh_without_news_writes_nothing(bench):
