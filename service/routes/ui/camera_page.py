@@ -40,7 +40,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         zone_name=state.settings.timezone,
         headline=headline(page, zone),
         drawings=draw_camera(page),
-        numbers=camera_words.number_rows(page.camera.prior_pose, page.pose.pose, estimate),
+        parameters=camera_words.parameter_rows(page.camera.prior_pose, page.pose.pose, estimate),
         misplaced=camera_words.misplaced_words(page.misplaced),
         flags=camera_words.flags(page, clock),
         activity=[(entry, entry_words(entry, clock)) for entry in page.activity],

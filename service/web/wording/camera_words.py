@@ -1,4 +1,4 @@
-"""The rest of a camera's page in words: numbers of the pose, activity, what a move means, flags."""
+"""The rest of a camera's page in words: pose parameters, activity, what a move means, flags."""
 
 import math
 from collections.abc import Sequence
@@ -56,8 +56,8 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NumberRow:
-    """One number of the pose as text; `served`, `drift`, `sure` are empty if not identifiable."""
+class ParameterRow:
+    """One pose parameter as text; `served`, `drift`, `sure` are empty if not identifiable."""
 
     name: str
     prior: str
@@ -66,9 +66,9 @@ class NumberRow:
     sure: str
 
 
-def number_rows(
+def parameter_rows(
     prior: CameraPose, served: CameraPose, estimate: EstimateRecord | None
-) -> tuple[NumberRow, ...]:
+) -> tuple[ParameterRow, ...]:
     """Pan, tilt, roll and height: prior, served, the drift, and half its 90 % interval."""
     identifiable = () if estimate is None else tuple(estimate.identifiable)
     rows = []
@@ -84,7 +84,7 @@ def number_rows(
                 "drift": f"{signed(drift, digits)}{unit}",
                 "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
             }
-        rows.append(NumberRow(**{"served": "", "drift": "", "sure": "", **row}))
+        rows.append(ParameterRow(**{"served": "", "drift": "", "sure": "", **row}))
     return tuple(rows)
 
 
