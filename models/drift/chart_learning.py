@@ -10,8 +10,8 @@ from models.drift.chart import (
     KNOCKS,
     RUN,
     DriftChart,
+    highest,
     ratios_of,
-    trace,
 )
 from models.drift.group_scores import SCORES, Usual, scores_at
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
@@ -98,10 +98,10 @@ def learn_chart(
         covariance=_covariance(bounded),
         responses=(after.mean(axis=1) - before.mean(axis=0)).T,
     )
-    highest = _highest(chart, bounded, np.random.default_rng(seed))
-    typical = float(np.median(highest))
+    reached = _reached(chart, bounded, np.random.default_rng(seed))
+    typical = float(np.median(reached))
     return replace(
-        chart, typical=typical, tail=max(float(highest[highest > typical].mean() - typical), 1.0)
+        chart, typical=typical, tail=max(float(reached[reached > typical].mean() - typical), 1.0)
     )
 
 
@@ -148,17 +148,17 @@ def _covariance(scores: Array) -> Array:
     return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
 
 
-def _highest(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Array:
+def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Array:
     """The highest statistic of each of so many runs of a still camera."""
     ratios = ratios_of(chart)
     count = len(scores)
-    highest = np.empty(_RUNS)
+    reached = np.empty(_RUNS)
     for run in range(_RUNS):
         taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
         people = scores[drawn_blocks(rng, count, count)]
         walked = people[drawn_blocks(rng, count, RUN)]
-        highest[run] = trace(ratios, walked - taken_for_usual).statistic.max()
-    return highest
+        reached[run] = highest(ratios, walked - taken_for_usual)
+    return reached
 
 
 def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:

@@ -12,6 +12,7 @@ from models.drift.chart import (
     LENGTHS,
     DriftChart,
     Knocked,
+    highest,
     ratios_of,
     trace,
 )
@@ -105,6 +106,18 @@ def test_the_ratio_is_that_of_a_shift_by_hand():
     # A reference of 16 walking groups, counted one and a half times, is more unsure than they are.
     path = trace(ratios_of(plain(walking_groups=16.0, responses=far_heading())), apart)
     assert path.statistic[-1] == pytest.approx(18.0 / 2.5)
+
+
+@pytest.mark.parametrize("count", [16, 90, 1000])
+def test_the_highest_is_the_highest_of_the_trace(learned, count):
+    chart, _ = learned
+    ratios = ratios_of(chart)
+    rng = np.random.default_rng(count)
+    for size in (0.3, 1.0, 4.0):
+        apart = rng.normal(rng.normal(0, size, SCORES), 1.0, (count, SCORES))
+        expected = trace(ratios, apart).statistic.max()
+        assert highest(ratios, apart) == pytest.approx(expected, rel=1e-12)
+    assert highest(ratios, np.zeros((15, SCORES))) == -math.inf
 
 
 def test_less_than_half_a_knock_never_adds_up():

@@ -77,7 +77,7 @@ def test_slopes_are_those_of_differences(number):
 
 
 def test_a_wide_site_has_wider_bumps_not_more():
-    place = np.random.default_rng(4).uniform(-200, 200, (4000, 2))
+    place = np.random.default_rng(4).uniform(-200, 200, (1500, 2))
     field = field_over(measured_at(place), SHAPE)
     assert len(field.centres) <= 150
     assert field.length_m > 6.0
