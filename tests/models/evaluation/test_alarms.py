@@ -39,7 +39,7 @@ EVEN = HabitConfig(
 def watch():
     """One knock, of the heading, moves the last of independent scores by 2; the level is 10."""
     responses = np.zeros((SCORES, len(KNOCKS)))
-    responses[-1, KNOCKS.index(Knocked(number=3, size=math.radians(6)))] = 2.0
+    responses[-1, KNOCKS.index(Knocked(parameter=3, size=math.radians(6)))] = 2.0
     chart = DriftChart(
         speed_reference=None,
         middle=np.zeros(SCORES),
