@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from models.estimation.joint.measures import measure_statures
 from models.estimation.joint.observations import STEP_S, Observations
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
@@ -54,7 +54,7 @@ def hidden(observations: Observations, pose: CameraPose) -> tuple[Mask, Mask]:
     """
     tops, rows = observations.tops, observations.tops.rows
     short = np.zeros(len(rows), dtype=bool)
-    statures = measure_statures(tops, numbers_of(pose), pose.heading_rad)
+    statures = measure_statures(tops, plane_parameters_of(pose), pose.heading_rad)
     seen = statures.valid
     if not seen.any():
         return np.zeros(len(observations.steps.rows), dtype=bool), short

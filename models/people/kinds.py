@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from models.estimation.joint.measures import measure_speeds
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.people.usual import residuals
@@ -43,7 +43,7 @@ def kinds_of(observations: Observations, pose: CameraPose) -> npt.NDArray[np.int
     fast everywhere and all the time is a bicycle, a runner or a car; fast now and then a tracker's
     mistake. At a pose that is off, everybody is off alike.
     """
-    speeds = measure_speeds(observations.steps, numbers_of(pose), pose.heading_rad)
+    speeds = measure_speeds(observations.steps, plane_parameters_of(pose), pose.heading_rad)
     assert speeds.direction is not None
     steps, rows = observations.steps, speeds.rows
     seen = speeds.valid

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.estimation.joint.measures import measure_speeds
 from models.estimation.joint.observations import Observations, Steps, steps_where
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 
 _TILTS_RAD = np.radians(np.arange(-12.0, 21.0, 4.0))
@@ -43,7 +43,7 @@ def _tilted(prior: CameraPose, by_rad: float) -> float:
 
 def _spread(steps: Steps, prior: CameraPose, by_rad: float) -> float:
     """How far apart the log paces are at a tilt; more than any where some are above the horizon."""
-    candidate = numbers_of(prior)
+    candidate = plane_parameters_of(prior)
     candidate[0] = _tilted(prior, by_rad)
     speeds = measure_speeds(steps, candidate, prior.heading_rad)
     on_ground = float(speeds.valid.mean())

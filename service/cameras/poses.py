@@ -59,9 +59,9 @@ class PoseView:
         return self.standing.estimate
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
-        return self.standing.told
+        return self.standing.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:

@@ -117,7 +117,7 @@ def test_a_refresh_without_news_writes_nothing(bench):
 
 def test_a_number_that_is_not_told_is_nowhere_taken_for_known(bench):
     for _ in range(4):
-        bench.see(moved(tilt_deg=5.0, roll_deg=0.3), weak=("tilt", "height"))
+        bench.see(moved(tilt_deg=5.0, roll_deg=0.3), unidentifiable=("tilt", "height"))
     body = bench.pose()
     assert body["state"] == "ok"
     assert body["estimated"] == ["roll_deg"]
@@ -140,7 +140,7 @@ def test_where_nothing_is_told_the_state_is_never_ok(bench):
     everything = ("tilt", "roll", "height")
     bench.see(PRIOR)
     assert bench.pose()["state"] == "ok"
-    bench.see(moved(tilt_deg=5.0), weak=everything)
+    bench.see(moved(tilt_deg=5.0), unidentifiable=everything)
     body = bench.pose()
     assert (body["state"], body["estimated"]) == ("learning", [])
     assert (body["sd"], body["drift"]) == (None, None)
@@ -148,7 +148,7 @@ def test_where_nothing_is_told_the_state_is_never_ok(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
     for _ in range(4):
-        bench.see(PRIOR, weak=everything)
+        bench.see(PRIOR, unidentifiable=everything)
     assert bench.pose()["state"] == "drifting"  # what is not told ends no alert
     (alert,) = bench.alerts(state="firing")
     assert alert["drift"]["tilt_deg"] == pytest.approx(5.0)
