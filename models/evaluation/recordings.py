@@ -55,9 +55,8 @@ def load_recording(folder: Path) -> list[Scene]:
 def _virtual_cameras(folder: Path) -> list[Scene]:
     camera = json.loads((folder / "camera.json").read_text())
     lens, pose = _lens(camera["intrinsics"]), _pose(camera["true_pose"])
-    path = next(
-        path for name in _ON_GROUND if (path := folder / name).exists() or name == _ON_GROUND[-1]
-    )
+    aligned, raw = (folder / name for name in _ON_GROUND)
+    path = aligned if aligned.exists() else raw
     rows = _numbers(path)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     reach_m = float(camera["max_ground_distance_m"])
@@ -96,7 +95,7 @@ def _real_camera(path: Path, name: str, cameras: Mapping[str, Any]) -> Scene:
         )
         tracks.append(SceneTrack(track_id=track_id, trajectory=trajectory, person_id=track_id))
     return Scene(
-        scene_id=f"meva-{name.lower()}-week" if name.startswith("G") else name,
+        scene_id=f"{path.parent.name}-{name}",
         intrinsics=_lens(cameras[usual]["intrinsics"]),
         true_pose=_pose(cameras[usual]["true_pose"]),
         frame_rate_hz=10.0,

@@ -88,13 +88,17 @@ def tasks_of(
     for fault in faults:
         if fault not in FAULTS:
             raise ShapeError(f"faults: {', '.join(FAULTS)} are known, got {fault!r}")
-    found: list[Task] = []
-    for table in tables:
-        for folder in folders:
-            for camera, scene in enumerate(load_recording(folder)):
-                asked = _asked(table, scene, seeds, batch, faults)
-                found += [Task(folder=folder, camera=camera, asked=some) for some in asked]
-    return found
+    cameras = [
+        (folder, camera, scene.scene_id, len(scene.tracks))
+        for folder in folders
+        for camera, scene in enumerate(load_recording(folder))
+    ]
+    return [
+        Task(folder=folder, camera=camera, asked=asked)
+        for table in tables
+        for folder, camera, name, tracks in cameras
+        for asked in _asked(table, name, tracks > _LONG, seeds, batch, faults)
+    ]
 
 
 def work(task: Task, plan: ReplayPlan) -> list[Found]:
@@ -116,9 +120,14 @@ def work(task: Task, plan: ReplayPlan) -> list[Found]:
 
 
 def _asked(
-    table: Table, scene: Scene, seeds: Sequence[int], batch: int, faults: Sequence[str]
+    table: Table,
+    scene: str,
+    long: bool,
+    seeds: Sequence[int],
+    batch: int,
+    faults: Sequence[str],
 ) -> Iterator[tuple[Asked, ...]]:
-    long = len(scene.tracks) > _LONG
+    """What is asked of a camera in a table, in parts that share a reference."""
     if table == Table.REPLAYS:
         if not long:
             return
@@ -126,7 +135,7 @@ def _asked(
             for move in MOVES if seed == seeds[0] else MOVES[1:]:  # nothing is drawn while still
                 asked = Asked(
                     table=table,
-                    scene=scene.scene_id,
+                    scene=scene,
                     seed=seed,
                     knock=move,
                     batch=batch,
@@ -143,7 +152,7 @@ def _asked(
                 drawn = table == Table.PEOPLE or long or bool(fault) or seed == seeds[0]
                 yield tuple(
                     Asked(
-                        table=table, scene=scene.scene_id, seed=seed, knock=knock, batch=batch,
+                        table=table, scene=scene, seed=seed, knock=knock, batch=batch,
                         fault=fault, reference=reference, seen=seen,
                     )
                     for knock in _KNOCKS[table]
