@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import ShapeError
-from models.evaluation.served.outcomes import NumberOutcome, ServedOutcome
+from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome, Stretch
 from service.studies.served_tasks import Asked, Found, Table
 
@@ -105,7 +105,8 @@ def _found(row: dict[str, Any]) -> Found:
     if asked.table == Table.REPLAYS:
         return Found(asked=asked, outcome=_replay_outcome(told))
     return Found(
-        asked=asked, outcome=ServedOutcome(**{**told, "numbers": _numbers(told["numbers"])})
+        asked=asked,
+        outcome=ServedOutcome(**{**told, "parameters": _parameters(told["parameters"])}),
     )
 
 
@@ -116,14 +117,15 @@ def _replay_outcome(told: dict[str, Any]) -> ReplayOutcome:
             **told,
             "before": _stretch(before),
             "after": None if after is None else _stretch(after),
-            "measured": None if measured is None else _numbers(measured),
+            "measured": None if measured is None else _parameters(measured),
         }
     )
 
 
 def _stretch(told: dict[str, Any]) -> Stretch:
-    return Stretch(**{**told, "told": tuple(told["told"]), "covered": tuple(told["covered"])})
+    counts = {name: tuple(told[name]) for name in ("identifiable", "covered")}
+    return Stretch(**{**told, **counts})
 
 
-def _numbers(told: Iterable[dict[str, Any]]) -> tuple[NumberOutcome, ...]:
-    return tuple(NumberOutcome(**each) for each in told)
+def _parameters(told: Iterable[dict[str, Any]]) -> tuple[ParameterOutcome, ...]:
+    return tuple(ParameterOutcome(**each) for each in told)

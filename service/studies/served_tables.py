@@ -5,7 +5,7 @@ from pathlib import Path
 
 from models.errors import ShapeError
 from models.evaluation.injectors.catalogue import FAULTS
-from models.evaluation.served.figures import Figures, NumberFigures, figures_of
+from models.evaluation.served.figures import Figures, ParameterFigures, figures_of
 from models.evaluation.served.outcomes import ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome
 from service.studies.outcome_file import Heading
@@ -28,7 +28,7 @@ _SHOWN = (
     "height",
     "tilt, roll, pan, deg",
     "covers: tilt, roll, height, pan",
-    "told",
+    "identifiable",
     "beyond 5 sd",
     "cut",
 )
@@ -149,7 +149,7 @@ def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
             _after(before.alarm_after),
             ", ".join(
                 "-" if not n else f"{100 * c / n:.0f}"
-                for c, n in zip(before.covered, before.told, strict=True)
+                for c, n in zip(before.covered, before.identifiable, strict=True)
             ),
             f"{before.worst_sd:.1f}",
         ]  # fmt: skip
@@ -161,7 +161,7 @@ def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
                 "too few came"
                 if told.measured is None
                 else ", ".join(
-                    f"{n.error:+.2f} ({n.sd:.2f})" if n.told else "not told"
+                    f"{n.error:+.2f} ({n.sd:.2f})" if n.identifiable else "not identifiable"
                     for n in (told.measured[0], told.measured[1], told.measured[3])
                 )
             )
@@ -170,27 +170,27 @@ def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
 
 
 def _cells(said: Figures) -> list[str]:
-    tilt, roll, height, pan = said.numbers
+    tilt, roll, height, pan = said.parameters
     errors = ", ".join(_or_dash(each.error, "{:.2f}") for each in (tilt, roll, pan))
     every = (tilt, roll, height, pan)
-    told = min(each.told for each in every)
+    told = min(each.identifiable for each in every)
     return [
         f"{said.rotation_deg:.2f} ({said.rotation_p90_deg:.1f})",
         f"{100 * said.height_error:.1f} % ({100 * said.height_error_p90:.0f})",
         errors,
         ", ".join(_or_dash(_percent(each), "{:.0f}") for each in every) + " %",
-        "all" if told == 1 else ", ".join(f"{each.told:.0%}" for each in every),
+        "all" if told == 1 else ", ".join(f"{each.identifiable:.0%}" for each in every),
         str(said.beyond),
         f"{said.cut:.0%}",
     ]
 
 
-def _percent(number: NumberFigures) -> float | None:
-    return None if number.covered is None else 100 * number.covered
+def _percent(parameter: ParameterFigures) -> float | None:
+    return None if parameter.covered is None else 100 * parameter.covered
 
 
 def _slopes(said: Figures) -> str:
-    return ", ".join(_or_dash(each.slope, "{:.2f}") for each in said.numbers)
+    return ", ".join(_or_dash(each.slope, "{:.2f}") for each in said.parameters)
 
 
 def _or_dash(value: float | None, form: str) -> str:

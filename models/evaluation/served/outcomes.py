@@ -1,4 +1,4 @@
-"""What was served of a case beside the truth: each number, whether it was told, and how surely."""
+"""What was served of a case beside the truth: each parameter, and how surely."""
 
 import math
 import time
@@ -7,29 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.errors import CalibrationError
-from models.estimation.numbers import WITH_HEADING
 from models.evaluation.protocol.cases import ProtocolCase, angle_deg
 from models.evaluation.served.windows import Window, looks
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import array_of
+from models.geometry.pose_parameters import PARAMETERS, array_of
 from models.quantiles import Z90
 from models.recalibration import CameraSite, PoseFinding
 
-NUMBERS = WITH_HEADING  # tilt, roll, height, heading: the order of every four here
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NumberOutcome:
-    """One number of a pose: degrees, or the log of the height.
+class ParameterOutcome:
+    """One parameter of a pose: degrees, or the log of the height.
 
     `moved` is how far it truly is from the prior pose, `error` how far off the truth the estimate
-    was, `sd` what it gave as its standard deviation. Served is it only where it was `told`.
+    was, `sd` what it gave as its standard deviation. Only `identifiable` ones are served.
     """
 
     moved: float
     error: float
     sd: float
-    told: bool
+    identifiable: bool
 
     @property
     def covered(self) -> bool:
@@ -44,9 +41,9 @@ class NumberOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServedOutcome:
-    """A case as it was served at its end: with what is told, the prior pose's numbers elsewhere.
+    """A case as it was served at its end: what is not identifiable as the prior has it.
 
-    `numbers` are tilt, roll, height, heading; none where nothing could be learned or estimated,
+    `parameters` are tilt, roll, height, heading; none where nothing could be learned or estimated,
     and `failure` says why. `rotation_deg` is the whole rotation between the served and the true
     pose, `height_error` a share of the height. `cuts` windows were cut at a change, where there
     was none. `mapped` says whether the flow map had a part, `reason` what was said of it.
@@ -55,7 +52,7 @@ class ServedOutcome:
     reference_tracks: int
     seen_tracks: int
     used_tracks: int
-    numbers: tuple[NumberOutcome, ...]
+    parameters: tuple[ParameterOutcome, ...]
     rotation_deg: float
     height_error: float
     cuts: int
@@ -84,7 +81,7 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
         used_tracks=last.finding.joint.walkers,
-        numbers=numbers_beside(last.finding, case.prior_pose, case.true_pose),
+        parameters=parameters_beside(last.finding, case.prior_pose, case.true_pose),
         rotation_deg=angle_deg(served, case.true_pose),
         height_error=abs(served.height_m / case.true_pose.height_m - 1),
         cuts=cuts,
@@ -94,26 +91,26 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
     )
 
 
-def numbers_beside(
+def parameters_beside(
     found: PoseFinding, prior: CameraPose, truth: CameraPose
-) -> tuple[NumberOutcome, ...]:
-    """Each number of a finding beside the truth."""
+) -> tuple[ParameterOutcome, ...]:
+    """Each parameter of a finding beside the truth."""
     estimate = found.fused
     sds = np.sqrt(np.diag(estimate.covariance))
-    columns = zip(NUMBERS, array_of(prior), array_of(truth), estimate.values, sds, strict=True)
+    columns = zip(PARAMETERS, array_of(prior), array_of(truth), estimate.values, sds, strict=True)
     return tuple(
-        NumberOutcome(
+        ParameterOutcome(
             moved=_apart(name, before, true),
             error=_apart(name, true, value),
             sd=_apart(name, 0.0, sd),
-            told=name in estimate.told,
+            identifiable=name in estimate.identifiable,
         )
         for name, before, true, value, sd in columns
     )
 
 
 def _apart(name: str, one: float, other: float) -> float:
-    """From one value of a number to another: degrees within half a turn, or the log's."""
+    """From one value of a parameter to another: degrees within half a turn, or the log's."""
     if name == "height":
         return float(other - one)
     return math.degrees(math.remainder(float(other - one), 2 * math.pi))
@@ -125,12 +122,12 @@ def reason_of(found: PoseFinding) -> str:
 
 
 def _unserved(case: ProtocolCase, failure: str, seconds: float) -> ServedOutcome:
-    """The prior pose is served where nothing is told."""
+    """The prior pose is served where nothing is identifiable."""
     return ServedOutcome(
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
         used_tracks=0,
-        numbers=(),
+        parameters=(),
         rotation_deg=angle_deg(case.prior_pose, case.true_pose),
         height_error=abs(case.prior_pose.height_m / case.true_pose.height_m - 1),
         cuts=0,

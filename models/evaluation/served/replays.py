@@ -12,7 +12,7 @@ import numpy as np
 from models.drift.verdict import judge
 from models.evaluation.protocol.partings import first_seen
 from models.evaluation.scenes import Knock, Scene, SceneTrack
-from models.evaluation.served.outcomes import NumberOutcome, numbers_beside, reason_of
+from models.evaluation.served.outcomes import ParameterOutcome, parameters_beside, reason_of
 from models.evaluation.served.windows import Look, Window, looks
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
@@ -48,8 +48,8 @@ class Stretch:
 
     `tracks` came, of which after `alarm_after` there was the first alarm; None where there was
     none. Shares are of the `looks`: with the map in use, with paths that are said to have changed.
-    `told` and `covered` count looks by tilt, roll, height, heading: where it was told, and where
-    its interval held the truth of those; `worst_sd` is the largest error of a told number in
+    `identifiable` and `covered` count looks by tilt, roll, height, heading: where it was, and where
+    its interval held the truth of those; `worst_sd` is the largest error of such a parameter in
     standard deviations. `cuts` is how many changes were found.
     """
 
@@ -58,7 +58,7 @@ class Stretch:
     alarm_after: int | None
     mapped: float
     paths_changed: float
-    told: tuple[int, ...]
+    identifiable: tuple[int, ...]
     covered: tuple[int, ...]
     worst_sd: float
     cuts: int
@@ -66,7 +66,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOutcome:
-    """A replay: before the move, and after it, with its numbers from 250 tracks on.
+    """A replay: before the move, and after it, with its parameters from 250 tracks on.
 
     A replay that is still has no `after`. `measured` is None where so many did not come.
     """
@@ -75,7 +75,7 @@ class ReplayOutcome:
     charted: bool
     before: Stretch
     after: Stretch | None
-    measured: tuple[NumberOutcome, ...] | None
+    measured: tuple[ParameterOutcome, ...] | None
     seconds: float
 
 
@@ -117,7 +117,9 @@ def replay(
         charted=site.chart is not None,
         before=_stretch(one, 0, len(stills), prior, prior),
         after=_stretch(other, len(stills), len(seen), prior, moved) if knock is not None else None,
-        measured=None if measured is None else numbers_beside(measured.look.finding, prior, moved),
+        measured=None
+        if measured is None
+        else parameters_beside(measured.look.finding, prior, moved),
         seconds=time.monotonic() - started,
     )
 
@@ -153,9 +155,9 @@ def _watch(
 def _stretch(
     watched: Sequence[_Watched], since: int, tracks: int, prior: CameraPose, truth: CameraPose
 ) -> Stretch:
-    numbers = [numbers_beside(each.look.finding, prior, truth) for each in watched]
-    told = [[n.told for n in each] for each in numbers]
-    covered = [[n.told and n.covered for n in each] for each in numbers]
+    parameters = [parameters_beside(each.look.finding, prior, truth) for each in watched]
+    told = [[n.identifiable for n in each] for each in parameters]
+    covered = [[n.identifiable and n.covered for n in each] for each in parameters]
     reasons = [reason_of(each.look.finding) for each in watched]
     alarms = (each.look.tracks - since for each in watched if each.alarm)
     return Stretch(
@@ -164,9 +166,11 @@ def _stretch(
         alarm_after=next(alarms, None),
         mapped=_share([each.look.finding.fused.registered for each in watched]),
         paths_changed=_share([reason == TracksCode.PATHS_CHANGED for reason in reasons]),
-        told=_counts(told),
+        identifiable=_counts(told),
         covered=_counts(covered),
-        worst_sd=max((n.off_sd for each in numbers for n in each if n.told), default=0.0),
+        worst_sd=max(
+            (n.off_sd for each in parameters for n in each if n.identifiable), default=0.0
+        ),
         cuts=sum(each.look.cut is not None for each in watched),
     )
 

@@ -12,19 +12,19 @@ from pathlib import Path
 import pytest
 
 from models.errors import ShapeError
-from models.evaluation.served.outcomes import NumberOutcome, ServedOutcome
+from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome, Stretch
 from service.studies.outcome_file import OutcomeFile
 from service.studies.served_tables import BEGIN, END, all_tables, write_between
 from service.studies.served_tasks import Asked, Found, Table, tasks_of
 from tests.models.evaluation.test_partings import scene_of
 
-NUMBER = NumberOutcome(moved=2.0, error=0.25, sd=0.5, told=True)
+NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True)
 SERVED = ServedOutcome(
     reference_tracks=100,
     seen_tracks=50,
     used_tracks=45,
-    numbers=(NUMBER, replace(NUMBER, error=1.0), replace(NUMBER, error=0.01, sd=0.02), NUMBER),
+    parameters=(NUMBER, replace(NUMBER, error=1.0), replace(NUMBER, error=0.01, sd=0.02), NUMBER),
     rotation_deg=0.75,
     height_error=0.0123,
     cuts=1,
@@ -33,15 +33,15 @@ SERVED = ServedOutcome(
     seconds=1.5,
 )
 STRETCH = Stretch(
-    tracks=300, looks=6, alarm_after=None, mapped=0.5, paths_changed=1 / 3, told=(6, 6, 6, 3),
-    covered=(6, 3, 6, 3), worst_sd=2.25, cuts=1,
+    tracks=300, looks=6, alarm_after=None, mapped=0.5, paths_changed=1 / 3,
+    identifiable=(6, 6, 6, 3), covered=(6, 3, 6, 3), worst_sd=2.25, cuts=1,
 )  # fmt: skip
 REPLAYED = ReplayOutcome(
     reference_tracks=1000,
     charted=True,
     before=STRETCH,
     after=replace(STRETCH, alarm_after=50),
-    measured=SERVED.numbers,
+    measured=SERVED.parameters,
     seconds=9.0,
 )
 ASKED = Asked(table=Table.TIME, scene="made-up", seed=0, knock="still", batch=50, seen=400)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.evaluation.protocol.cases import ProtocolCase
 from models.evaluation.scenes import Knock, Scene, SceneTrack
-from models.evaluation.served.outcomes import numbers_beside, serve_case
+from models.evaluation.served.outcomes import parameters_beside, serve_case
 from models.evaluation.served.replays import ReplayPlan, replay
 from models.evaluation.served.windows import Window, looks
 from models.recalibration import CameraSite, DriftLimits, Trajectory, learn_site, observe
@@ -78,21 +78,21 @@ def test_a_served_case_is_judged_beside_the_truth(walked, site):
     told = serve_case(case_of(walked, 2), site, Window(batch=40))
     assert told.failure == ""
     assert (told.reference_tracks, told.seen_tracks, told.cuts) == (150, 80, 0)
-    moves = [number.moved for number in told.numbers]
+    moves = [parameter.moved for parameter in told.parameters]
     assert_allclose(moves, [5.0, -4.0, math.log(1.08), 0.0], atol=1e-9)
     assert told.rotation_deg < 1.0
     assert told.height_error < 0.05
     (look,) = looks(walked[2], site, Window(batch=None))
     by_hand = look.finding.fused.values[0] - KNOCKED.tilt_rad
-    assert told.numbers[0].error == pytest.approx(math.degrees(by_hand), abs=1e-6)
-    assert numbers_beside(look.finding, PRIOR, KNOCKED) == told.numbers
+    assert told.parameters[0].error == pytest.approx(math.degrees(by_hand), abs=1e-6)
+    assert parameters_beside(look.finding, PRIOR, KNOCKED) == told.parameters
 
 
 def test_nothing_is_made_up_where_nobody_walks_or_nothing_is_known(walked, site):
     few = case_of([walked[0], [], walked[2][:3]], 2)
     told = serve_case(few, site, Window())
     assert told.failure == "too few people walk"
-    assert told.numbers == ()
+    assert told.parameters == ()
     assert told.height_error == pytest.approx(1 - 1 / 1.08)  # the prior pose is served
     assert serve_case(few, None, Window()).failure == "the reference tells nothing"
 
