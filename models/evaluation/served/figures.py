@@ -17,8 +17,8 @@ class ParameterFigures:
 
     `identifiable` is the share of cases that determine it; the others are of those. The median and
     the 90th percentile of the error, the share of 90 % intervals that hold the truth, the largest
-    error in standard deviations, the slope of estimated against true drift with its standard error, where
-    it was moved. None where there is nothing to tell it by.
+    error in standard deviations, the slope of estimated against true drift with its standard error,
+    where it was moved. None where there is nothing to tell it by.
     """
 
     identifiable: float
@@ -35,8 +35,8 @@ class Figures:
     """Some cases: `rotation_deg` and `height_error` are of the served pose, medians and p90.
 
     `beyond` counts cases with an identifiable parameter more than 5 standard deviations off,
-    `sound` is the share of parameters that are covered or declared, `cut` the share of cases with a window
-    that was cut though nothing moved, `failed` of those in which nothing was estimated at all.
+    `sound` is the share of parameters that are covered or declared, `cut` the share of cases with a
+    window that was cut though nothing moved, `failed` of those in which nothing was estimated.
     """
 
     cases: int
