@@ -133,7 +133,7 @@ def _fault_table(cases: _Cases) -> str:
 
 def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
     lines = _head(
-        "camera", "moved", "seed", "reference", "still: tracks", "map in use",
+        "camera", "moved", "seed", "reference tracks", "still: tracks", "map in use",
         "“paths have changed”", "cuts", "alarm after", "covers: tilt, roll, height, pan",
         "worst, sd", "moved: tracks", "alarm after", "map in use",
         "250 tracks on: error (sd) of tilt, roll, pan, deg",
