@@ -42,8 +42,8 @@ def ramp(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -> li
 def wrong_k1(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -> list[SceneTrack]:
     """Tracks by a lens whose k1 is larger by `size` than the configured one. Nothing is drawn."""
     lens = view.intrinsics
-    k1, *others = lens.distortion
-    return _through(tracks, view, replace(lens, distortion=(k1 + size, *others)))
+    k1, k2, p1, p2, k3 = lens.distortion
+    return _through(tracks, view, replace(lens, distortion=(k1 + size, k2, p1, p2, k3)))
 
 
 def wrong_focal_length(

@@ -48,6 +48,7 @@ def view_of(scene: Scene, pose: CameraPose | None = None) -> View:
         raise ShapeError(f"scene {scene.scene_id}: at least 1 track is needed, got 0")
     recorded = scene.true_pose
     uv = np.concatenate([track.trajectory.uv for track in scene.tracks])
+    uv = uv[scene.intrinsics.contains(uv)]
     uv = uv[:: max(1, len(uv) // _PLACES)]
     places, valid = ground_from_pixel(scene.intrinsics, recorded.rotation, recorded.centre_m, uv)
     return View(
