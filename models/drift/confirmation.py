@@ -2,24 +2,30 @@
 
 import numpy as np
 
-from models.estimation.joint.estimate import JointEstimate
-from models.quantiles import chi_squared_above
+from models.estimation.numbers import NUMBERS, WITH_HEADING
+from models.flow.fusion import FusedEstimate
+from models.quantiles import f_above
 
-# Twice what a chi-squared passes once in a million: the same people are in many of a crowd's last
-# tracks, and crowds change. On recorded scenes of still cameras, cuts that were none reached 41.
-_BY_CHANCE = 1e-6
-_DOUBT = 2.0
+_BY_CHANCE = 1e-4  # of windows that are suspected already
+_FEWEST_PARTIES = 7  # more than there are numbers, for a covariance to be known at all
 
 
-def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
+def moved_beyond_doubt(
+    before: FusedEstimate, parties_before: int, after: FusedEstimate, parties_after: int
+) -> bool:
     """Whether a camera has moved from one estimate to the other.
 
-    A cut must leave a pose behind it: where the tracks after it cannot tell a number, more of them
-    are to be waited for. The covariances know of parties and of other poses that explain the
-    tracks about as well, where a change point's own do not.
+    A cut must leave a pose behind it: where the tracks after it cannot tell tilt, roll or height,
+    more of them are to be waited for. A heading that is not told counts for as little as is known
+    of it. Of few parties a covariance is not well known, and chance goes farther.
+
+    Source: Hotelling 1931, T squared, by the freedom of the smaller part.
     """
-    if after.weak:
+    parties = min(parties_before, parties_after)
+    if parties < _FEWEST_PARTIES or not set(NUMBERS) <= set(after.told):
         return False
     apart = after.values - before.values
     squared = float(apart @ np.linalg.solve(before.covariance + after.covariance, apart))
-    return squared > _DOUBT * chi_squared_above(_BY_CHANCE, 3)
+    numbers, freedom = len(WITH_HEADING), parties - len(WITH_HEADING)
+    limit = numbers * (parties - 1) / freedom * f_above(_BY_CHANCE, numbers, freedom)
+    return squared > limit

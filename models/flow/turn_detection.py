@@ -44,6 +44,12 @@ class StillScores:
         """What is compared with `level`, (W, 4): of the newest 8, 9, ... of parties (P, 4)."""
         return _squares(scores, self.mean, self.covariance, self.bent, self.parties)
 
+    @property
+    def information_of_a_party(self) -> Array:
+        """How much (4, 4) the mean score of one party tells of a move, were paths all it told."""
+        ridge = self.covariance + _RIDGE * np.diag(np.diag(self.covariance)) + 1e-9 * np.eye(4)
+        return np.asarray(self.bent.T @ np.linalg.solve(ridge, self.bent))
+
     def level(self, rate: float) -> float:
         """What the statistic passes in a share `rate` of windows of a still camera."""
         return value_below(rate / self.looks / 2, self.parties - 1) ** 2

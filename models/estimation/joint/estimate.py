@@ -1,11 +1,12 @@
 """The joint estimate: one pose for all tracks, with a covariance, and what it cannot tell."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.joint.fit import Fit, fit_pose
+from models.estimation.joint.fit import Channel, Fit, fit_pose
 from models.estimation.joint.groups import count_parties
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import SiteReference, channels_of, pose_prior
@@ -19,6 +20,7 @@ from models.reasons import Reason, TracksCode, Value
 _STARTS = 2
 _START_TRACKS = 80
 _FEWEST_PARTIES = 5
+_HOPELESS = 12.0  # of the tempered log likelihood, for another end to be named
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
 
@@ -26,20 +28,24 @@ _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
-    `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
+    `raw` (3,) is before that. `score` is its log likelihood, tempered, up to what is the same for
+    the same tracks. `weak` names those of tilt, roll, height that the tracks cannot
     tell; `reason` says why, and is None where they tell all. `walkers` is the number of
     tracks that were used, `parties` that of people or groups who walked independently. `bound`
-    (3, 3) is the Cramer-Rao bound of the likelihood.
+    (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other poses (3,) that explain the
+    tracks, if not as well.
     """
 
     values: Array
     covariance: Array
     raw: Array
     bound: Array
+    score: float
     walkers: int
     parties: int
     weak: tuple[str, ...]
     reason: Reason | None
+    others: tuple[Array, ...] = ()
 
     @property
     def raw_parameters(self) -> PoseParameters:
@@ -57,6 +63,29 @@ def joint_estimate(
     begin = starts(few, numbers_of(prior), _STARTS)
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    return _told(observations, channels, ends, reference)
+
+
+def joint_near(
+    observations: Observations, prior: CameraPose, reference: SiteReference, candidate: Array
+) -> JointEstimate:
+    """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
+
+    How fast people are where, and which way, is another question once a camera has been panned.
+    """
+    turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
+    channels = channels_of(observations, reference, turned)
+    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior))
+    return _told(observations, channels, [fit], reference)
+
+
+def _told(
+    observations: Observations,
+    channels: Sequence[Channel],
+    ends: list[Fit],
+    reference: SiteReference,
+) -> JointEstimate:
+    """What is said of the ends of fits, the best first."""
     best = ends[0]
     covariance = best.covariance * reference.inflation + _elsewhere(ends, reference)
     parties = count_parties(channels[0].measure(best.candidate))
@@ -81,10 +110,16 @@ def joint_estimate(
         covariance=covariance,
         raw=best.candidate,
         bound=best.bound,
+        score=best.score / reference.inflation,
         walkers=observations.walkers,
         parties=parties,
         weak=weak,
         reason=reason,
+        others=tuple(
+            end.candidate - reference.offset
+            for end in ends[1:]
+            if end.score > best.score - _HOPELESS * reference.inflation
+        ),
     )
 
 

@@ -12,6 +12,7 @@ from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.site import (
+    PLAUSIBLE_OFFSET,
     USUAL_SPEEDS_MPS,
     USUAL_STATURES_M,
     SiteReference,
@@ -58,7 +59,6 @@ _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, n
 _DOUBT_RAD = float(np.radians(4.0))
 _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
-_PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
 # Squared errors against predicted ones, before any is seen, and what that guess weighs.
 _SURPRISE = 3.0
 _SURPRISE_WEIGHT = 6.0
@@ -121,7 +121,7 @@ def learn_reference(
     offset = whole.candidate - numbers_of(prior)
     inflation = _inflation(observations, prior, _with_spreads(blank, site), offset, seed)
     # A bias is of a degree or so: what the tracks leave free is not taken for one.
-    plausible = np.diag(_PLAUSIBLE_OFFSET**2)
+    plausible = np.diag(PLAUSIBLE_OFFSET**2)
     noise = whole.covariance * inflation
     kept = plausible @ np.linalg.inv(plausible + noise)
     site = replace(
