@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.joint.site import SiteReference
-from models.estimation.numbers import TELLING_SD, WITH_HEADING
+from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.parameters import identifiable_of
 from models.flow.ends import HEADING_SD
 from models.flow.fusion import FusedEstimate
 from models.flow.reference import FlowReference
+from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
 
-# How much surer a part of a window may be of a number than as many people of the reference were:
+# How much surer a part of a window may be of a parameter than as many people of the reference were:
 # another view may be a better one.
 _BETTER_VIEW = 2.0
 
@@ -19,39 +20,42 @@ _BETTER_VIEW = 2.0
 def widened(
     before: FusedEstimate,
     after: FusedEstimate,
-    parties: int,
-    speeds: SiteReference,
+    walking_groups: int,
+    speed_reference: SpeedReference,
     flow: FlowReference | None,
 ) -> FusedEstimate:
     """The estimate after a change with the covariance that it deserves.
 
-    The cut is where it suits the tracks best. One party on its wrong side would move the pose by
-    the way between the two poses over the number of parties. And no number is surer than so many
+    The cut is where it suits the tracks best. One group on its wrong side would move the pose by
+    the way between the two poses over the number of groups. And no parameter is surer than so many
     people can make it: few of them, who walk alike, may seem to agree.
 
     Args:
         before: of the tracks before the change.
         after: of those after it.
-        parties: that walk after it.
-        speeds: how people walk at the site.
+        walking_groups: that walk after it.
+        speed_reference: how people walk at the site.
         flow: where they do, if that is known.
     """
-    apart = (after.values - before.values) / max(parties, 1)
-    floor = least_covariance(parties, speeds, flow)
+    apart = (after.values - before.values) / max(walking_groups, 1)
+    floor = least_covariance(walking_groups, speed_reference, flow)
     covariance = _at_least(after.covariance + np.outer(apart, apart), floor)
-    telling = np.sqrt(np.diag(covariance)) <= TELLING_SD
-    told = dict(zip(WITH_HEADING, telling, strict=True))
+    known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return replace(
-        after, covariance=covariance, told=tuple(name for name in after.told if told[name])
+        after,
+        covariance=covariance,
+        identifiable=tuple(name for name in after.identifiable if name in known),
     )
 
 
-def least_covariance(parties: int, speeds: SiteReference, flow: FlowReference | None) -> Array:
-    """The covariance (4, 4) that no number of so many parties is below, by the reference's own."""
+def least_covariance(
+    walking_groups: int, speed_reference: SpeedReference, flow: FlowReference | None
+) -> Array:
+    """The covariance (4, 4) that none of so many groups is below, by the reference's own."""
     known = np.diag([0.0, 0.0, 0.0, HEADING_SD**-2])
-    known[:3, :3] = speeds.information_of_a_track * parties
+    known[:3, :3] = speed_reference.information_of_a_track * walking_groups
     if flow is not None:
-        known = known + flow.still.information_of_a_party * parties
+        known = known + flow.still.information_of_a_group * walking_groups
     floor = 1e-9 * np.trace(known) * np.eye(4)  # what nobody tells is not below anything
     return np.asarray(np.linalg.inv(known + floor)) / _BETTER_VIEW**2
 

@@ -1,4 +1,7 @@
-"""The fused pose: the joint estimate's speeds and the flow map's places, in one posterior."""
+"""The fused pose: the joint estimate's speeds and the flow map's places, in one posterior.
+
+Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the map / variance inflation.
+"""
 
 import math
 from dataclasses import dataclass
@@ -7,29 +10,29 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.joint.site import SiteReference
-from models.estimation.numbers import NUMBERS, TELLING_SD, WITH_HEADING
+from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
 from models.flow.ends import (
     HEADING_SD,
     REACH_RAD,
     apart,
-    chances_of,
     elsewhere,
     ends_of,
     flatter,
+    odds_of,
 )
 from models.flow.heading import on_known_ground, variance_of_halves
 from models.flow.likelihood import walkers_of
-from models.flow.path_test import party_fits
+from models.flow.path_test import group_fits
 from models.flow.reference import FlowReference, candidate_of
 from models.flow.registration import Posterior, settled, shape_at
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode
 
-_FEWEST_PARTIES = 5
+_FEWEST_GROUPS = 5
 _EDGE_RAD = math.radians(2.0)
 _FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
@@ -39,8 +42,8 @@ _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
-    `told` names those of tilt, roll, height, heading that the tracks can tell; `reason` is
-    what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
+    `identifiable` names those of tilt, roll, height, heading that the tracks determine; `reason`
+    is what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
     off; None where the map had no part: then all is the joint estimate's and the heading the prior
     pose's.
     `rivals` are headings (radians) of other poses that explain the tracks about as well.
@@ -48,7 +51,7 @@ class FusedEstimate:
 
     values: Array
     covariance: Array
-    told: tuple[str, ...]
+    identifiable: tuple[str, ...]
     reason: Reason | None
     raw: Array | None = None
     rivals: tuple[float, ...] = ()
@@ -79,7 +82,7 @@ def fused_estimate(
     intrinsics: Intrinsics,
     prior: CameraPose,
     joint: JointEstimate,
-    speeds: SiteReference,
+    speed_reference: SpeedReference,
     reference: FlowReference,
 ) -> FusedEstimate:
     """The pose by speeds and places together.
@@ -93,15 +96,15 @@ def fused_estimate(
         intrinsics: of the camera.
         prior: where it was.
         joint: what the speeds say, the heading taken for the prior pose's.
-        speeds: how people walk at the site.
+        speed_reference: how people walk at the site.
         reference: where they do.
     """
     walkers = walkers_of(observations, np.append(joint.values, prior.heading_rad))
-    if walkers.parties < _FEWEST_PARTIES:
+    if walkers.walking_groups < _FEWEST_GROUPS:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
-    temper = reference.temper_for(walkers.people)
-    ends = ends_of(walkers, site, temper, joint, observations, prior, speeds)
+    variance_inflation = reference.variance_inflation_for(walkers.people)
+    ends = ends_of(walkers, site, variance_inflation, joint, observations, prior, speed_reference)
     best = ends[0]
     shape = shape_at(walkers, site, best.candidate)
     move = best.candidate - candidate_of(prior)
@@ -109,27 +112,31 @@ def fused_estimate(
     values, covariance = settled(
         walkers, site, best.belief, best.peak, shape, known, reference.bias
     )
-    if reference.fit.has_changed(party_fits(walkers, site, values)):
+    if reference.fit.has_changed(group_fits(walkers, site, values)):
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     if _out_of_reach(values, prior) or not on_known_ground(walkers, site, values):
         untold = {"heading_sd_rad": HEADING_SD}
-        return by_speeds_alone(joint, prior, Reason(code=TracksCode.HEADING_UNTOLD, values=untold))
+        return by_speeds_alone(
+            joint, prior, Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values=untold)
+        )
     covariance = covariance * apart(best.belief, known, values)
-    chances = chances_of(walkers, site, ends)
-    covariance = covariance + elsewhere([end.peak for end in ends], chances)
-    posterior = Posterior(walkers=walkers, site=site, belief=best.belief, temper=temper)
+    odds = odds_of(walkers, site, ends)
+    covariance = covariance + elsewhere([end.peak for end in ends], odds)
+    posterior = Posterior(
+        walkers=walkers, site=site, belief=best.belief, variance_inflation=variance_inflation
+    )
     covariance = covariance + flatter(best, posterior, covariance)
     covariance = covariance + _unrepeated(posterior, values, covariance)
     rivals = tuple(
         float(end.candidate[3])
-        for end, chance in zip(ends, chances, strict=True)
-        if end is not best and chance > _RIVAL
+        for end, against_best in zip(ends, odds, strict=True)
+        if end is not best and against_best > _RIVAL
     )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        told=tuple(n for n, telling in zip(WITH_HEADING, sd <= TELLING_SD, strict=True) if telling),
+        identifiable=identifiable_of(PARAMETERS, sd),
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
@@ -139,14 +146,14 @@ def fused_estimate(
 def by_speeds_alone(
     joint: JointEstimate, prior: CameraPose, reason: Reason | None = None
 ) -> FusedEstimate:
-    """The joint estimate with the prior's heading, which it cannot tell."""
+    """The joint estimate with the prior's heading, which speeds leave open."""
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
     covariance[3, 3] = HEADING_SD**2
     return FusedEstimate(
         values=np.append(joint.values, prior.heading_rad),
         covariance=covariance,
-        told=tuple(name for name in NUMBERS if name not in joint.weak),
+        identifiable=joint.identifiable,
         reason=reason,
     )
 
@@ -157,8 +164,8 @@ def _reason(
     if rivals:
         turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
         return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
-    if sd > TELLING_SD[3]:
-        return Reason(code=TracksCode.HEADING_UNTOLD, values={"heading_sd_rad": sd})
+    if sd > IDENTIFIABLE_SD[3]:
+        return Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": sd})
     return None
 
 

@@ -1,4 +1,4 @@
-"""Whether a heading may be told: on known ground, and whichever people are asked."""
+"""Whether a heading is identifiable: on known ground, and whichever people are asked."""
 
 from dataclasses import replace
 
@@ -28,11 +28,11 @@ def on_known_ground(walkers: Walkers, site: Site, candidate: Array) -> bool:
 
 
 def variance_of_halves(posterior: Posterior, candidate: Array, line: Array) -> float:
-    """The variance of a heading by how far two halves of the parties find it apart.
+    """The variance of a heading by how far two halves of the walking groups find it apart.
 
-    Each half begins 4 deg to another side of a candidate (4,), the other numbers following along a
-    line (4,): whether it is found from elsewhere, and whether it hangs on a few people, is seen at
-    once. It is of one degree of freedom: for telling that something is wrong, not for an interval.
+    Each half begins 4 deg to another side of a candidate (4,), the other parameters following along
+    a line (4,): whether it is found from elsewhere, and whether it hangs on a few people, is seen.
+    It is of one degree of freedom: for telling that something is wrong, not for an interval.
     """
     ends = [
         replace(posterior, walkers=half).climbed(candidate + away * line).candidate[3]
@@ -42,8 +42,8 @@ def variance_of_halves(posterior: Posterior, candidate: Array, line: Array) -> f
 
 
 def _halves(walkers: Walkers) -> tuple[Walkers, Walkers]:
-    """Every other party, and the others."""
-    _, rank = np.unique(walkers.party_idx[walkers.steps.rows.owner_idx], return_inverse=True)
+    """Every other walking group, and the others."""
+    _, rank = np.unique(walkers.group_idx[walkers.steps.rows.owner_idx], return_inverse=True)
     first = rank % 2 == 0
     return _part(walkers, first), _part(walkers, ~first)
 

@@ -43,11 +43,13 @@ class Searched:
 
 def posed(tracks: Observations, site: CameraSite) -> Posed:
     """The pose of tracks that are of one: by speeds, and by places where these are known."""
-    joint = joint_estimate(tracks, site.prior, site.speeds)
+    joint = joint_estimate(tracks, site.prior, site.speed_reference)
     if site.flow is None:
         fused = by_speeds_alone(joint, site.prior)
     else:
-        fused = fused_estimate(tracks, site.intrinsics, site.prior, joint, site.speeds, site.flow)
+        fused = fused_estimate(
+            tracks, site.intrinsics, site.prior, joint, site.speed_reference, site.flow
+        )
     return Posed(joint=joint, fused=fused)
 
 
@@ -70,8 +72,16 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
         if parts is None:
             continue
         before, after = (posed(part, site) for part in parts)
-        if moved_beyond_doubt(before.fused, before.joint.parties, after.fused, after.joint.parties):
-            fused = widened(before.fused, after.fused, after.joint.parties, site.speeds, site.flow)
+        if moved_beyond_doubt(
+            before.fused, before.joint.walking_groups, after.fused, after.joint.walking_groups
+        ):
+            fused = widened(
+                before.fused,
+                after.fused,
+                after.joint.walking_groups,
+                site.speed_reference,
+                site.flow,
+            )
             return Searched(
                 change_idx=change_idx,
                 first=first,
@@ -88,7 +98,7 @@ def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> 
     camera that moved long ago seems to move with every change of the crowd.
     """
     turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
-    found = find_change(tracks, turned, site.speeds)
+    found = find_change(tracks, turned, site.speed_reference)
     if found is not None:
         yield found.track_idx
     if site.flow is not None:

@@ -74,14 +74,14 @@ def test_a_pose_after_a_change_is_less_sure_than_one_of_as_many_people(site, lan
 
 
 def test_no_people_are_surer_than_the_reference_s_were_twice_over(site):
-    few, many = (least_covariance(count, site.speeds, site.flow) for count in (10, 40))
+    few, many = (least_covariance(count, site.speed_reference, site.flow) for count in (10, 40))
     ratio = np.sqrt(np.diag(few) / np.diag(many))
     assert (ratio > 1.5).all()
     assert (ratio < 2.01).all()  # the root of four times as many
-    without = least_covariance(10, site.speeds, None)
+    without = least_covariance(10, site.speed_reference, None)
     assert (np.diag(without)[:3] > np.diag(few)[:3]).all()
     assert math.sqrt(without[3, 3]) == pytest.approx(math.radians(7.5), rel=1e-3)
     # Of as many people as the reference had, twice as sure as it was of its own offset at most.
-    whole = least_covariance(site.speeds.tracks, site.speeds, None)
-    own = np.sqrt(np.diag(site.speeds.offset_covariance) / np.diag(whole)[:3])
+    whole = least_covariance(site.speed_reference.tracks, site.speed_reference, None)
+    own = np.sqrt(np.diag(site.speed_reference.offset_covariance) / np.diag(whole)[:3])
     assert (own < 2.05).all()

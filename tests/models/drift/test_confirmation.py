@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 
 from models.drift.confirmation import moved_beyond_doubt
-from models.estimation.numbers import WITH_HEADING
 from models.flow.fusion import FusedEstimate
+from models.geometry.pose_parameters import PARAMETERS
 
 
-def estimate(values=(0.3, 0.0, 1.8, 0.1), covariance=None, told=WITH_HEADING):
+def estimate(values=(0.3, 0.0, 1.8, 0.1), covariance=None, identifiable=PARAMETERS):
     covariance = np.diag([1e-4] * 4) if covariance is None else np.array(covariance)
     return FusedEstimate(
         values=np.array(values),
         covariance=covariance,
-        told=told,
+        identifiable=identifiable,
         reason=None,
         raw=np.array(values) + 5.0,  # before the map's bias: nothing to go by
     )
 
 
-def moved(before, after, parties_before=300, parties_after=300):
-    return moved_beyond_doubt(before, parties_before, after, parties_after)
+def moved(before, after, groups_before=300, groups_after=300):
+    return moved_beyond_doubt(before, groups_before, after, groups_after)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2, 3])
@@ -36,7 +36,7 @@ def test_the_limit_is_hotelling_s(axis, sign):
         assert moved(found, before) is expected
 
 
-def test_few_parties_must_be_farther_apart():
+def test_few_groups_must_be_farther_apart():
     before, after = estimate(), estimate((0.42, 0.0, 1.8, 0.1))  # 0.12^2 / 2e-4 = 72: of 40, 34.7
     assert moved(before, after, 300, 40)
     assert moved(before, after, 40, 300)
@@ -45,7 +45,7 @@ def test_few_parties_must_be_farther_apart():
     assert not moved(before, estimate((1.5, 0.0, 1.8, 0.1)), 6, 300)
 
 
-def test_numbers_that_make_up_for_each_other_are_apart_across_that_alone():
+def test_parameters_that_make_up_for_each_other_are_apart_across_that_alone():
     # Together [[2, 1], [1, 2]] e-4: along (1, 1) a step of 0.05 counts 17, along (1, -1) 50.
     tied = 0.5e-4 * np.array(
         [[2.0, 1.0, 0.0, 0.0], [1.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0], [0.0, 0.0, 0.0, 2.0]]
@@ -60,9 +60,9 @@ def test_numbers_that_make_up_for_each_other_are_apart_across_that_alone():
 def test_a_cut_must_leave_a_pose_behind_it():
     before, far = estimate(), (0.9, 0.0, 1.8, 0.1)
     assert moved(before, estimate(far))
-    assert not moved(before, estimate(far, told=("tilt", "height", "heading")))
-    assert moved(before, estimate(far, told=("tilt", "roll", "height")))
-    assert moved(estimate(told=("tilt", "height", "heading")), estimate(far))
+    assert not moved(before, estimate(far, identifiable=("tilt", "height", "heading")))
+    assert moved(before, estimate(far, identifiable=("tilt", "roll", "height")))
+    assert moved(estimate(identifiable=("tilt", "height", "heading")), estimate(far))
 
 
 def test_the_same_estimate_has_not_moved():

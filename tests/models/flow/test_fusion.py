@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.estimate import joint_estimate, joint_near
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.ends import apart
 from models.flow.fusion import fused_estimate
 from models.flow.reference import candidate_of, learn_flow
@@ -38,7 +38,7 @@ def walk(lanes, pose, count, seed):
 @pytest.fixture(scope="module")
 def site(lanes):
     known = walk(lanes, PRIOR, 240, 4)
-    return learn_reference(known, PRIOR, WalkConfig(), 0), learn_flow(known, LENS, PRIOR, 0)
+    return learn_speed_reference(known, PRIOR, WalkConfig(), 0), learn_flow(known, LENS, PRIOR, 0)
 
 
 def panned(degrees):
@@ -56,7 +56,7 @@ def test_a_pan_alone_moves_neither_tilt_nor_roll(lanes, site, degrees):
     pose = panned(degrees)
     tracks = walk(lanes, pose, 120, 5)
     joint, found = fused(tracks, site)
-    assert found.told == ("tilt", "roll", "height", "heading")
+    assert found.identifiable == ("tilt", "roll", "height", "heading")
     off = found.values - candidate_of(pose)
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 0.5
     assert abs(off[2]) < 0.03
@@ -80,19 +80,19 @@ def test_what_contradicts_is_less_sure_by_as_much():
     assert apart(belief, known, np.array([0.1, 0.0, 0.0, 0.0])) == 1.0
 
 
-def test_no_heading_is_told_at_the_edge_of_the_search(lanes, site):
+def test_no_heading_is_identifiable_at_the_edge_of_the_search(lanes, site):
     tracks = walk(lanes, panned(33), 120, 7)
     joint, found = fused(tracks, site)
-    assert "heading" not in found.told
+    assert "heading" not in found.identifiable
     assert found.reason is not None
     assert found.reason.code in (
-        TracksCode.HEADING_UNTOLD,
+        TracksCode.HEADING_UNIDENTIFIABLE,
         TracksCode.HEADING_AMBIGUOUS,
         TracksCode.PATHS_CHANGED,
     )
 
 
-def test_no_heading_is_told_of_people_on_ground_that_the_reference_never_saw(lanes, site):
+def test_no_heading_is_identifiable_of_people_on_ground_that_the_reference_never_saw(lanes, site):
     """Turned by 25 deg, and all but a few walk where nobody was seen before."""
     pose = panned(25)
     elsewhere = draw_lanes(LENS, panned(48), SLOW, np.random.default_rng(8))
@@ -102,5 +102,5 @@ def test_no_heading_is_told_of_people_on_ground_that_the_reference_never_saw(lan
         + walk_site(LENS, pose, elsewhere, SLOW, 60, rng)
     )
     joint, found = fused(tracks, site)
-    assert "heading" not in found.told
+    assert "heading" not in found.identifiable
     np.testing.assert_array_equal(found.values[:3], joint.values)
