@@ -62,7 +62,7 @@ class Likelihood:
 
 def walkers_of(observations: Observations, candidate: Array) -> Walkers:
     """The steps that are walked, seen from a candidate (4,) that is about right."""
-    placed = place_steps(observations.steps, candidate)
+    placed = place_steps(observations.steps, candidate, sloped=False)
     moving = placed.valid & (placed.length_m > _STANDING_MPS * observations.steps.seconds)
     steps = steps_where(observations.steps, moving)
     rows = steps.rows
@@ -94,7 +94,7 @@ def likelihood(
     Unless it is `scored`, the scores are nothing, and it takes a quarter of the time.
     """
     steps = walkers.steps
-    placed = place_steps(steps, candidate)
+    placed = place_steps(steps, candidate, sloped=scored)
     slot_idx = flow.slot_of(steps.rows.time_s)
     known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     unseen, unseen_by_place = flow.look_unseen(placed.place)
@@ -140,7 +140,7 @@ def anchored_scores(
     """
     steps = walkers.steps
     slot_idx = flow.slot_of(steps.rows.time_s)
-    unseen, _ = flow.look_unseen(place_steps(steps, anchor).place)
+    unseen, _ = flow.look_unseen(place_steps(steps, anchor, sloped=False).place)
     placed = place_steps(steps, candidate)
     _, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     score = (

@@ -8,10 +8,18 @@ from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of
 from models.evaluation.protocol.cases import Answer, nothing_identifiable
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.protocol.served import served_pose
-from models.flow.fusion import elsewhere
+from models.flow.ends import elsewhere
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
-from models.flow.registration import Belief, Peak, Site, register, settled
+from models.flow.registration import (
+    Belief,
+    Peak,
+    Site,
+    curvature_of,
+    register,
+    settled,
+    shape_at,
+)
 from models.geometry.rotation import Array
 from models.recalibration import CameraSite, Observations
 
@@ -62,10 +70,11 @@ def registration(learned: Learned) -> Answer:
     belief = Belief(mean=mean, precision=_BROAD)
     peaks = _peaks(walkers, site, belief, variance_inflation)
     best = peaks[0]
-    known = reference.precision(best, walkers.people, best.candidate - mean)
-    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    odds = np.exp([peak.value - best.value for peak in peaks])
-    covariance = covariance + elsewhere(peaks, odds)
+    shape = shape_at(walkers, site, best.candidate)
+    known = reference.precision(shape, walkers.people, best.candidate - mean)
+    values, covariance = settled(walkers, site, belief, best, shape, known, reference.bias)
+    chances = np.exp([peak.value - best.value for peak in peaks])
+    covariance = covariance + elsewhere(peaks, chances)
     sd = np.sqrt(np.diag(covariance))[:3]
     answer = replace(
         nothing_identifiable(case),
@@ -96,7 +105,8 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: flo
             walkers, site, around, variance_inflation=variance_inflation, headings=_HEADINGS
         ):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            posterior = peak.curvature / variance_inflation + belief.precision
+            bent = curvature_of(walkers, site, peak.candidate)
+            posterior = bent / variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
                 peaks.append(replace(peak, candidate=candidate, value=log_posterior(candidate)))

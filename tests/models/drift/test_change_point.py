@@ -48,5 +48,5 @@ def test_a_still_camera_has_no_change(known, pose):
 
 def test_a_few_tracks_after_a_knock_are_too_few(known):
     tracks = window((PRIOR, 60), (KNOCKED, FEWEST_BESIDE))
-    assert find_change(of_tracks(tracks, np.arange(60 + FEWEST_BESIDE // 2)), PRIOR, known) is None
+    assert find_change(of_tracks(tracks, np.arange(60 + FEWEST_BESIDE // 4)), PRIOR, known) is None
     assert find_change(of_tracks(tracks, np.arange(2 * FEWEST_BESIDE - 1)), PRIOR, known) is None

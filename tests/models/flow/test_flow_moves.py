@@ -96,7 +96,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
-    fused = fused_estimate(changed, LENS, PRIOR, joint, flow)
+    fused = fused_estimate(changed, LENS, PRIOR, joint, speeds, flow)
     assert fused.reason == Reason(code=TracksCode.PATHS_CHANGED)
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
@@ -157,7 +157,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
-    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
+    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), speeds, flow)
     assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
