@@ -92,7 +92,9 @@ def _said_of(
     """What is said of the ends of fits, the best first."""
     best = ends[0]
     covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
-    walking_groups = count_walking_groups(channels[0].measure(best.candidate))
+    walking_groups = count_walking_groups(
+        channels[0].measure(candidate=best.candidate, sloped=False)
+    )
     # One walking group is one draw of pace and pauses, however many tracks it has.
     covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
     covariance = covariance + reference.offset_covariance

@@ -4,6 +4,7 @@ Ours: pose = estimate - offset, which is learned while the pose is known.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -70,14 +71,14 @@ def channels_of(
     steps, tops = observations.steps, observations.tops
     found = [
         Channel(
-            measure=lambda candidate: measure_speeds(steps, candidate, heading),
+            measure=partial(measure_speeds, steps, heading_rad=heading),
             learned=reference.speeds,
         )
     ]
     if reference.statures is not None and len(tops.rows):
         found.append(
             Channel(
-                measure=lambda candidate: measure_statures(tops, candidate, heading),
+                measure=partial(measure_statures, tops, heading_rad=heading),
                 learned=reference.statures,
             )
         )

@@ -42,11 +42,11 @@ def averaged_of(service):
 
 def test_a_replay_through_http_is_the_offline_evaluation(service):
     scene = load_scene(SCENES / "town_centre")
-    service.start_again(epochs=3)
+    service.start_again(epochs=1)
     output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
     assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
     served = wait_for(lambda: averaged_of(service), timeout_s=180)
-    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=3)
+    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=1)
     assert served["tracks"] == offline.tracks
     assert served["height_m"] == pytest.approx(offline.height_m, abs=1e-4)
     assert served["tilt_deg"] == pytest.approx(offline.tilt_deg, abs=1e-3)
