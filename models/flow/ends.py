@@ -24,15 +24,20 @@ _SHARED = 3  # parameters that speeds and places both determine
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class End:
-    """A peak, with what was believed where it was climbed.
+    """A peak, with the posterior that it is one of.
 
     `score` is how much better the speeds are explained with its heading than with the prior
     pose's; it is part of the peak's value.
     """
 
     peak: Peak
-    belief: Belief
+    posterior: Posterior
     score: float
+
+    @property
+    def belief(self) -> Belief:
+        """What was believed where it was climbed."""
+        return self.posterior.belief
 
     @property
     def candidate(self) -> Array:
@@ -71,22 +76,21 @@ def ends_of(
         belief=_belief(joint, prior),
         variance_inflation=variance_inflation,
     )
-    peaks = register(
-        walkers, site, first.belief, variance_inflation=variance_inflation, headings=_HEADINGS
-    )
+    peaks = register(first, _HEADINGS)
     begin = [(peak, peak.value > peaks[0].value - _UNLIKELY) for peak in peaks]
     for other in joint.others:
         candidate = np.append(other, peaks[0].candidate[3])
         begin.append((Peak(candidate=candidate, value=first.value(candidate)), True))
     ends = []
     for start, likely in begin:
-        peak, belief, score = start, first.belief, 0.0
+        peak, posterior, score = start, first, 0.0
         for _ in range(_ROUNDS if likely else 0):
             near = joint_near(observations, prior, speed_reference, peak.candidate)
-            belief, score = _belief(near, prior), near.score - joint.score
-            peak = replace(first, belief=belief).climbed(peak.candidate)
+            posterior = replace(first, belief=_belief(near, prior))
+            score = near.score - joint.score
+            peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
-        ends.append(End(peak=peak, belief=belief, score=score))
+        ends.append(End(peak=peak, posterior=posterior, score=score))
     kept = distinct([end.peak for end in ends])
     return [next(end for end in ends if end.peak is peak) for peak in kept]
 
@@ -128,7 +132,7 @@ def elsewhere(peaks: list[Peak], odds: Array) -> Array:
     return np.asarray((away * (odds / odds.sum())[:, None]).T @ away)
 
 
-def flatter(best: End, posterior: Posterior, covariance: Array) -> Array:
+def flatter(best: End, covariance: Array) -> Array:
     """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
 
     Looked at along the heading, the other parameters following as they do around the peak.
@@ -136,7 +140,7 @@ def flatter(best: End, posterior: Posterior, covariance: Array) -> Array:
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])
     turns = sd * np.linspace(-4, 4, 17)
-    values = np.array([posterior.value(best.candidate + turn * line) for turn in turns])
+    values = np.array([best.posterior.value(best.candidate + turn * line) for turn in turns])
     density = np.exp(values - values.max())
     variance = float(density @ turns**2 / density.sum())
     return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

@@ -122,11 +122,8 @@ def fused_estimate(
     covariance = covariance * apart(best.belief, known, values)
     odds = odds_of(walkers, site, ends)
     covariance = covariance + elsewhere([end.peak for end in ends], odds)
-    posterior = Posterior(
-        walkers=walkers, site=site, belief=best.belief, variance_inflation=variance_inflation
-    )
-    covariance = covariance + flatter(best, posterior, covariance)
-    covariance = covariance + _unrepeated(posterior, values, covariance)
+    covariance = covariance + flatter(best, covariance)
+    covariance = covariance + _unrepeated(best.posterior, values, covariance)
     rivals = tuple(
         float(end.candidate[3])
         for end, against_best in zip(ends, odds, strict=True)

@@ -88,7 +88,11 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """What walkers say by a map, tempered, and what is believed beside."""
+    """What walkers say by a map, tempered, and what is believed beside.
+
+    `variance_inflation` divides what the map says: how much larger its squared errors are than its
+    scores would have it.
+    """
 
     walkers: Walkers
     site: Site
@@ -126,24 +130,15 @@ class Posterior:
         return found.value / self.variance_inflation + self.belief.log_density(candidate), found
 
 
-def register(
-    walkers: Walkers,
-    site: Site,
-    belief: Belief,
-    *,
-    variance_inflation: float,
-    headings: Sequence[float],
-) -> list[Peak]:
-    """Peaks of the posterior, the highest first.
+def register(posterior: Posterior, headings: Sequence[float]) -> list[Peak]:
+    """Peaks of a posterior, the highest first.
 
     The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
-    are climbed from, and ends that are the same are one. `variance_inflation` divides what the map
-    says: how much larger its squared errors are than its scores would have it.
+    are climbed from, and ends that are the same are one.
     """
-    posterior = Posterior(
-        walkers=walkers, site=site, belief=belief, variance_inflation=variance_inflation
-    )
-    tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
+    tried = [
+        posterior.belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings
+    ]
     log_posteriors = [posterior.value(candidate) for candidate in tried]
     begin: list[Array] = []
     for number in np.argsort(log_posteriors)[::-1]:

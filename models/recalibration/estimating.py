@@ -33,7 +33,7 @@ class PoseFinding:
     `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
     same without the newest people; None unless a verdict asks for it. `change_idx` is the first
     track after the change, None where there was none, and `first` the first that counts.
-    `searched_by_map` says whether the flow map was asked for a change, `lacks` what failed beside.
+    `lacks` says what failed beside.
     """
 
     prior: CameraPose
@@ -42,7 +42,6 @@ class PoseFinding:
     earlier: FusedEstimate | None = None
     change_idx: int | None = None
     first: int = 0
-    searched_by_map: bool = False
     lacks: tuple[Lack, ...] = ()
 
     @property
@@ -82,7 +81,6 @@ def estimate_pose(
     searched = None
     if site.flow is not None:
         searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site))
-    searched_by_map = searched is not None
     if searched is None:
         site = replace(site, flow=None)
         searched = search_change(tracks, site)
@@ -97,7 +95,6 @@ def estimate_pose(
         earlier=earlier,
         change_idx=searched.change_idx,
         first=searched.first,
-        searched_by_map=searched_by_map,
         lacks=tuple(lacks),
     )
 

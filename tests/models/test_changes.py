@@ -14,7 +14,8 @@ from models.flow.turn_detection import moved_within
 from models.recalibration import estimate_pose, learn_site
 from models.recalibration.changes import posed
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, seen
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, LENS, PRIOR, seen
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 PANNED = replace(KNOCKED, heading_rad=PRIOR.heading_rad + math.radians(5))
@@ -28,7 +29,7 @@ def lanes():
 @pytest.fixture(scope="module")
 def site(lanes):
     known = walk_site(LENS, PRIOR, lanes, CONFIG, 150, np.random.default_rng(4))
-    return learn_site(seen(in_time(known)), LENS, PRIOR, chart=False)
+    return learn_site(seen(by_end(known)), LENS, PRIOR, chart=False)
 
 
 def window(*parts, seed):
@@ -39,7 +40,7 @@ def window(*parts, seed):
         part = walk_site(LENS, pose, lanes, CONFIG, count, rng)
         tracks += [replace(track, time_s=track.time_s + begin_s) for track in part]
         begin_s = max(float(track.time_s[-1]) for track in tracks) + 20
-    return seen(in_time(tracks))
+    return seen(by_end(tracks))
 
 
 def test_a_crowd_that_changes_its_ways_before_a_knocked_camera_is_no_move(site, lanes):

@@ -29,7 +29,8 @@ from models.recalibration import (
     read_alarm_chart,
 )
 from models.simulation.site import SiteConfig
-from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, near, seen, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
@@ -42,7 +43,7 @@ LIMITS = DriftLimits(
 def tracks():
     """Reference tracks, then some of the still camera and of the knocked one."""
     known, still, after = tracks_of(3, (PRIOR, 150), (PRIOR, 60), (KNOCKED, 60), config=CONFIG)
-    return [in_time(part) for part in (known, still, after)]
+    return [by_end(part) for part in (known, still, after)]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def site(tracks):
 
 @pytest.fixture(scope="module")
 def window(tracks):
-    return seen(in_time([*tracks[1], *tracks[2]]))
+    return seen(by_end([*tracks[1], *tracks[2]]))
 
 
 def swapped(tracks):
@@ -69,7 +70,8 @@ def test_the_pose_is_from_the_change_on(site, window, tracks):
     alone = estimate_pose(of_tracks(window, np.arange(found.first, window.tracks)), site)
     assert alone.change_idx is None
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
-    assert (found.searched_by_map, found.lacks) == (True, ())
+    assert found.fused.registered
+    assert not found.lacks
 
 
 def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
@@ -139,7 +141,7 @@ def test_few_people_make_no_map_and_fewer_no_site(tracks):
     assert few.learned
     assert (few.flow, few.chart) == (None, None)
     found = estimate_pose(seen(tracks[2]), few)
-    assert (found.searched_by_map, found.fused.raw) == (False, None)
+    assert not found.fused.registered
     assert read_alarm_chart(seen(tracks[2]), few, ONE_A_YEAR) is None
     with pytest.raises(TooFewTrajectoriesError, match="at least 5"):
         learn_site(seen(tracks[0][:3]), LENS, PRIOR)
@@ -167,7 +169,7 @@ def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, tracks, fails_
     (lack,) = found.lacks
     assert lack.part == "flow_map"
     assert isinstance(lack.error, ValueError)
-    assert not found.searched_by_map
+    assert not found.fused.registered
     blind = estimate_pose(asked, replace(site, flow=None))
     assert found.change_idx == blind.change_idx
     np.testing.assert_array_equal(found.fused.values, blind.fused.values)
@@ -183,7 +185,7 @@ def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, 
         prior_pose=PRIOR,
         true_pose=KNOCKED,
         reference=tuple(tracks[0]),
-        seen=tuple(in_time([*tracks[1], *tracks[2]])),
+        seen=tuple(by_end([*tracks[1], *tracks[2]])),
     )
     learned = Learned(
         case=case, seen=window, site=site, feet=window, feet_speed_reference=site.speed_reference

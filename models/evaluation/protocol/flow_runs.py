@@ -14,6 +14,7 @@ from models.flow.reference import candidate_of
 from models.flow.registration import (
     Belief,
     Peak,
+    Posterior,
     Site,
     curvature_of,
     register,
@@ -86,30 +87,25 @@ def registration(learned: Learned) -> Answer:
 
 def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
-
-    def log_posterior(candidate: Array) -> float:
-        return float(
-            site.track_log_likelihoods(walkers, candidate).sum()
-        ) / variance_inflation + belief.log_density(candidate)
-
+    posterior = Posterior(
+        walkers=walkers, site=site, belief=belief, variance_inflation=variance_inflation
+    )
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
-        number: max(log_posterior(belief.mean + node + turn) for turn in turns)
+        number: max(posterior.value(belief.mean + node + turn) for turn in turns)
         for number, node in enumerate(_NODES)
     }
     likeliest = sorted(starts, key=lambda number: -starts[number])
     peaks: list[Peak] = []
     for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
         around = replace(belief, mean=belief.mean + node)
-        for peak in register(
-            walkers, site, around, variance_inflation=variance_inflation, headings=_HEADINGS
-        ):
+        for peak in register(replace(posterior, belief=around), _HEADINGS):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
             bent = curvature_of(walkers, site, peak.candidate)
-            posterior = bent / variance_inflation + belief.precision
-            candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
+            precision = bent / variance_inflation + belief.precision
+            candidate = peak.candidate - np.linalg.solve(precision, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
-                peaks.append(replace(peak, candidate=candidate, value=log_posterior(candidate)))
+                peaks.append(replace(peak, candidate=candidate, value=posterior.value(candidate)))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

@@ -24,6 +24,7 @@ from models.simulation.site import (
     walk_site,
 )
 from models.simulation.walkers import WalkConfig
+from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR
 
 AT = candidate_of(PRIOR)
@@ -121,7 +122,7 @@ def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
         for number, track in enumerate(walks):
             shift = hour * 3600 + number % 2 * day_s - track.time_s[0] + 20 * number
             tracks.append(replace(track, time_s=track.time_s + shift))
-    tracks.sort(key=lambda track: float(track.time_s[-1]))
+    tracks = by_end(tracks)
     reference = learn_flow(feet(tracks), LENS, PRIOR, 0)
     assert reference is not None
     assert reference.flow.slots == 4
