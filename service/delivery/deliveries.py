@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
-from models.reasons import Reason
+from models.reasons import Reason, Value
 from service.delivery.messages import Message, all_firing, message_of
 from service.delivery.outbox import wake
 from service.delivery.send import Outcome
@@ -208,7 +208,10 @@ def _failed(
         return
     patience = timedelta(hours=settings.webhook_patience_h)
     if now - webhook.failing_since > patience:
-        values = {"patience_s": patience.total_seconds(), "error": str(outcome.error)}
+        values: dict[str, Value] = {
+            "patience_s": patience.total_seconds(),
+            "error": str(outcome.error),
+        }
         webhook.disable(Reason(code=ServiceCode.ENDPOINT_FAILS, values=values))
 
 
