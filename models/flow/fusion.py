@@ -108,12 +108,14 @@ def fused_estimate(
     best = ends[0]
     shape = shape_at(walkers, site, best.candidate)
     move = best.candidate - candidate_of(prior)
+    fits = group_fits(walkers, site, best.candidate)
+    if reference.fit.has_changed(fits):
+        return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     known = reference.precision(shape, walkers.people, move)
+    known = known / reference.fit.variance_inflation(fits)
     values, covariance = settled(
         walkers, site, best.belief, best.peak, shape, known, reference.bias
     )
-    if reference.fit.has_changed(group_fits(walkers, site, values)):
-        return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     if _out_of_reach(values, prior) or not on_known_ground(walkers, site, values):
         untold = {"heading_sd_rad": HEADING_SD}
         return by_speeds_alone(

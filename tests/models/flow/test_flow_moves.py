@@ -106,11 +106,19 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
 
 def test_a_fit_is_judged_by_its_drop():
     fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
-    # t of 99 degrees at 1e-4: 3.86; times sqrt(1/25 + 1/100) = 0.2236: a drop of 0.863
-    assert not fit.has_changed(np.full(25, -1.85))
-    assert fit.has_changed(np.full(25, -1.88))
-    assert not fit.has_changed(np.full(10_000, -1.3))  # sure, but too little to matter
+    # t of 99 degrees at 1e-4: 3.86; times sqrt(1/16 + 1/100) = 0.2693: a drop of 1.039
+    assert not fit.has_changed(np.full(16, -2.03))
+    assert fit.has_changed(np.full(16, -2.05))
+    assert not fit.has_changed(np.full(10_000, -1.99))  # sure, but hours differ by as much
     assert not fit.has_changed(np.empty(0))
+
+
+def test_the_map_says_the_less_the_worse_it_fits():
+    fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
+    assert fit.variance_inflation(np.full(9, -1.35)) == pytest.approx(2.0)
+    assert fit.variance_inflation(np.full(9, -1.7)) == pytest.approx(5.0)
+    for as_well in (np.full(9, -1.0), np.full(9, -0.5), np.empty(0)):
+        assert fit.variance_inflation(as_well) == 1.0
 
 
 def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
