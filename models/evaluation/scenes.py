@@ -133,7 +133,9 @@ def knock_trajectory(
             intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
         )
         top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
-    return replace(trajectory, uv=uv, top_v=top_v).part(longest)
+        top_v = top_v[longest]
+    # What is behind the camera now has no pixels.
+    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v)
 
 
 def _tops(path: Path, intrinsics: Intrinsics) -> dict[tuple[str, str], float]:
