@@ -25,6 +25,7 @@ class TracksCode(StrEnum):
     BEYOND_LIMITS_LAST_TOLD = "beyond_limits_last_told"
     WITHIN_LIMITS = "within_limits"
     CHART = "chart"
+    CREPT = "crept"
     SCALE_CHANGED = "scale_changed"
     PATHS_CHANGED = "paths_changed"
     HEADING_AMBIGUOUS = "heading_ambiguous"

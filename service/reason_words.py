@@ -89,6 +89,15 @@ def _chart(v: _Values) -> str:
     )
 
 
+def _crept(v: _Values) -> str:
+    by, sd = math.degrees(v["by_rad"]), math.degrees(v["sd_rad"])
+    return (
+        f"has crept by {by:+.1f} deg (sd {sd:.1f}) in {v['number']} since "
+        f"{datetime.fromisoformat(v['since']):%Y-%m-%d}, by the first map and speeds of its "
+        f"reference (creep: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
+    )
+
+
 def _scale_changed(v: _Values) -> str:
     factor, rate_hz = v["factor"], v["rate_hz"]
     return (
@@ -239,6 +248,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.BEYOND_LIMITS_LAST_TOLD: lambda v: f"beyond {_limit(v)} when it was last told",
     TracksCode.WITHIN_LIMITS: lambda v: f"{_numbers(v)}: not beyond {_limit(v)}",
     TracksCode.CHART: _chart,
+    TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
     TracksCode.PATHS_CHANGED: lambda v: "the paths have changed: the flow map is left out",
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,

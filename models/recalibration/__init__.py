@@ -4,11 +4,14 @@ All that these three take and give can be imported from here.
 """
 
 from models.drift.chart import Reading
+from models.drift.creep import Creep, read_creep
+from models.drift.creep_log import CreepLog
 from models.drift.verdict import Drift, DriftLimits
 from models.estimation.joint.observations import Observations, observe
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.recalibration.alarms import AlarmRate, read_alarm_chart
+from models.recalibration.anchoring import begin_creep_log, log_creep, without_creep
 from models.recalibration.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
 from models.recalibration.lacks import Lack
 from models.recalibration.learning import assume_site, learn_site
@@ -20,6 +23,8 @@ __all__ = [
     "AlarmRate",
     "CameraPose",
     "CameraSite",
+    "Creep",
+    "CreepLog",
     "Drift",
     "DriftLimits",
     "Intrinsics",
@@ -31,9 +36,13 @@ __all__ = [
     "Trajectory",
     "WalkConfig",
     "assume_site",
+    "begin_creep_log",
     "drift_of",
     "estimate_pose",
     "learn_site",
+    "log_creep",
     "observe",
     "read_alarm_chart",
+    "read_creep",
+    "without_creep",
 ]

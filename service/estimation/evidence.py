@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from models.drift.chart import Reading
 from models.drift.chart_packing import chart_from_bytes
+from models.drift.creep import SHARE
 from models.drift.verdict import DriftLimits
 from models.estimation.averaged import (
     FEWEST_TRACKS,
@@ -26,6 +27,7 @@ from models.geometry.pose import CameraPose
 from models.recalibration import (
     AlarmRate,
     CameraSite,
+    Creep,
     Observations,
     SecondLook,
     assume_site,
@@ -36,6 +38,7 @@ from models.recalibration import (
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.alerting.alerts import fired_by_estimate
+from service.estimation.anchoring import Anchor, anchor_of, creep_of, first_site
 from service.estimation.lacks import Lacks
 from service.estimation.limits import drift_limits
 from service.kinds import AlertKind
@@ -68,10 +71,10 @@ class SeenTrack:
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
-    `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
-    `chart`; None where there is none. `predictions` has what the model in use says of the tracks.
-    `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed. `drifting`
-    says that an alert tells of a drift by now.
+    `site` is the learned reference as bytes; None while it is being learned. So are `flow`, `chart`
+    and `anchor`; None where there is none. `predictions` has what the model in use says of the
+    tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
+    `drifting` says that an alert tells of a drift by now.
     """
 
     camera_id: str
@@ -79,6 +82,7 @@ class Evidence:
     site: bytes | None
     flow: bytes | None
     chart: bytes | None
+    anchor: Anchor | None
     intrinsics: Intrinsics
     prior: CameraPose
     walk: WalkConfig
@@ -97,7 +101,8 @@ class Finding:
 
     `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
     for it. `reading` is what the drift chart says of the tracks after the change, or of all where
-    these are too few, long before a pose can say how far; None where there is no chart.
+    these are too few, long before a pose can say how far; None where there is no chart. `creep`
+    is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `lacks` names what should be there beside the served pose and failed.
     """
 
@@ -106,6 +111,7 @@ class Finding:
     earlier: FusedEstimate | None
     averaged: PoseEstimate | None
     reading: Reading | None
+    creep: Creep | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
     lacks: Reasons = ()
@@ -128,7 +134,8 @@ def load_evidence(
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
         return None
-    records = windows.window(session, window_of(session, reference, settings))
+    bounds = window_of(session, reference, settings)
+    records = windows.window(session, bounds)
     model = trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
@@ -145,6 +152,7 @@ def load_evidence(
         site=reference.data,
         flow=None if kept is None else kept.data,
         chart=None if kept is None else kept.chart,
+        anchor=anchor_of(session, reference, bounds),
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         walk=walk_of(camera),
@@ -174,6 +182,12 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         return None
     lacks = Lacks(evidence.camera_id)
     site = _site_of(evidence, observed, lacks)
+    creep = lacks.unless_failed(
+        "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)
+    )
+    if creep is not None and creep.moved and evidence.anchor is not None:
+        first = lacks.unless_failed("anchor", partial(first_site, site, evidence.anchor))
+        site = first or site
     judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
     found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
     lacks.take(found.lacks)
@@ -194,6 +208,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         earlier=found.earlier,
         averaged=averaged,
         reading=reading,
+        creep=creep,
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         lacks=tuple(lacks.said),
@@ -227,7 +242,7 @@ def _read(
 ) -> Reading | None:
     """What the chart says; once a person has said how the camera stands, it begins anew."""
     rate = AlarmRate(
-        alarms_a_year=evidence.alarms_a_year,
+        alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
         calm_parties=evidence.limits.people,

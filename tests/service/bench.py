@@ -136,6 +136,7 @@ def made_up(
         earlier=before if asked_enough(evidence) else None,
         averaged=None,
         reading=None,
+        creep=None,
         tracks=evidence.tracks,
         change=None if change is None else evidence.tracks[change],
     )

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.estimation.numbers import numbers_of
-from models.evaluation.scenes import Knock, Scene, knock_trajectory
+from models.evaluation.scenes import Knock, Scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
+from models.simulation.knocked import knock_trajectory
 from models.trajectory import Trajectory
 
 NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here

@@ -33,6 +33,12 @@ def turned(degrees: float):
     return replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(degrees))
 
 
+def judge_by(street, tracks):
+    """Have windows of so many tracks; the map grows by those of before."""
+    settings = street.context.settings.model_copy(update={"window_tracks": tracks})
+    street.context = replace(street.context, settings=settings)
+
+
 def tracks_of_map(street):
     with street.context.store.read() as session:
         return flow_maps.find(session, references.newest(session, "corner").id).tracks
@@ -64,11 +70,12 @@ def test_a_turn_is_an_alert_within_sixty_tracks_that_says_since_when_and_stops_t
     street.keep_to_lanes(turned(-6), 30)
     street.look()
     assert [one["id"] for one in street.alerts()] == [alert["id"]]
-    assert tracks_of_map(street) == WANTED + 60
+    assert tracks_of_map(street) == WANTED
 
 
 def test_a_still_camera_is_not_suspected_and_its_map_grows(street):
-    street.keep_to_lanes(PRIOR, 60)
+    judge_by(street, 60)
+    street.keep_to_lanes(PRIOR, 120)
     body = street.look()
     assert "drift chart" not in body["reason"]
     assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
@@ -119,7 +126,8 @@ def test_a_chart_of_another_release_is_done_without(street):
     with street.context.store.write() as session:
         reference = references.newest(session, "corner")
         flow_maps.find(session, reference.id).chart = b"of another release"
-    street.keep_to_lanes(PRIOR, 60)
+    judge_by(street, 60)
+    street.keep_to_lanes(PRIOR, 120)
     assert street.look()["state"] == "ok"
     with street.context.store.read() as session:
         kept = flow_maps.find(session, references.newest(session, "corner").id)
