@@ -11,7 +11,7 @@ import gzip
 import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
@@ -21,6 +21,7 @@ from safetensors.numpy import load, save
 from models.errors import CheckpointError
 
 _ENTRY = "surefoot"  # alone in the header: several entries have no order
+_STORED = "stored"
 _DAMAGED = (OSError, EOFError, zlib.error, SafetensorError, ValueError, KeyError, TypeError)
 
 Made = TypeVar("Made")
@@ -67,11 +68,16 @@ def unpack(form: Format, data: bytes) -> dict[str, Any]:
     return {**values, **arrays}
 
 
+def stored_as(name: str) -> Any:
+    """A field that is stored under another name: what is in stores keeps the names it has."""
+    return field(metadata={_STORED: name})
+
+
 def flattened(value: Any, prefix: str = "") -> dict[str, Any]:
     """The fields of a dataclass, and of those in it by dotted names; None is left out."""
     found: dict[str, Any] = {}
-    for field in fields(value):
-        part, name = getattr(value, field.name), prefix + field.name
+    for each in fields(value):
+        part, name = getattr(value, each.name), prefix + each.metadata.get(_STORED, each.name)
         if is_dataclass(part):
             found |= flattened(part, f"{name}.")
         elif part is not None:
@@ -92,18 +98,20 @@ def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
         CheckpointError: fields are missing, or there are others.
     """
     made, known = dict(given), set()
-    for name, hint in get_type_hints(kind).items():
-        if name in given:
+    hints = get_type_hints(kind)
+    for each in fields(cast(Any, kind)):
+        if each.name in given:
             continue
+        name, hint = each.metadata.get(_STORED, each.name), hints[each.name]
         inner = [part for part in (hint, *get_args(hint)) if is_dataclass(part)]
         parts = under(values, name)
         known |= {name, *(f"{name}.{key}" for key in parts)}
         if inner and (parts or inner[0] is hint):
-            made[name] = restored(cast(type[Any], inner[0]), parts)
+            made[each.name] = restored(cast(type[Any], inner[0]), parts)
         elif inner:
-            made[name] = None
+            made[each.name] = None
         elif name in values:
-            made[name] = values[name]
+            made[each.name] = values[name]
         else:
             raise CheckpointError(f"{kind.__name__}: {name} is missing")
     if strange := sorted(values.keys() - known):

@@ -1,4 +1,4 @@
-"""The closed vocabularies: states, kinds, outcomes, severities, acts; each word is defined here.
+"""The closed vocabularies: states, kinds, outcomes, severities, activity; each is defined here.
 
 Their values are what HTTP, webhooks and the store say. The store refuses any other word by a CHECK
 constraint, so a new one needs a migration.
@@ -98,7 +98,7 @@ class Outcome(StrEnum):
     CAMERA_REMOVED = "camera_removed"
 
 
-class AlertAct(StrEnum):
+class AlertActivity(StrEnum):
     """What is done with an alert."""
 
     OPENED = "opened"
@@ -191,7 +191,7 @@ class Readiness(StrEnum):
     NOT_READY = "not_ready"
 
 
-class Act(StrEnum):
+class Activity(StrEnum):
     """What the log says was done: a subject and a verb."""
 
     CAMERA_REGISTERED = "camera.registered"

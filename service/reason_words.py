@@ -6,7 +6,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
-from models.estimation.numbers import WITH_HEADING
+from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode
 from service.kinds import Cause, TrainingState
 from service.reasons import ServiceCode
@@ -34,7 +34,7 @@ def in_words(reasons: Sequence[Reason]) -> str:
     for number, reason in enumerate(reasons):
         said += _WORDS[reason.code](reason.values)
         if number + 1 < len(reasons):
-            said += " " if reason.code is ServiceCode.LAST_TOLD else "; "
+            said += " " if reason.code is ServiceCode.LAST_IDENTIFIABLE else "; "
     return said
 
 
@@ -59,7 +59,7 @@ def _limit(v: _Values) -> str:
 
 def _numbers(v: _Values) -> str:
     said = []
-    for name in WITH_HEADING:
+    for name in PARAMETERS:
         if name == "height" and "height_m" in v:
             said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
         elif f"{name}_rad" in v:
@@ -112,12 +112,12 @@ def _ambiguous(v: _Values) -> str:
     return f"turns of {said} explain where people walk about as well"
 
 
-def _heading_untold(v: _Values) -> str:
+def _heading_unidentifiable(v: _Values) -> str:
     sd_deg = math.degrees(v["heading_sd_rad"])
     return f"where people walk does not tell the heading (sd {sd_deg:.1f} deg)"
 
 
-def _numbers_untold(v: _Values) -> str:
+def _unidentifiable(v: _Values) -> str:
     said = [
         f"{name} (sd {math.degrees(v[f'{name}_sd_rad']):.1f} deg)"
         for name in ("tilt", "roll")
@@ -135,7 +135,7 @@ def _numbers_untold(v: _Values) -> str:
     return text
 
 
-def _few_parties(v: _Values) -> str:
+def _few_groups(v: _Values) -> str:
     return (
         f"the {v['tracks']} tracks are of {v['parties']} "
         f"{'party' if v['parties'] == 1 else 'parties'} walking together, at least "
@@ -245,16 +245,18 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}: beyond {_limit(v)}",
     TracksCode.BEYOND_LIMITS_UNCONFIRMED: _unconfirmed,
     TracksCode.BEYOND_LIMITS_BEFORE: _beyond_before,
-    TracksCode.BEYOND_LIMITS_LAST_TOLD: lambda v: f"beyond {_limit(v)} when it was last told",
+    TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE: lambda v: (
+        f"beyond {_limit(v)} when it was last told"
+    ),
     TracksCode.WITHIN_LIMITS: lambda v: f"{_numbers(v)}: not beyond {_limit(v)}",
     TracksCode.CHART: _chart,
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
     TracksCode.PATHS_CHANGED: lambda v: "the paths have changed: the flow map is left out",
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
-    TracksCode.HEADING_UNTOLD: _heading_untold,
-    TracksCode.NUMBERS_UNTOLD: _numbers_untold,
-    TracksCode.TOO_FEW_PARTIES: _few_parties,
+    TracksCode.HEADING_UNIDENTIFIABLE: _heading_unidentifiable,
+    TracksCode.UNIDENTIFIABLE: _unidentifiable,
+    TracksCode.TOO_FEW_GROUPS: _few_groups,
     TracksCode.SPEED_UNUSUAL: _speed,
     TracksCode.STATURE_UNUSUAL: _stature,
     TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,
@@ -262,7 +264,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: f"{v['tracks']} of {v['wanted']} reference tracks",
     ServiceCode.TRACKS_SINCE: _since,
-    ServiceCode.LAST_TOLD: lambda v: "when it was last told:",
+    ServiceCode.LAST_IDENTIFIABLE: lambda v: "when it was last told:",
     ServiceCode.MAINTENANCE: _maintenance,
     ServiceCode.RANGE_EDGE: lambda v: (
         f"{v['number']} is at the edge of the range that the model in use was trained for"

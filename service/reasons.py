@@ -18,7 +18,7 @@ class ServiceCode(StrEnum):
     LEARNING_REFERENCE = "learning_reference"
     REFERENCE_TRACKS = "reference_tracks"
     TRACKS_SINCE = "tracks_since"
-    LAST_TOLD = "last_told"
+    LAST_IDENTIFIABLE = "last_told"
     MAINTENANCE = "maintenance"
     RANGE_EDGE = "range_edge"
     TRAINING_AROUND = "training_around"

@@ -91,7 +91,9 @@ class Settings(BaseSettings):
         6.0, gt=0, description="hours of silence after which another source takes over"
     )
 
-    drift_sigmas: float = Field(5.0, gt=0, description="a told drift must exceed so many sd")
+    drift_sigmas: float = Field(
+        5.0, gt=0, description="an identifiable drift must exceed so many sd"
+    )
     drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
     drift_people: int = Field(

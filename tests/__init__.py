@@ -1,4 +1,5 @@
 import os
 
 # Small matrices on two threads wait for one another. Set here, before anything imports numpy.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(name, "1")

@@ -34,12 +34,12 @@ CAMERA: dict[str, Any] = {
 }
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def lens() -> Intrinsics:
     return Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def pose() -> CameraPose:
     return CameraPose(
         height_m=6.0,
@@ -55,9 +55,9 @@ Once = Callable[[str, Callable[[Path], None]], Path]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave slow tests out of the coverage; where two processes run, begin with them in both.
+    """Leave slow tests out of the coverage; where some processes run, begin with them in each.
 
-    Each process is given one half of the list, and steals from the other's end: what takes long
+    Each process is given its share of the list, and steals from another's end: what takes long
     must not be what is left. Tests of a file stay together, with what they share.
     """
     slow = [item for item in items if item.get_closest_marker("slow")]
@@ -67,10 +67,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return
     fast = [item for item in items if not item.get_closest_marker("slow")]
     files = list(dict.fromkeys(item.path for item in slow))
-    first = [item for item in slow if files.index(item.path) % 2 == 0]
-    second = [item for item in slow if files.index(item.path) % 2 == 1]
-    cut = min(max(len(items) // 2 - len(first), 0), len(fast))
-    items[:] = [*first, *fast[:cut], *second, *fast[cut:]]
+    processes = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    order: list[pytest.Item] = []
+    for number in range(processes):
+        share = (len(items) - len(order)) // (processes - number)
+        own = [item for item in slow if files.index(item.path) % processes == number]
+        rest = max(share - len(own), 0)
+        order += [*own, *fast[:rest]]
+        fast = fast[rest:]
+    items[:] = [*order, *fast]
 
 
 @pytest.fixture(scope="session")

@@ -92,10 +92,10 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
     with Store(settings).read() as session:
         view = view_pose(session, settings, "old")
         # Its alert fires on, so it is taken for moved; what was told last is served meanwhile.
-        assert (view.state, view.told) == ("drifting", ("tilt", "roll", "height"))
+        assert (view.state, view.identifiable) == ("drifting", ("tilt", "roll", "height"))
         assert (view.reference.tracks, view.reference.wanted) == (learned_of, 50)
         (history,) = pose_history(session, "old", None, None, 10)
-        assert history.told == ["tilt", "roll", "height"]
+        assert history.identifiable == ["tilt", "roll", "height"]
         assert (history.heading_rad, history.heading_sd_rad) == (0.7, None)
         assert history.drift_heading_rad == 0
         assert list_alerts(session, AlertFilter(state="firing"), 10)[0].source == "estimate"

@@ -2,7 +2,7 @@
 
 The files of `golden/stored_models` were written by the code of commit 1d1919f, of
 `tracks_of(3, (PRIOR, 60), boxes=True)` (and `boxes=False`), from `tests.models.sites`, with
-`learn_reference`, `learn_flow` and `learn_chart`, all with seed 0.
+`learn_speed_reference`, `learn_flow` and `learn_chart`, all with seed 0.
 """
 
 import io
@@ -108,10 +108,10 @@ def test_what_was_learned_is_read_to_the_bit(settings):
     assert flow_to_bytes(flow) == found[1][1] == found[2][1]
     chart = chart_from_bytes(found[1][2])
     expected = archive(CHART)
-    paces = undoubted(expected.pop("paces").tobytes())
+    speed_reference = undoubted(expected.pop("paces").tobytes())
     parts = {name: part for name, part in flattened(chart).items() if not name.startswith("paces.")}
     assert_same(parts, expected)
-    assert_same(as_archived(flattened(chart.paces)), paces)
+    assert_same(as_archived(flattened(chart.speed_reference)), speed_reference)
     assert chart_to_bytes(chart) == found[1][2]
 
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.estimation.joint.fit import Fit, fit_pose, per_track, track_goodness
+from models.estimation.joint.fit import Fit, fit_pose, per_track, track_log_likelihoods
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, pose_prior
-from models.estimation.numbers import numbers_of
+from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import chi_squared_above
@@ -28,7 +28,7 @@ class ChangePoint:
 
 
 def find_change(
-    observations: Observations, prior: CameraPose, reference: SiteReference
+    observations: Observations, prior: CameraPose, reference: SpeedReference
 ) -> ChangePoint | None:
     """The move within tracks; None where one pose explains them all.
 
@@ -49,7 +49,7 @@ def find_change(
         before = _fit(observations, np.arange(cut), prior, reference)
         after = _fit(observations, np.arange(cut, observations.tracks), prior, reference)
         channels = channels_of(observations, reference, prior)
-        gain = track_goodness(channels, after.candidate) - track_goodness(
+        gain = track_log_likelihoods(channels, after.candidate) - track_log_likelihoods(
             channels, before.candidate
         )
         moved = _best_cut(np.cumsum(gain[::-1])[::-1])
@@ -59,19 +59,19 @@ def find_change(
     assert before is not None
     assert after is not None
     apart = after.candidate - before.candidate
-    covariance = (before.covariance + after.covariance) * reference.inflation
+    covariance = (before.covariance + after.covariance) * reference.pose_variance_inflation
     limit = chi_squared_above(_BY_CHANCE, 3)
     excess = float(apart @ np.linalg.solve(covariance, apart)) / limit
     return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None
 
 
-def _first_cut(observations: Observations, prior: CameraPose, reference: SiteReference) -> int:
+def _first_cut(observations: Observations, prior: CameraPose, reference: SpeedReference) -> int:
     """The cut with the highest likelihood ratio, by scores at the prior pose or at one for all.
 
     The first is the better one for a small move, the second where most tracks are after it.
     """
     channels = channels_of(observations, reference, prior)
-    at_prior = numbers_of(prior) + reference.offset
+    at_prior = plane_parameters_of(prior) + reference.offset
     whole = fit_pose(channels, at_prior, pose_prior(prior)).candidate
     best, place = -np.inf, FEWEST_BESIDE
     for candidate in (at_prior, whole):
@@ -108,8 +108,8 @@ def _best_cut(gain: Array) -> int:
 
 
 def _fit(
-    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SiteReference
+    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SpeedReference
 ) -> Fit:
     part = of_tracks(observations, chosen)
-    start = numbers_of(prior) + reference.offset
+    start = plane_parameters_of(prior) + reference.offset
     return fit_pose(channels_of(part, reference, prior), start, pose_prior(prior))

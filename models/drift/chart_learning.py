@@ -10,29 +10,29 @@ from models.drift.chart import (
     KNOCKS,
     RUN,
     DriftChart,
+    highest,
     ratios_of,
-    trace,
 )
-from models.drift.party_scores import SCORES, Usual, scores_at
+from models.drift.group_scores import SCORES, Usual, scores_at
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.reference import relearned
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.folds import Fold, Folds
-from models.flow.turn_detection import parties_in_time
+from models.flow.turn_detection import groups_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 
-_ENOUGH = 400  # parties that the answers to knocks are learned of
+_ENOUGH = 400  # walking groups that the answers to knocks are learned of
 _RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
-_BLOCK = 3  # parties after one another that the bootstrap keeps together
+_BLOCK = 3  # walking groups after one another that the bootstrap keeps together
 _RUNS = 100
 _LEAST_SHRUNK = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Asked:
-    """Scores (P, 14) of parties left out, when each was last seen (P,), and seen after knocks."""
+    """Scores (P, 14) of groups left out, when each was last seen (P,), and seen after knocks."""
 
     still: Array
     times: npt.NDArray[np.int64]
@@ -42,14 +42,14 @@ class _Asked:
 def learn_chart(
     observations: Observations,
     prior: CameraPose,
-    site: SiteReference,
+    site: SpeedReference,
     folds: Folds,
     seed: int,
 ) -> DriftChart | None:
-    """The chart of a site; None where fewer than 12 parties have scores.
+    """The chart of a site; None where fewer than 12 walking groups have scores.
 
-    Each quarter of the parties is scored by what the others say is usual, and again as a camera
-    that has been knocked would see them. How high the statistic gets by chance is learned by
+    Each quarter of the walking groups is scored by what the others say is usual, and again as a
+    camera that has been knocked would see them. How high the statistic gets by chance is learned by
     bootstrap: what is taken for usual, the people that there really are, and runs of these in
     blocks are all drawn anew.
 
@@ -76,13 +76,13 @@ def learn_chart(
     middle = np.median(scores, axis=0)
     width = SD_OF_MEDIAN_DEVIATION * np.median(np.abs(scores - middle), axis=0) + 1e-9
     chart = DriftChart(
-        paces=relearned(observations, prior, site),
+        speed_reference=relearned(observations, prior, site),
         middle=middle,
         width=width,
         mean=np.zeros(SCORES),
         covariance=np.eye(SCORES),
         responses=np.zeros((SCORES, len(KNOCKS))),
-        parties=float(known),
+        walking_groups=float(known),
         typical=0.0,
         tail=1.0,
     )
@@ -98,25 +98,25 @@ def learn_chart(
         covariance=_covariance(bounded),
         responses=(after.mean(axis=1) - before.mean(axis=0)).T,
     )
-    highest = _highest(chart, bounded, np.random.default_rng(seed))
-    typical = float(np.median(highest))
+    reached = _reached(chart, bounded, np.random.default_rng(seed))
+    typical = float(np.median(reached))
     return replace(
-        chart, typical=typical, tail=max(float(highest[highest > typical].mean() - typical), 1.0)
+        chart, typical=typical, tail=max(float(reached[reached > typical].mean() - typical), 1.0)
     )
 
 
 def _asked(
     observations: Observations,
     prior: CameraPose,
-    site: SiteReference,
+    site: SpeedReference,
     fold: Fold,
     *,
     answers: bool,
 ) -> _Asked:
     seen = of_tracks(observations, fold.asked)
-    paces = relearned(of_tracks(observations, fold.known), prior, site)
-    usual = Usual(prior=prior, paces=paces, paths=fold.site)
-    _, _, last = parties_in_time(fold.walkers)
+    speed_reference = relearned(of_tracks(observations, fold.known), prior, site)
+    usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.site)
+    _, _, last = groups_in_time(fold.walkers)
     knocked = None
     if answers:
         # A camera that has moved on sees people as one that stays would from a little back.
@@ -131,7 +131,7 @@ def _asked(
 
 
 def _covariance(scores: Array) -> Array:
-    """The covariance (14, 14) of scores (P, 14), its correlations shrunk as few parties demand.
+    """The covariance (14, 14) of scores (P, 14), its correlations shrunk as few groups demand.
 
     Source: Schäfer and Strimmer 2005, target "diagonal, unequal variance".
     """
@@ -148,20 +148,20 @@ def _covariance(scores: Array) -> Array:
     return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
 
 
-def _highest(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Array:
+def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Array:
     """The highest statistic of each of so many runs of a still camera."""
     ratios = ratios_of(chart)
     count = len(scores)
-    highest = np.empty(_RUNS)
+    reached = np.empty(_RUNS)
     for run in range(_RUNS):
         taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
         people = scores[drawn_blocks(rng, count, count)]
         walked = people[drawn_blocks(rng, count, RUN)]
-        highest[run] = trace(ratios, walked - taken_for_usual).statistic.max()
-    return highest
+        reached[run] = highest(ratios, walked - taken_for_usual)
+    return reached
 
 
 def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
-    """Indices (wanted,) of parties, some after one another at a time."""
+    """Indices (wanted,) of walking groups, some after one another at a time."""
     starts = rng.integers(0, count, -(-wanted // _BLOCK))
     return np.asarray(((starts[:, None] + np.arange(_BLOCK)).ravel() % count)[:wanted])

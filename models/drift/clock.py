@@ -4,7 +4,7 @@ import math
 
 from models.drift.chart import CLOCK, Reading
 from models.drift.verdict import Drift
-from models.estimation.numbers import ANGLES, NUMBERS
+from models.estimation.parameters import ANGLES, PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 
@@ -14,7 +14,7 @@ _STILL_SIGMAS = 2.0
 _STILL_RAD = math.radians(1.0)
 _USUAL_RATE_HZ = 25.0
 _HEIGHT = 2
-_PARTIES_FOR_POSE = 24
+_GROUPS_FOR_POSE = 24
 
 
 def may_be_clock(reading: Reading) -> bool:
@@ -22,7 +22,7 @@ def may_be_clock(reading: Reading) -> bool:
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return reading.number in (_HEIGHT, CLOCK) and reading.parties < _PARTIES_FOR_POSE
+    return reading.parameter in (_HEIGHT, CLOCK) and reading.walking_groups < _GROUPS_FOR_POSE
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
@@ -37,13 +37,13 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
         prior: that pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
-    if not set(NUMBERS) <= set(drift.told):
+    if not set(PLANE_PARAMETERS) <= set(drift.identifiable):
         return None
     factor = 1 + drift.by.height_m / prior.height_m
     relative_sd = drift.sd.height_m / (factor * prior.height_m)
     if abs(math.log(factor)) <= max(_SIGMAS * relative_sd, _LEAST_LOG):
         return None
-    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.told):
+    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
         if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
             return None
     values = {"factor": factor, "rate_hz": frame_rate_hz or _USUAL_RATE_HZ}

@@ -3,6 +3,7 @@
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
+from models.estimation.parameters import PLANE_PARAMETERS
 from models.quantiles import chi_squared_above
 
 # Twice what a chi-squared passes once in a million: the same people are in many of a crowd's last
@@ -14,11 +15,11 @@ _DOUBT = 2.0
 def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
     """Whether a camera has moved from one estimate to the other.
 
-    A cut must leave a pose behind it: where the tracks after it cannot tell a number, more of them
-    are to be waited for. The covariances know of parties and of other poses that explain the
-    tracks about as well, where a change point's own do not.
+    A cut must leave a pose behind it: where a parameter of the tracks after it is not identifiable,
+    more of them are to be waited for. The covariances know of walking groups and of other poses
+    that explain the tracks about as well, where a change point's own do not.
     """
-    if after.weak:
+    if len(after.identifiable) < len(PLANE_PARAMETERS):
         return False
     apart = after.values - before.values
     squared = float(apart @ np.linalg.solve(before.covariance + after.covariance, apart))

@@ -33,13 +33,13 @@ _LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn 
 class Creep:
     """What a log says: a camera's turn by now, at its likeliest.
 
-    `statistic` is compared with `level`. `number` is 0 for tilt, 1 for roll, 3 for heading, `by`
+    `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
     how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
     """
 
     statistic: float
     level: float
-    number: int
+    parameter: int
     by: float
     sd: float
     since_day: float
@@ -67,13 +67,13 @@ def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None)
     if held is None:
         return None
     chance = min(alarms_a_year / _LOOKS, 0.5) / 2
-    level = value_below(chance, max(log.reference_parties - 1, 1.0)) ** 2
+    level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
     statistics = held.shown**2 / held.known
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
     return Creep(
         statistic=float(statistics[row, way]),
         level=level,
-        number=ANGLES[int(row)],
+        parameter=ANGLES[int(row)],
         by=float(held.shown[row, way] / held.known[row, way]),
         sd=float(held.known[row, way] ** -0.5),
         since_day=float(held.ramps.starts[way]),

@@ -1,10 +1,11 @@
 """How many tracks a camera usually sees when, and how improbable it is that none come for a while.
 
 A profile over the hours of the day, weekends apart, says how many are expected. People come in
-parties, trains and rushes: gaps between tracks, measured in tracks expected meanwhile, would be
-exponential of mean 1 if they came alone; how much longer the longest are is the burst, by which all
-expectations are divided. What is left is Poisson given the level of the day, which is Gamma: usual,
-or, on a holiday or in the rain, quiet. Times are seconds since the epoch, hours whole ones since.
+walking groups, trains and rushes: gaps between tracks, measured in tracks expected meanwhile, would
+be exponential of mean 1 if they came alone; how much longer the longest are is the burst, by which
+all expectations are divided. What is left is Poisson given the level of the day, which is Gamma:
+usual, or, on a holiday or in the rain, quiet. Times are seconds since the epoch, hours whole ones
+since.
 """
 
 import math
@@ -32,7 +33,7 @@ _CHANGES_PER_HOUR = 0.05  # how often the level becomes another within a day
 _HOURS_PER_YEAR = 8766.0
 
 
-_FEW = 3.0  # parties
+_FEW = 3.0  # walking groups
 _SURELY = 1e-3  # chance below which people should have been seen: then the fixed limit counts
 
 
@@ -84,7 +85,7 @@ class Rhythm:
 
     @property
     def arrivals_per_year(self) -> float:
-        """How many parties come in a year: after each, a silence may begin."""
+        """How many walking groups come in a year: after each, a silence may begin."""
         week = 5 * sum(self.rates[:24]) + 2 * sum(self.rates[24:])
         return week / (7 * 24) * _HOURS_PER_YEAR / self.burst
 
@@ -125,7 +126,7 @@ def expected_tracks(
 def chance_of_silence(
     rhythm: Rhythm, missed: float, silent_s: float, seen: float, expected: float
 ) -> float:
-    """The probability that a silence is as long as this one, after one more party.
+    """The probability that a silence is as long as this one, after one more walking group.
 
     Args:
         rhythm: of the camera.
@@ -174,7 +175,7 @@ def judge_silence(
 
 
 def is_missed(rhythm: Rhythm, missed: float) -> bool:
-    """Whether more than a few parties should have come: fewer may stay away any day."""
+    """Whether more than a few walking groups should have come: fewer may stay away any day."""
     return missed > _FEW * rhythm.burst
 
 

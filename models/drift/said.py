@@ -1,4 +1,4 @@
-"""What a verdict and a chart are to be told with: codes and numbers."""
+"""What a verdict and a chart give as their reason: codes and values."""
 
 from datetime import UTC, datetime
 
@@ -6,12 +6,12 @@ from models.drift.chart import CLOCK, Reading
 from models.drift.creep import Creep
 from models.drift.creep_log import DAY_S
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
-from models.estimation.numbers import WITH_HEADING
+from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode, Value
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
-    """The told numbers against the prior pose and the limits; None where none is told."""
+    """The identifiable parameters against the prior pose and the limits; None where none is."""
     values: dict[str, Value] = {
         "sigmas": limits.sigmas,
         "floor_rad": limits.floor_rad,
@@ -19,10 +19,10 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
         "people": limits.people,
         "clear_ratio": limits.clear_ratio,
     }
-    if not drift.told:
-        last_told = TracksCode.BEYOND_LIMITS_LAST_TOLD
-        return Reason(code=last_told, values=values) if verdict.drifting else None
-    for name in drift.told:
+    if not drift.identifiable:
+        code = TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE
+        return Reason(code=code, values=values) if verdict.drifting else None
+    for name in drift.identifiable:
         unit = "m" if name == "height" else "rad"
         values[f"{name}_{unit}"], values[f"{name}_sd_{unit}"] = drift.of(name)
     beyond = verdict.excess >= 1
@@ -36,15 +36,16 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
 def reason_of_reading(reading: Reading) -> Reason | None:
     """Which way the drift chart says that a camera has moved; None where it says nothing.
 
-    `number` is one of a pose, or `times` where all were too long (`sign` 1) or too short (-1).
+    Its `number` is a parameter of a pose, or `times` where all were too long (`sign` 1) or too
+    short (-1).
     """
     if not reading.suspicious:
         return None
-    number = "times" if reading.number == CLOCK else WITH_HEADING[reading.number]
+    parameter = "times" if reading.parameter == CLOCK else PARAMETERS[reading.parameter]
     values: dict[str, Value] = {
-        "number": number,
+        "number": parameter,
         "sign": reading.sign,
-        "parties": reading.parties,
+        "parties": reading.walking_groups,
         "statistic": reading.statistic,
         "level": reading.level,
     }
@@ -59,7 +60,7 @@ def reason_of_creep(creep: Creep) -> Reason | None:
     if not creep.moved:
         return None
     values: dict[str, Value] = {
-        "number": WITH_HEADING[creep.number],
+        "number": PARAMETERS[creep.parameter],
         "by_rad": creep.by,
         "sd_rad": creep.sd,
         "since": datetime.fromtimestamp(creep.since_day * DAY_S, UTC).isoformat(),

@@ -1,31 +1,32 @@
-"""The verdict: by the chart at once, by the told pose twice; with hysteresis."""
+"""The verdict: by the chart at once, by the pose twice; with hysteresis."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from models.drift.chart import Reading
 from models.drift.creep import Creep
-from models.estimation.numbers import ANGLES, WITH_HEADING
+from models.estimation.parameters import ANGLES
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import angle_between
 
 # What a clock that is wrong looks like in a pose is a height.
-_CHARTED = (*WITH_HEADING, "height")
+_CHARTED = (*PARAMETERS, "height")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
     """Estimate minus prior pose: `by` how much, and the standard deviations of the estimate.
 
-    `told` names the parameters that the tracks can tell; the others stand here but count nowhere.
-    `angle_rad` is the whole rotation that the told angles make.
+    `identifiable` names the parameters that the tracks determine; the others stand here but count
+    nowhere. `angle_rad` is the whole rotation that the identifiable angles make.
     """
 
     by: PoseParameters
     sd: PoseParameters
     angle_rad: float
-    told: tuple[str, ...]
+    identifiable: tuple[str, ...]
 
     def of(self, name: str) -> tuple[float, float]:
         """A parameter's drift and its standard deviation: in metres for height, else in radians."""
@@ -33,8 +34,8 @@ class Drift:
 
     @property
     def turned(self) -> bool:
-        """Whether an angle is told."""
-        return bool(set(ANGLES) & set(self.told))
+        """Whether an angle is identifiable."""
+        return bool(set(ANGLES) & set(self.identifiable))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +52,7 @@ class DriftLimits:
     clear_ratio: float
 
     def of(self, name: str, sd: float) -> float:
-        """From where on a number's drift counts, given its standard deviation."""
+        """From where on a parameter's drift counts, given its standard deviation."""
         floor = self.floor_m if name == "height" else self.floor_rad
         return max(self.sigmas * sd, floor, 1e-12)
 
@@ -60,8 +61,9 @@ class DriftLimits:
 class DriftVerdict:
     """`streak` is 1 where the window is beyond the limits, -1 where it is below `clear_ratio`.
 
-    `excess` is the largest told drift in units of its limit: 1 and more is beyond. `drifted` names
-    the numbers that have been beyond since the drift began; empty where there is none.
+    `excess` is the largest identifiable drift in units of its limit: 1 and more is beyond.
+    `drifted` names the parameters that have been beyond since the drift began; empty where there is
+    none.
     """
 
     streak: int
@@ -75,14 +77,14 @@ class DriftVerdict:
 
 
 def drift_between(
-    found: PoseParameters, sd: PoseParameters, told: tuple[str, ...], prior: CameraPose
+    found: PoseParameters, sd: PoseParameters, identifiable: Sequence[str], prior: CameraPose
 ) -> Drift:
     """How far an estimate is from the prior pose; x and y count as unmoved.
 
     Args:
         found: what is estimated.
         sd: its standard deviations.
-        told: those of tilt, roll, height, heading that the tracks can tell.
+        identifiable: those of tilt, roll, height, heading that the tracks determine.
         prior: the prior pose.
     """
     drift = Drift(
@@ -94,7 +96,7 @@ def drift_between(
         ),
         sd=sd,
         angle_rad=0.0,
-        told=tuple(name for name in WITH_HEADING if name in told),
+        identifiable=tuple(name for name in PARAMETERS if name in identifiable),
     )
     turned = pose_after(drift, prior)
     return replace(
@@ -103,9 +105,9 @@ def drift_between(
 
 
 def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
-    """The prior pose moved by what is told of the drift; what is not told stays the prior's."""
+    """The prior pose moved by the identifiable drift; the rest stays the prior's."""
     turn = 2 * math.pi
-    by = {name: drift.by.of(name) if name in drift.told else 0.0 for name in WITH_HEADING}
+    by = {name: drift.by.of(name) if name in drift.identifiable else 0.0 for name in PARAMETERS}
     heading = prior.heading_rad + by["heading"]
     return replace(
         prior,
@@ -133,35 +135,36 @@ def judge(
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
-    Drifting begins at once where the chart or the creep is beyond its level, and where a told
-    number is beyond its limit, by the window and by the same without its newest `people`: one freak
-    person does not do it, and it matters not how many jobs have looked meanwhile. The chart's level
-    is of a rate of false alarms already, and far moves, which the chart is not made for, are told
-    by the pose. It ends where both, the chart and the creep are below `clear_ratio`. A number that
-    the tracks cannot tell is never beyond, and its drift does not end until it is told again or the
-    chart, which asks for all four, is calm. Where nothing is told, nothing changes.
+    Drifting begins at once where the chart or the creep is beyond its level, and where an
+    identifiable parameter is beyond its limit, by the window and by the same without its newest
+    `people`: one outlier does not do it, and it matters not how many jobs have looked meanwhile.
+    The chart's level is of a rate of false alarms already, and far moves, which the chart is not
+    made for, are seen in the pose. It ends where both, the chart and the creep are below
+    `clear_ratio`. A parameter that is not identifiable is never beyond, and its drift does not end
+    until it is identifiable again or the chart, which asks for all four, is calm. Where nothing is
+    identifiable, nothing changes.
 
     Args:
         drift: of the window.
         limits: what counts.
-        drifted: the numbers that have drifted, by the verdicts before; empty where none has.
+        drifted: the parameters that have drifted, by the verdicts before; empty where none has.
         reading: of the chart, where there is one.
         earlier: of the window without its newest people; None where too few are left, or nobody
             has asked (`asks_again`).
         creep: of the weeks up to now, where there is an anchor.
     """
     ratios = _ratios(drift, limits)
-    crept = () if creep is None or not creep.moved else (WITH_HEADING[creep.number],)
+    crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
     if not ratios and reading is None and not crept:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     excess = max(ratios.values(), default=0.0)
     beyond = _beyond(drift, limits)
-    charted = (_CHARTED[reading.number],) if reading is not None and reading.moved else crept
+    charted = (_CHARTED[reading.parameter],) if reading is not None and reading.moved else crept
     calm = all(said is None or said.excess < limits.clear_ratio for said in (reading, creep))
     well = calm and _is_well(drift, limits, drifted, reading)
     streak = 1 if beyond or charted else -1 if well else 0
     if drifted:
-        drifted = tuple(n for n in WITH_HEADING if n in drifted or n in beyond)
+        drifted = tuple(n for n in PARAMETERS if n in drifted or n in beyond)
         if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, reading):
             drifted = ()
     elif charted or (earlier is not None and beyond.items() & _beyond(earlier, limits).items()):
@@ -170,13 +173,13 @@ def judge(
 
 
 def _ratios(drift: Drift, limits: DriftLimits) -> dict[str, float]:
-    """The told numbers in units of their limits."""
-    found = {name: drift.of(name) for name in drift.told}
+    """The identifiable parameters in units of their limits."""
+    found = {name: drift.of(name) for name in drift.identifiable}
     return {name: abs(value) / limits.of(name, sd) for name, (value, sd) in found.items()}
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
-    """The told numbers that are beyond their limits, and whether they have grown."""
+    """The identifiable parameters beyond their limits, and whether they have grown."""
     found = _ratios(drift, limits).items()
     return {name: drift.by.of(name) > 0 for name, ratio in found if ratio >= 1}
 
@@ -184,6 +187,6 @@ def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
 def _is_well(
     drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], reading: Reading | None
 ) -> bool:
-    told = set(drift.told) if reading is None else set(WITH_HEADING)
+    identifiable = set(drift.identifiable) if reading is None else set(PARAMETERS)
     excess = max(_ratios(drift, limits).values(), default=0.0)
-    return excess < limits.clear_ratio and set(drifted) <= told
+    return excess < limits.clear_ratio and set(drifted) <= identifiable

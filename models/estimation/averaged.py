@@ -99,7 +99,7 @@ def averaged_estimate(predictions: TrackPredictions, seed: int) -> PoseEstimate:
 
 
 def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
-    """The estimate as a pose; what tracks cannot tell (x, y, heading) is the prior pose's."""
+    """The estimate as a pose; what is not identifiable (x, y, heading) is the prior pose's."""
     return replace(
         prior,
         height_m=max(estimate.value.height_m, 1e-3),

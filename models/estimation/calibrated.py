@@ -6,7 +6,7 @@ import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.estimation.averaged import FEWEST_TRACKS, TrackPredictions
-from models.estimation.numbers import NumbersEstimate
+from models.estimation.parameters import PlaneEstimate
 from models.geometry.rotation import (
     Array,
     angles_from_rotation,
@@ -48,7 +48,7 @@ class Calibration:
 def fit_calibration(
     prior: Array, true: Array, means: Array, sampling_covariance: Array
 ) -> Calibration:
-    """The curve through the means (S, 3) of sets whose true numbers (S, 3) are known.
+    """The curve through the means (S, 3) of sets whose true parameters (S, 3) are known.
 
     `sampling_covariance` (S, 3, 3) is that part of each mean's scatter which more tracks would
     take away.
@@ -71,8 +71,8 @@ def fit_calibration(
 
 def calibrated_estimate(
     predictions: TrackPredictions, calibration: Calibration, seed: int
-) -> NumbersEstimate:
-    """The true numbers whose mean answer is the mean over these tracks.
+) -> PlaneEstimate:
+    """The true parameters whose mean answer is the mean over these tracks.
 
     The covariance holds the tracks' scatter (bootstrap over tracks) and the sites', both carried
     through the inverse of the curve's slope.
@@ -85,19 +85,19 @@ def calibrated_estimate(
         raise TooFewTrajectoriesError(
             f"tracks: at least {FEWEST_TRACKS} with a prediction are needed, got {count}"
         )
-    mean = mean_numbers(predictions)
+    mean = mean_plane_parameters(predictions)
     scatter = sampling_covariance(predictions, seed) / np.outer(_UNITS, _UNITS)
     offset, slope = _invert(calibration.curve, (mean - calibration.prior) / _UNITS)
     back = np.linalg.pinv(slope, rcond=0.02)
     covariance = back @ (scatter + calibration.site_covariance) @ back.T
-    return NumbersEstimate(
+    return PlaneEstimate(
         values=calibration.prior + offset * _UNITS,
         covariance=covariance * np.outer(_UNITS, _UNITS),
         tracks=count,
     )
 
 
-def mean_numbers(predictions: TrackPredictions, weights: Array | None = None) -> Array:
+def mean_plane_parameters(predictions: TrackPredictions, weights: Array | None = None) -> Array:
     """Tilt, roll and log height (..., 3) of the mean over tracks, weighted by (..., N)."""
     count = len(predictions)
     weights = np.ones(count) if weights is None else weights
@@ -109,13 +109,13 @@ def mean_numbers(predictions: TrackPredictions, weights: Array | None = None) ->
 
 
 def sampling_covariance(predictions: TrackPredictions, seed: int) -> Array:
-    """The covariance (3, 3) of `mean_numbers` by bootstrap over tracks."""
+    """The covariance (3, 3) of `mean_plane_parameters` by bootstrap over tracks."""
     count = len(predictions)
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), _RESAMPLES)
-    numbers = mean_numbers(predictions, drawn.astype(np.float64))
-    middle = mean_numbers(predictions)[1]
-    numbers[:, 1] = (numbers[:, 1] - middle + np.pi) % (2 * np.pi) - np.pi
-    return np.atleast_2d(np.cov(numbers, rowvar=False))
+    parameters = mean_plane_parameters(predictions, drawn.astype(np.float64))
+    middle = mean_plane_parameters(predictions)[1]
+    parameters[:, 1] = (parameters[:, 1] - middle + np.pi) % (2 * np.pi) - np.pi
+    return np.atleast_2d(np.cov(parameters, rowvar=False))
 
 
 def _invert(curve: Array, answer: Array) -> tuple[Array, Array]:

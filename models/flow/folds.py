@@ -1,4 +1,7 @@
-"""Quarters of a site's people, each beside a map of all the others: how a map errs is seen so."""
+"""Quarters of a site's people, each beside a map of all the others: how a map errs is seen so.
+
+Source: Stone 1974, cross-validation; walking groups stay together.
+"""
 
 from dataclasses import dataclass
 
@@ -13,7 +16,7 @@ from models.flow.site_map import best_grain, mapped
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
-FEWEST_PARTIES = 12
+FEWEST_GROUPS = 12
 _FOLDS = 4
 
 
@@ -29,7 +32,7 @@ class Fold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folds:
-    """All quarters, and the grain of map that foretells people best."""
+    """All quarters, and the grain of map that predicts people best."""
 
     each: tuple[Fold, ...]
     grain: Grain
@@ -42,17 +45,17 @@ def fold_maps(
     seed: int,
     weights: Array | None = None,
 ) -> Folds | None:
-    """A map of each three quarters of the parties; None where fewer than 12 parties walk.
+    """A map of each three quarters of the groups; None where fewer than 12 groups walk.
 
     Args:
         observations: of the tracks.
         intrinsics: of the camera.
         at: the known pose (4,).
-        seed: of the quarters; parties stay together.
+        seed: of the quarters; walking groups stay together.
         weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
     """
     walkers = walkers_of(observations, at)
-    if walkers.parties < FEWEST_PARTIES:
+    if walkers.walking_groups < FEWEST_GROUPS:
         return None
     weights = np.ones(observations.tracks) if weights is None else weights
     fold_of = _dealt(walkers, seed)
@@ -81,7 +84,7 @@ def fold_maps(
 
 
 def _dealt(walkers: Walkers, seed: int) -> npt.NDArray[np.int64]:
-    """The fold of each track: parties stay together, and are dealt out by chance."""
-    parties = np.unique(walkers.party_idx)
-    fold_of = np.random.default_rng(seed).permutation(parties.size) % _FOLDS
-    return np.asarray(fold_of[np.searchsorted(parties, walkers.party_idx)])
+    """The fold of each track: walking groups stay together, and are dealt out by chance."""
+    walking_groups = np.unique(walkers.group_idx)
+    fold_of = np.random.default_rng(seed).permutation(walking_groups.size) % _FOLDS
+    return np.asarray(fold_of[np.searchsorted(walking_groups, walkers.group_idx)])

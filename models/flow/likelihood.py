@@ -1,11 +1,15 @@
-"""What a set of tracks says of a pose by the flow map: a log likelihood and its score by track."""
+"""What a set of tracks says of a pose by the flow map: a log likelihood and its score by track.
+
+Ours: log p(image) = log f(place, direction) + log |d(place, direction) / d(image)| - log share,
+where the share is that of the map which the camera sees; a track's steps count for two at the most.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from models.estimation.joint.groups import parties_of
+from models.estimation.joint.groups import walking_groups_of
 from models.estimation.joint.observations import Observations, Steps, steps_where
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.placement import place_steps
@@ -27,12 +31,13 @@ _BUSY_MEAN, _BUSY_SD = np.log(0.5), 1.0
 class Walkers:
     """Steps of people who move.
 
-    `weight` (M,) adds up to at most 2 a track; `party_idx` (tracks,) is the party of each track.
+    `weight` (M,) adds up to at most 2 a track; `group_idx` (tracks,) is the walking group of each
+    track.
     """
 
     steps: Steps
     weight: Array
-    party_idx: npt.NDArray[np.int64]
+    group_idx: npt.NDArray[np.int64]
     tracks: int
 
     @property
@@ -41,9 +46,9 @@ class Walkers:
         return int(np.unique(self.steps.rows.owner_idx).size)
 
     @property
-    def parties(self) -> int:
-        """How many parties have a step."""
-        return int(np.unique(self.party_idx[np.unique(self.steps.rows.owner_idx)]).size)
+    def walking_groups(self) -> int:
+        """How many walking groups have a step."""
+        return int(np.unique(self.group_idx[np.unique(self.steps.rows.owner_idx)]).size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +71,7 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
     return Walkers(
         steps=steps,
         weight=np.minimum(1.0, _TRACK_STEPS / number[rows.owner_idx]),
-        party_idx=parties_of(
+        group_idx=walking_groups_of(
             rows.time_s, rows.owner_idx, placed.place[moving], way[moving], observations.tracks
         ),
         tracks=observations.tracks,
@@ -129,7 +134,7 @@ def anchored_scores(
 ) -> Array:
     """The scores (N, 4) of people in those parts of the picture that see known ground.
 
-    Which these are is told at an anchor (4,), about where the candidate is, and stays so. Unlike
+    Which these are is decided at an anchor (4,), about where the candidate is, and stays so. Unlike
     the whole likelihood's, the mean of these scores is nothing at the truth whatever people do on
     ground that the reference did not see.
     """

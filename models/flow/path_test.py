@@ -2,6 +2,8 @@
 
 A camera that moves takes all paths along, and some pose puts people back on them. Where no pose
 does, the paths themselves have changed, and the map says nothing true of the camera.
+
+Ours: a one-sided t test of the mean over groups of log f - E log f, E by the map over what is seen.
 """
 
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from models.flow.map.view import in_view
 from models.flow.registration import Site
 from models.flow.student import value_below
 from models.geometry.rotation import Array
+from models.packing import stored_as
 
 _RATE = 1e-4  # of windows with unchanged paths that are called changed
 _LEAST_DROP = 0.35  # of the mean log density: less moves no pose by much
@@ -23,38 +26,40 @@ _KNOWN = 0.5  # of a place's ground must have been seen for it to be asked
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UsualFit:
-    """How well a party fits while the paths are as they were: mean and standard deviation."""
+    """How well a group fits while the paths are as they were: mean and standard deviation."""
 
     mean: float
     sd: float
-    parties: float
+    walking_groups: float = stored_as("parties")
 
     def has_changed(self, fits: Array) -> bool:
-        """Whether parties (P,) fit so much worse that the paths must have changed."""
+        """Whether walking groups (P,) fit so much worse that the paths must have changed."""
         if not fits.size:
             return False
         drop = self.mean - float(fits.mean())
-        sd = self.sd * float(np.sqrt(1 / fits.size + 1 / self.parties))
-        return drop > max(_LEAST_DROP, -value_below(_RATE, self.parties - 1) * sd)
+        sd = self.sd * float(np.sqrt(1 / fits.size + 1 / self.walking_groups))
+        return drop > max(_LEAST_DROP, -value_below(_RATE, self.walking_groups - 1) * sd)
 
 
 def usual_fit(fits: Array) -> UsualFit:
-    """What is usual of the fits (P,) of parties to maps that they have no part in."""
-    return UsualFit(mean=float(fits.mean()), sd=float(fits.std(ddof=1)), parties=float(fits.size))
+    """What is usual of the fits (P,) of walking groups to maps that they have no part in."""
+    return UsualFit(
+        mean=float(fits.mean()), sd=float(fits.std(ddof=1)), walking_groups=float(fits.size)
+    )
 
 
-def party_fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
-    """Each party's mean log density (P,) on known ground, less what the map itself expects.
+def group_fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """Each walking group's mean log density (P,) on known ground, less what the map itself expects.
 
     The map's expectation is over what a camera at the candidate (4,) sees, so that a busy view and
-    a quiet one compare. Parties on ground that the reference did not see are left out.
+    a quiet one compare. Walking groups on ground that the reference did not see are left out.
     """
     fits = _fits(walkers, site, candidate)
     return fits[np.isfinite(fits)]
 
 
 def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
-    """How much worse parties on known ground fit at another candidate, in standard errors.
+    """How much worse walking groups on known ground fit at another candidate, in standard errors.
 
     Ground that the reference did not see tells one pose from another by guesses alone. Infinite
     where hardly anybody is on known ground from both.
@@ -67,7 +72,7 @@ def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
 
 
 def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
-    """The fit (tracks,) of each party at its own number; NaN of those on unknown ground."""
+    """The fit (tracks,) of each walking group at its own index; NaN of those on unknown ground."""
     flow = site.flow
     placed = place_steps(walkers.steps, candidate)
     rows = walkers.steps.rows
@@ -76,10 +81,10 @@ def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
     unseen, _ = flow.look_unseen(placed.place)
     fit = value - _expected(site, candidate)[slot_idx]
     asked = placed.valid & (unseen < 1 - _KNOWN)
-    parties = walkers.party_idx[rows.owner_idx[asked]]
+    walking_groups = walkers.group_idx[rows.owner_idx[asked]]
     weight = walkers.weight[asked]
-    total = np.bincount(parties, weight, walkers.tracks)
-    sums = np.bincount(parties, weight * fit[asked], walkers.tracks)
+    total = np.bincount(walking_groups, weight, walkers.tracks)
+    sums = np.bincount(walking_groups, weight * fit[asked], walkers.tracks)
     return np.asarray(np.where(total > 0, sums / np.where(total > 0, total, 1.0), np.nan))
 
 

@@ -1,4 +1,8 @@
-"""Learn a site's flow from tracks at a known pose, and how registration errs there."""
+"""Learn a site's flow from tracks at a known pose, and how registration errs there.
+
+Source: Godambe 1960, the information of an estimating function, H J^-1 H, whose J has the scatter
+of walking groups here, the noise of the map and what is not known of the bias.
+"""
 
 from dataclasses import dataclass
 
@@ -18,9 +22,11 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
+from models.packing import stored_as
 
-_GROUP = 6  # parties after one another
-_SURPRISE, _SURPRISE_WEIGHT = 1.3, 5.0  # the usual one, and how many groups it is worth
+_RUN = 6  # walking groups after one another
+# The inflation before any is seen, and how many runs that guess is worth.
+_ASSUMED_INFLATION, _ASSUMED_INFLATION_WEIGHT = 1.3, 5.0
 _LEFT_NOISE = 0.5  # of the bias's, after what cancels
 _ELSEWHERE = np.array([0.05, 0.05, 0.05, 0.15])  # of a person's scatter: how far off the bias is
 _FAR = np.array([np.radians(8), np.radians(8), 0.15, np.radians(8)])  # how far that pose is
@@ -32,9 +38,10 @@ class FlowReference:
 
     `bias` (4,) is a person's mean score at the truth, by tilt, roll, log height and heading,
     `bias_covariance` (4, 4) how unsure that is, `spread` (4,) how much people's scores scatter.
-    `temper` is how much larger squared errors are than the curvature at a peak says, and `surprise`
-    than curvature and the scatter of parties together say, for a map of endless people; this one is
-    of `people`. `still` and `fit` are what its two tests go by.
+    `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
+    peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
+    together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
+    its two tests go by.
     """
 
     flow: FlowMap
@@ -42,8 +49,8 @@ class FlowReference:
     bias: Array
     bias_covariance: Array
     spread: Array
-    temper: float
-    surprise: float
+    curvature_variance_inflation: float = stored_as("temper")
+    score_variance_inflation: float = stored_as("surprise")
     people: float
     still: StillScores
     fit: UsualFit
@@ -52,9 +59,9 @@ class FlowReference:
         """What walkers are registered to."""
         return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics)
 
-    def temper_for(self, people: float) -> float:
+    def variance_inflation_for(self, people: float) -> float:
         """How much larger squared errors are for so many people than the curvature says."""
-        return self.temper * self.map_noise(people)
+        return self.curvature_variance_inflation * self.map_noise(people)
 
     def map_noise(self, people: float) -> float:
         """The noise of map and walkers over that of the walkers.
@@ -72,7 +79,7 @@ class FlowReference:
         """
         far = min(float(np.linalg.norm(move / _FAR)), 1.0)
         elsewhere = np.diag((_ELSEWHERE * far * self.spread) ** 2)
-        scatter = self.surprise * self.map_noise(people) * peak.noise
+        scatter = self.score_variance_inflation * self.map_noise(people) * peak.noise
         scatter = scatter + people**2 * (self.bias_covariance + elsewhere)
         scatter = scatter + 1e-9 * np.trace(scatter) * np.eye(4)
         return np.asarray(peak.curvature @ np.linalg.solve(scatter, peak.curvature))
@@ -91,11 +98,12 @@ def learn_flow(
     weights: Array | None = None,
     folds: Folds | None = None,
 ) -> FlowReference | None:
-    """The flow of tracks at the prior pose; None where fewer than 12 parties walk.
+    """The flow of tracks at the prior pose; None where fewer than 12 walking groups walk.
 
-    A map knows the tracks that it is made of too well. So each quarter of the parties is held
-    against a map of the others: what their scores are on average is the bias, how much more they
-    scatter in groups of parties after one another than parties do is the surprise.
+    A map knows the tracks that it is made of too well. So each quarter of the walking groups is
+    held against a map of the others: what their scores are on average is the bias, how much more
+    they scatter in runs of walking groups after one another than walking groups do is the inflation
+    of their variance.
 
     Args:
         observations: of the tracks.
@@ -111,12 +119,12 @@ def learn_flow(
     if folds is None:
         return None
     crossed = cross_fit(folds.each, at)
-    surprise, scatter = _scatter(crossed)
+    inflation, scatter = _scatter(crossed)
     parts_bent = float(np.trace(np.linalg.solve(scatter, crossed.curvature)))
     count = float(crossed.people.sum())
     # Each in the others' map and they in its: to first order, what noise does to the mean cancels.
     bias = crossed.slopes.sum(axis=0) / count
-    unsure = _LEFT_NOISE * surprise * scatter / count**2
+    unsure = _LEFT_NOISE * inflation * scatter / count**2
     walkers = walkers_of(observations, at)
     weights = np.ones(observations.tracks) if weights is None else weights
     whole = mapped(walkers, weights, intrinsics, at, folds.grain)
@@ -127,8 +135,8 @@ def learn_flow(
         bias=bias,
         bias_covariance=unsure,
         spread=np.sqrt(np.diag(scatter) / count),
-        temper=surprise * max(1.0, 4 / max(parts_bent, 1e-9)),
-        surprise=surprise,
+        curvature_variance_inflation=inflation * max(1.0, 4 / max(parts_bent, 1e-9)),
+        score_variance_inflation=inflation,
         people=float(counted.sum() ** 2 / (counted**2).sum()),
         still=learn_scores(crossed.scores, crossed.bent, seed),
         fit=usual_fit(crossed.fits),
@@ -136,12 +144,15 @@ def learn_flow(
 
 
 def _scatter(crossed: CrossFit) -> tuple[float, Array]:
-    """The surprise, and how the sum of the slopes scatters (4, 4) if parties are independent."""
+    """The inflation of the scores' variance, and what it is of.
+
+    That is the scatter (4, 4) of the slopes' sum if walking groups are independent.
+    """
     centred = crossed.slopes - crossed.slopes.mean(axis=0)
     scatter = centred.T @ centred + 1e-9 * np.trace(centred.T @ centred) * np.eye(4)
     whitened = np.linalg.solve(np.linalg.cholesky(scatter / len(centred)), centred.T).T
-    groups = len(centred) // _GROUP
-    sums = whitened[: groups * _GROUP].reshape(groups, _GROUP, 4).sum(axis=1)
-    found = float((sums**2).mean() / _GROUP)
-    weight = groups / (groups + _SURPRISE_WEIGHT)
-    return max(1.0, weight * found + (1 - weight) * _SURPRISE), scatter
+    runs = len(centred) // _RUN
+    sums = whitened[: runs * _RUN].reshape(runs, _RUN, 4).sum(axis=1)
+    found = float((sums**2).mean() / _RUN)
+    weight = runs / (runs + _ASSUMED_INFLATION_WEIGHT)
+    return max(1.0, weight * found + (1 - weight) * _ASSUMED_INFLATION), scatter

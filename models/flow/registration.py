@@ -1,4 +1,8 @@
-"""Registration: the pose, heading too, that puts walkers back on the site's paths."""
+"""Registration: the pose, heading too, that puts walkers back on the site's paths.
+
+Source: Berndt, Hall, Hall and Hausman 1974, steps by the scores' outer product; damped as by
+Levenberg 1944. The curvature by differences of the scores is ours.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -37,7 +41,7 @@ class Site:
         """How likely the walkers are, seen from a candidate (4,)."""
         return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
 
-    def log_chances(self, walkers: Walkers, candidate: Array) -> Array:
+    def track_log_likelihoods(self, walkers: Walkers, candidate: Array) -> Array:
         """The log likelihood (N,) of each track alone."""
         lens = self.intrinsics
         return likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
@@ -67,7 +71,7 @@ class Peak:
     """Where a search ended: candidate (4,), log posterior, and what the map says there.
 
     `curvature` (4, 4) is how the log likelihood bends, `noise` (4, 4) how its slope scatters, by
-    party. Were the map the truth and parties single walkers, they would be the same.
+    walking group. Were the map the truth and walking groups single walkers, they would be the same.
     """
 
     candidate: Array
@@ -77,33 +81,39 @@ class Peak:
 
 
 def register(
-    walkers: Walkers, site: Site, belief: Belief, *, temper: float, headings: Sequence[float]
+    walkers: Walkers,
+    site: Site,
+    belief: Belief,
+    *,
+    variance_inflation: float,
+    headings: Sequence[float],
 ) -> list[Peak]:
     """Peaks of the posterior, the highest first.
 
-    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg
-    apart are climbed from, and ends that are the same are one. `temper` divides what the map
+    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
+    are climbed from, and ends that are the same are one. `variance_inflation` divides what the map
     says: how much larger its squared errors are than its scores would have it.
     """
 
     def posterior(candidate: Array) -> tuple[float, Likelihood]:
         found = site.likelihood(walkers, candidate)
-        return found.value / temper + belief.log_density(candidate), found
+        return found.value / variance_inflation + belief.log_density(candidate), found
 
     tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
-    chances = [
-        float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(candidate)
+    log_posteriors = [
+        float(site.track_log_likelihoods(walkers, candidate).sum()) / variance_inflation
+        + belief.log_density(candidate)
         for candidate in tried
     ]
     begin: list[Array] = []
-    for number in np.argsort(chances)[::-1]:
+    for number in np.argsort(log_posteriors)[::-1]:
         apart = [abs(tried[number][3] - other[3]) for other in begin]
-        hopeless = chances[number] < max(chances) - _HOPELESS
+        hopeless = log_posteriors[number] < max(log_posteriors) - _HOPELESS
         if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
             begin.append(tried[number])
     ends: list[tuple[Array, float, Likelihood]] = []
     for candidate in begin:
-        end = _climbed(candidate, posterior, belief, temper)
+        end = _climbed(candidate, posterior, belief, variance_inflation)
         if all(np.abs(end[0] - other[0]).max() > _SAME_END for other in ends):
             ends.append(end)
     ends.sort(key=lambda end: -end[1])
@@ -123,8 +133,8 @@ def settled(
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
-    A single `temper` lets directions in which the map is noise drown a belief that is sure of
-    them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
+    A single `variance_inflation` lets directions in which the map is noise drown a belief that is
+    sure of them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
 
     Args:
         walkers: who is registered.
@@ -149,12 +159,14 @@ def _climbed(
     candidate: Array,
     posterior: Callable[[Array], tuple[float, Likelihood]],
     belief: Belief,
-    temper: float,
+    variance_inflation: float,
 ) -> tuple[Array, float, Likelihood]:
     value, found = posterior(candidate)
     for _ in range(_MOST_ROUNDS):
-        slope = found.scores.sum(axis=0) / temper - belief.precision @ (candidate - belief.mean)
-        matrix = _scatter(found.scores) / temper + belief.precision
+        slope = found.scores.sum(axis=0) / variance_inflation - belief.precision @ (
+            candidate - belief.mean
+        )
+        matrix = _scatter(found.scores) / variance_inflation + belief.precision
         move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
         move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
         share, gain = 1.0, -1.0
@@ -193,12 +205,12 @@ def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
 
 
 def noise_of(walkers: Walkers, scores: Array) -> Array:
-    """How the sum of scores (N, 4) scatters (4, 4): parties are independent, their people not."""
-    parties = np.zeros((walkers.tracks, 4))
-    np.add.at(parties, walkers.party_idx, scores)
-    used = int(parties.any(axis=1).sum())
-    # Where scores add up to nothing, as at a peak, four of the parties are not free.
-    return _scatter(parties) * used / max(used - 4, 1)
+    """How the sum of scores (N, 4) scatters (4, 4): groups are independent, their people not."""
+    walking_groups = np.zeros((walkers.tracks, 4))
+    np.add.at(walking_groups, walkers.group_idx, scores)
+    used = int(walking_groups.any(axis=1).sum())
+    # Where scores add up to nothing, as at a peak, four of the walking groups are not free.
+    return _scatter(walking_groups) * used / max(used - 4, 1)
 
 
 def _scatter(scores: Array) -> Array:

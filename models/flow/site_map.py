@@ -1,4 +1,7 @@
-"""From walkers at a known pose to a map that others can be registered to."""
+"""From walkers at a known pose to a map that others can be registered to.
+
+Source: Duin 1976, the width of a kernel by the likelihood of who was left out.
+"""
 
 from dataclasses import replace
 
@@ -21,7 +24,7 @@ _GRAINS = (
 )
 _SLOTS = 4  # parts of a day: night, morning, afternoon, evening, wherever midnight UTC falls
 _FEWEST_A_SLOT = 80  # people that a part of the day is asked by
-_CLEAR = 3.0  # standard errors by which parts of the day must foretell better
+_CLEAR = 3.0  # standard errors by which parts of the day must predict better
 
 
 def mapped(
@@ -41,34 +44,34 @@ def mapped(
 def best_grain(
     folds: list[tuple[Walkers, Array, Walkers]], intrinsics: Intrinsics, at: Array
 ) -> Grain:
-    """The grain of map that foretells people best; parts of the day where it is clear that they do.
+    """The grain of map that predicts people best; parts of the day where it is clear that they do.
 
     Args:
-        folds: walkers to learn of with their weights, and others to foretell.
+        folds: walkers to learn of with their weights, and others to predict.
         intrinsics: of the camera.
         at: the known pose (4,).
     """
 
-    def foretold(grain: Grain) -> Array:
+    def held_out(grain: Grain) -> Array:
         return np.concatenate(
             [
-                _foretold(asked, mapped(known, weights, intrinsics, at, grain), at)
+                _held_out_log_likelihoods(asked, mapped(known, weights, intrinsics, at, grain), at)
                 for known, weights, asked in folds
             ]
         )
 
-    asked = {grain: foretold(grain) for grain in _GRAINS}
+    asked = {grain: held_out(grain) for grain in _GRAINS}
     best = max(asked, key=lambda grain: float(asked[grain].mean()))
     everyone = np.concatenate([_slot_of_people(walkers) for _, _, walkers in folds])
     if (np.bincount(everyone, minlength=_SLOTS) >= _FEWEST_A_SLOT).sum() < 2:
         return best
     by_day = replace(best, slots=_SLOTS)
-    gains = foretold(by_day) - asked[best]
+    gains = held_out(by_day) - asked[best]
     return by_day if gains.mean() > _CLEAR * gains.std() / np.sqrt(gains.size) else best
 
 
-def _foretold(walkers: Walkers, site: Site, at: Array) -> Array:
-    """The mean log density (P,) of each person."""
+def _held_out_log_likelihoods(walkers: Walkers, site: Site, at: Array) -> Array:
+    """The mean log density (P,) of each person, whom the map has no part of."""
     placed = place_steps(walkers.steps, at)
     rows = walkers.steps.rows
     slot_idx = site.flow.slot_of(rows.time_s)

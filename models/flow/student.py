@@ -1,4 +1,7 @@
-"""Student's t: how often chance goes so far, and how far it goes so often."""
+"""Student's t: how often chance goes so far, and how far it goes so often.
+
+Source: Student 1908; the functions are SciPy's.
+"""
 
 
 def chance_below(value: float, freedom: float) -> float:

@@ -1,9 +1,11 @@
-"""Scores of parties by where they walk, and the first of them after a move within a window.
+"""Scores of walking groups by where they walk, and the first of them after a move within a window.
 
 At the pose where a camera is taken to be, each person's places and directions have a signed score
 along tilt, roll, log height and heading: how much likelier they were from a little further on. Of
 a still camera the scores are on average what they were in the reference; of one that has moved
 they are not, by as much as it has.
+
+Source: Rao 1948, the score test, of finite steps here; Künsch 1989, the block bootstrap.
 """
 
 from dataclasses import dataclass
@@ -15,12 +17,13 @@ from models.flow.likelihood import Walkers
 from models.flow.registration import Site
 from models.flow.student import chance_below, value_below
 from models.geometry.rotation import Array
+from models.packing import stored_as
 
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.
 REACH = np.array([np.radians(3), np.radians(3), 0.08, np.radians(4)])
-_FEWEST = 8  # parties that a move is told by
+_FEWEST = 8  # walking groups that a move is detected by
 _MOST = 300
-_BLOCK = 3  # parties after one another that the bootstrap keeps together
+_BLOCK = 3  # walking groups after one another that the bootstrap keeps together
 _DRAWS = 1500
 _RIDGE = 0.02  # of each score's variance is its own, so that no direction is too good
 _BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's tail is theirs
@@ -28,65 +31,68 @@ _BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StillScores:
-    """What scores are like while a camera stands: mean (4,) and covariance (4, 4) of a party's.
+    """What scores are like while a camera stands: mean (4,) and covariance (4, 4) of a group's.
 
-    `bent` (4, 4) has in a column how the mean moves with each number. `looks` is how
-    many independent looks at a number the test of a window is worth; `parties` made the reference.
+    `bent` (4, 4) has in a column how the mean moves with each parameter. `looks` is how many
+    independent looks at a parameter the test of a window is worth; `walking_groups` made the
+    reference.
     """
 
     mean: Array
     covariance: Array
     bent: Array
     looks: float
-    parties: float
+    walking_groups: float = stored_as("parties")
 
     def squares(self, scores: Array) -> Array:
-        """What is compared with `level`, (W, 4): of the newest 8, 9, ... of parties (P, 4)."""
-        return _squares(scores, self.mean, self.covariance, self.bent, self.parties)
+        """What is compared with `level`, (W, 4): of the newest 8, 9, ... of groups (P, 4)."""
+        return _squares(scores, self.mean, self.covariance, self.bent, self.walking_groups)
 
     def level(self, rate: float) -> float:
         """What the statistic passes in a share `rate` of windows of a still camera."""
-        return value_below(rate / self.looks / 2, self.parties - 1) ** 2
+        return value_below(rate / self.looks / 2, self.walking_groups - 1) ** 2
 
 
-def party_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.NDArray[np.int64]]:
-    """The mean scores (P, 4) of each party, in the order of their last tracks (P,)."""
+def group_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """The mean scores (P, 4) of each walking group, in the order of their last tracks (P,)."""
     scores = np.stack(
         [
-            site.log_chances(walkers, at + step) - site.log_chances(walkers, at - step)
+            site.track_log_likelihoods(walkers, at + step)
+            - site.track_log_likelihoods(walkers, at - step)
             for step in np.diag(REACH)
         ],
         axis=1,
     )
-    people, party_of, last = parties_in_time(walkers)
+    people, group_of, last = groups_in_time(walkers)
     sums = np.zeros((last.size, 4))
-    np.add.at(sums, party_of, scores[people] / 2)
-    return sums / np.bincount(party_of)[:, None], last
+    np.add.at(sums, group_of, scores[people] / 2)
+    return sums / np.bincount(group_of)[:, None], last
 
 
-def parties_in_time(
+def groups_in_time(
     walkers: Walkers,
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Tracks with a step (N,), the party (N,) of each, and each party's last track (P,), rising."""
+    """Tracks with a step (N,), the group (N,) of each, and each group's last track (P,), rising."""
     people = np.unique(walkers.steps.rows.owner_idx)
-    labels, party_of = np.unique(walkers.party_idx[people], return_inverse=True)
+    labels, group_of = np.unique(walkers.group_idx[people], return_inverse=True)
     last = np.zeros(labels.size, dtype=np.int64)
-    np.maximum.at(last, party_of, people)
+    np.maximum.at(last, group_of, people)
     rank = np.empty(labels.size, dtype=np.int64)
     rank[np.argsort(last)] = np.arange(labels.size)
-    return people, rank[party_of], np.sort(last)
+    return people, rank[group_of], np.sort(last)
 
 
 def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
-    """What is usual of the scores (P, 4) of parties, in the order of time.
+    """What is usual of the scores (P, 4) of walking groups, in the order of time.
 
     How high the statistic gets is learned by bootstrap: a reference and a window are drawn anew,
-    the window some parties after one another at a time, and the one is tested by the other. So few
-    parties in the reference, heavy tails and parties that come together all raise the level.
+    the window some walking groups after one another at a time, and the one is tested by the other.
+    So few walking groups in the reference, heavy tails and walking groups that come together all
+    raise the level.
 
     Args:
         scores: each scored by a map that its people have no part in.
-        bent: how the mean score changes with each number (4, 4): a column for a number.
+        bent: how the mean score changes with each parameter (4, 4): a column for a parameter.
         seed: of the bootstrap.
     """
     count = len(scores)
@@ -105,7 +111,7 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
         covariance=covariance,
         bent=bent,
         looks=max(_BODY / alone, 4.0),
-        parties=float(count),
+        walking_groups=float(count),
     )
 
 
@@ -114,10 +120,10 @@ def moved_within(
 ) -> int | None:
     """The first track after a move that happened among those of a window; None where none did.
 
-    Parties before and after are held against one another, so that a camera which has stood
+    Walking groups before and after are held against one another, so that a camera which has stood
     elsewhere for all of the window is not taken for one that moves again.
     """
-    scores, tracks = party_scores(walkers, site, at)
+    scores, tracks = group_scores(walkers, site, at)
     if len(scores) < 2 * _FEWEST:
         return None
     directions, variance = _directions(still.covariance, still.bent)
@@ -129,21 +135,23 @@ def moved_within(
     squares = apart**2 / (variance * (1 / before + 1 / after))
     if squares.max() < still.level(rate):
         return None
-    parties, _ = np.unravel_index(int(squares.argmax()), squares.shape)
-    return int(tracks[int(parties) + _FEWEST])
+    walking_groups, _ = np.unravel_index(int(squares.argmax()), squares.shape)
+    return int(tracks[int(walking_groups) + _FEWEST])
 
 
-def _squares(scores: Array, mean: Array, covariance: Array, bent: Array, parties: float) -> Array:
-    """Squared standard scores (W, 4) of the newest 8, 9, ... parties' means, for each number."""
+def _squares(
+    scores: Array, mean: Array, covariance: Array, bent: Array, walking_groups: float
+) -> Array:
+    """Squared standard scores (W, 4) of the newest 8, 9, ... groups' means, for each parameter."""
     directions, variance = _directions(covariance, bent)
     along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
     count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
-    # The map is wrong by as much as its own parties' mean is.
-    return np.asarray((along / count) ** 2 / (variance * (1 / count + 1 / parties)))
+    # The map is wrong by as much as its own walking groups' mean is.
+    return np.asarray((along / count) ** 2 / (variance * (1 / count + 1 / walking_groups)))
 
 
 def _directions(covariance: Array, bent: Array) -> tuple[Array, Array]:
-    """Rows (4, 4) to look along, to see each number best against the scatter; variances (4,)."""
+    """Rows (4, 4) to look along, to see each parameter best against the scatter; variances (4,)."""
     ridge = covariance + _RIDGE * np.diag(np.diag(covariance)) + 1e-9 * np.eye(4)
     directions = np.linalg.solve(ridge, bent).T
     return np.asarray(directions), np.einsum("ki,ij,kj->k", directions, ridge, directions)

@@ -1,7 +1,7 @@
-"""The numbers of a pose that people can show, as one value: height, tilt, roll and heading.
+"""The parameters of a pose that people can show, as one value: height, tilt, roll and heading.
 
 The one place where they become arrays and come back. Arrays, which the numerics of `joint/` and
-`flow/` work on, are in the order of `NAMES`, the height as its log.
+`flow/` work on, are in the order of `PARAMETERS`, the height as its log.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
-NAMES = ("tilt", "roll", "height", "heading")
+PARAMETERS = ("tilt", "roll", "height", "heading")
 _FIELDS = {"tilt": "tilt_rad", "roll": "roll_rad", "height": "height_m", "heading": "heading_rad"}
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.drift.chart import RUN, Reading, read_chart
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.geometry.rotation import Mask
 from models.recalibration.site import CameraSite
@@ -15,14 +15,14 @@ from models.recalibration.site import CameraSite
 class AlarmRate:
     """How many false alarms a year are allowed, and how many tracks come in one.
 
-    After an alarm the chart has calmed down once `calm_parties` in a row were below `calm_ratio`
+    After an alarm the chart has calmed down once `calm_groups` in a row were below `calm_ratio`
     of its level.
     """
 
     alarms_a_year: float
     tracks_a_year: float
     calm_ratio: float = 0.7
-    calm_parties: int = 12
+    calm_groups: int = 12
 
 
 def read_alarm_chart(
@@ -55,14 +55,14 @@ def read_alarm_chart(
     for asked in (every[every >= first], every):
         if not asked.size:
             continue
-        scores = score_parties(of_tracks(tracks, asked), usual)
-        parties_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
+        scores = score_groups(of_tracks(tracks, asked), usual)
+        groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
         reading = read_chart(
             site.chart,
             scores,
-            RUN * rate.alarms_a_year / parties_a_year,
+            RUN * rate.alarms_a_year / groups_a_year,
             calm_ratio=rate.calm_ratio,
-            calm_parties=rate.calm_parties,
+            calm_groups=rate.calm_groups,
         )
         if reading is not None:
             return replace(reading, track_idx=int(asked[reading.track_idx]))

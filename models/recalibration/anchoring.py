@@ -13,7 +13,7 @@ import numpy as np
 
 from models.drift.believed_turn import believed_turns
 from models.drift.creep_log import DAY_S, CreepLog, add_day, begin_log
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -49,7 +49,7 @@ def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLo
     day_idx = np.floor(tracks.ended_s / DAY_S).astype(np.int64)
     # Each day by itself, so that it matters not which days were at hand together.
     for day in np.setdiff1d(day_idx, log.day_idx):
-        scores = score_parties(of_tracks(tracks, np.flatnonzero(day_idx == day)), usual)
+        scores = score_groups(of_tracks(tracks, np.flatnonzero(day_idx == day)), usual)
         log = add_day(log, first.chart, int(day), scores)
     return log
 

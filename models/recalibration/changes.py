@@ -41,12 +41,12 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    prior, speeds = site.prior, site.speeds
-    found = find_change(tracks, prior, speeds)
+    prior, speed_reference = site.prior, site.speed_reference
+    found = find_change(tracks, prior, speed_reference)
     if found is not None:
         first, parts = _parted(tracks, found.track_idx)
         if parts is not None:
-            before, after = (joint_estimate(part, prior, speeds) for part in parts)
+            before, after = (joint_estimate(part, prior, speed_reference) for part in parts)
             if moved_beyond_doubt(before, after):
                 return Searched(
                     change_idx=found.track_idx, first=first, tracks=parts[1], joint=after
@@ -57,9 +57,9 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
         turned = moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _CUT_RATE)
         first, parts = (0, None) if turned is None else _parted(tracks, turned)
         if parts is not None:
-            joint = joint_estimate(parts[1], prior, speeds)
+            joint = joint_estimate(parts[1], prior, speed_reference)
             return Searched(change_idx=turned, first=first, tracks=parts[1], joint=joint)
-    joint = joint_estimate(tracks, prior, speeds)
+    joint = joint_estimate(tracks, prior, speed_reference)
     return Searched(change_idx=None, first=0, tracks=tracks, joint=joint)
 
 

@@ -52,7 +52,7 @@ class PoseFinding:
 
     @property
     def pose(self) -> CameraPose:
-        """The prior pose moved by what the tracks tell."""
+        """The prior pose moved by what is identifiable."""
         return pose_after(self.drift, self.prior)
 
 
@@ -61,7 +61,7 @@ def estimate_pose(
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
-    What the flow map says may fail: the pose is by speeds alone then, and the failure is told. Of
+    What the flow map says may fail: the pose is by speeds alone then, and the failure is said. Of
     a site that was not learned, all tracks count and the walking speed is assumed.
 
     Args:
@@ -76,7 +76,7 @@ def estimate_pose(
     check_in_time(tracks)
     prior = site.prior
     if not site.learned:
-        joint = joint_estimate(tracks, prior, site.speeds)
+        joint = joint_estimate(tracks, prior, site.speed_reference)
         return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
     lacks: list[Lack] = []
     searched = None
@@ -112,7 +112,7 @@ def estimate_pose(
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
     """How far an estimate is from the prior pose."""
-    return drift_between(fused.parameters, fused.sd, fused.told, prior)
+    return drift_between(fused.parameters, fused.sd, fused.identifiable, prior)
 
 
 def _fused(tracks: Observations, joint: JointEstimate, site: CameraSite) -> FusedEstimate:
@@ -136,4 +136,4 @@ def _look_again(
     if walkers.size < limits.people + FEWEST_WALKERS:
         return None
     older = of_tracks(tracks, np.arange(walkers[-limits.people]))
-    return _fused(older, joint_estimate(older, site.prior, site.speeds), site)
+    return _fused(older, joint_estimate(older, site.prior, site.speed_reference), site)

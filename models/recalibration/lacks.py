@@ -1,4 +1,4 @@
-"""What may fail beside an estimate: a failure is told as a value, and stops nobody."""
+"""What may fail beside an estimate: a failure is a value, and stops nobody."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

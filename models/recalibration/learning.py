@@ -6,8 +6,8 @@ import numpy as np
 
 from models.drift.chart_learning import learn_chart
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
-from models.estimation.joint.reference import assumed_reference, learn_reference
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.folds import fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.geometry.intrinsics import Intrinsics
@@ -26,12 +26,12 @@ def learn_site(
     walk: WalkConfig = _USUAL_WALK,
     *,
     seed: int = 0,
-    speeds: SiteReference | None = None,
+    speed_reference: SpeedReference | None = None,
     weights: Array | None = None,
     speed_tracks: int | None = None,
     chart: bool = True,
 ) -> CameraSite:
-    """The site of tracks at the prior pose; no map and no chart where fewer than 12 parties walk.
+    """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
 
     A map that grows is learned anew of all tracks that are known to be of the prior pose, older
     ones by less weight; how people walk there stays what the reference said, as an anchor.
@@ -42,7 +42,8 @@ def learn_site(
         prior: where it stood.
         walk: how fast people are taken to walk before any are seen.
         seed: of all that is drawn.
-        speeds: how people walk, where that was learned before: then it is not learned again.
+        speed_reference: how people walk, where that was learned before: then it is not learned
+            again.
         weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
         speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
         chart: whether the chart is wanted: it takes as long as all the rest.
@@ -52,17 +53,17 @@ def learn_site(
         ShapeError: tracks that are not in the order of their ends.
     """
     check_in_time(tracks)
-    if speeds is None:
+    if speed_reference is None:
         first = tracks if speed_tracks is None else _first(tracks, speed_tracks)
-        speeds = learn_reference(first, prior, walk, seed)
-    site = CameraSite(intrinsics=intrinsics, prior=prior, speeds=speeds)
+        speed_reference = learn_speed_reference(first, prior, walk, seed)
+    site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
     folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights)
     if folds is None:
         return site
     return replace(
         site,
         flow=learn_flow(tracks, intrinsics, prior, seed, weights, folds),
-        chart=learn_chart(tracks, prior, speeds, folds, seed) if chart else None,
+        chart=learn_chart(tracks, prior, speed_reference, folds, seed) if chart else None,
     )
 
 
@@ -77,8 +78,8 @@ def assume_site(
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
-    speeds = assumed_reference(tracks, prior, walk)
-    return CameraSite(intrinsics=intrinsics, prior=prior, speeds=speeds)
+    speed_reference = assumed_speed_reference(tracks, prior, walk)
+    return CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
 
 
 def _first(tracks: Observations, count: int) -> Observations:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from models.drift.chart import DriftChart
-from models.drift.party_scores import Usual
-from models.estimation.joint.site import SiteReference
+from models.drift.group_scores import Usual
+from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.reference import FlowReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -14,21 +14,25 @@ from models.geometry.pose import CameraPose
 class CameraSite:
     """A camera at its prior pose, and what is known of the people before it.
 
-    `speeds` is how they walk, learned or assumed. `flow` is where they do and `chart` how their
-    scores scatter; None where too few people walked to learn it.
+    `speed_reference` is how they walk, learned or assumed. `flow` is where they do and `chart` how
+    their scores scatter; None where too few people walked to learn it.
     """
 
     intrinsics: Intrinsics
     prior: CameraPose
-    speeds: SiteReference
+    speed_reference: SpeedReference
     flow: FlowReference | None = None
     chart: DriftChart | None = None
 
     @property
     def learned(self) -> bool:
         """Whether anything of it was learned; else a walking speed is assumed, and no more."""
-        return self.speeds.tracks > 0
+        return self.speed_reference.tracks > 0
 
     def usual(self, flow: FlowReference, chart: DriftChart) -> Usual:
         """What its flow map and its chart take for usual, seen from the prior pose."""
-        return Usual(prior=self.prior, paces=chart.paces, paths=flow.site(self.intrinsics))
+        return Usual(
+            prior=self.prior,
+            speed_reference=chart.speed_reference,
+            paths=flow.site(self.intrinsics),
+        )

@@ -9,10 +9,10 @@ from models.estimation.averaged import TrackPredictions, average_windows
 from models.estimation.calibrated import (
     Calibration,
     fit_calibration,
-    mean_numbers,
+    mean_plane_parameters,
     sampling_covariance,
 )
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.regression.network import PoseRegressor
 from models.regression.prediction import predict_windows
@@ -54,10 +54,10 @@ def learn_calibration(
     ):
         for site, predictions in _by_site(network, plan, some, site_idx):
             pose = _pose(plan.prior_pose, seen_by, site)
-            true.append(numbers_of(pose))
-            means.append(mean_numbers(predictions))
+            true.append(plane_parameters_of(pose))
+            means.append(mean_plane_parameters(predictions))
             scatter.append(sampling_covariance(predictions, site))
-    prior = numbers_of(plan.prior_pose)
+    prior = plane_parameters_of(plan.prior_pose)
     shape = (-1, 3)
     return fit_calibration(
         prior,

@@ -8,7 +8,7 @@ import torch
 
 from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import FEWEST_TRACKS
-from models.estimation.numbers import NumbersEstimate, numbers_of
+from models.estimation.parameters import PlaneEstimate, plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.regression.set_features import FEATURES, usual_speeds, walking, window_features
@@ -22,7 +22,7 @@ _FARTHEST = np.array([0.4, 0.4, 0.7])  # radians of tilt and roll, log height fr
 
 def set_estimate(
     network: SetNetwork, plan: SetPlan, seen: Windows, reference: Windows | None
-) -> NumbersEstimate:
+) -> PlaneEstimate:
     """Tilt, roll and log height from all windows at once.
 
     The windows are looked at from the prior pose, then again from the pose that the network found:
@@ -52,8 +52,8 @@ def set_estimate(
             )
         step, sd = _ask(network, features, known)
         offset = np.clip(offset + step - bias, -_FARTHEST, _FARTHEST)
-    return NumbersEstimate(
-        values=numbers_of(plan.prior_pose) + offset,
+    return PlaneEstimate(
+        values=plane_parameters_of(plan.prior_pose) + offset,
         covariance=np.diag(np.square(sd) + np.square(bias_sd)),
         tracks=tracks,
     )

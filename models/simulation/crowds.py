@@ -46,7 +46,7 @@ class FlowConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sites:
+class SimulatedSites:
     """What stays of sites (S,): their lanes (S, L), ways and pace."""
 
     lanes: npt.NDArray[np.int64]
@@ -69,13 +69,13 @@ class Sites:
     noise_rho: Array
 
 
-def draw_sites(
+def draw_simulated_sites(
     intrinsics: Intrinsics,
     poses: PoseSet,
     flow: FlowConfig,
     walk: WalkConfig,
     rng: np.random.Generator,
-) -> Sites:
+) -> SimulatedSites:
     """Sites, one for each pose."""
     sites, most = len(poses), flow.lanes[1]
 
@@ -88,7 +88,7 @@ def draw_sites(
     direction = rng.uniform(0, 2 * math.pi, (sites, most))
     parallel = rng.random((sites, most)) < flow.parallel_share
     gathered = rng.random(sites) < flow.gathered_share
-    return Sites(
+    return SimulatedSites(
         lanes=rng.integers(flow.lanes[0], most + 1, sites),
         lane_point_m=_ground_points(intrinsics, poses, most, walk.farthest_m, rng),
         lane_direction=np.where(parallel, direction[:, :1], direction),
@@ -129,7 +129,7 @@ class Crowd:
 
 
 def draw_crowd(
-    sites: Sites, people: int, flow: FlowConfig, walk: WalkConfig, rng: np.random.Generator
+    sites: SimulatedSites, people: int, flow: FlowConfig, walk: WalkConfig, rng: np.random.Generator
 ) -> Crowd:
     """Other people on every visit; the lanes are the site's, how busy they are changes somewhat."""
     most = flow.lanes[1]

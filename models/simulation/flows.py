@@ -12,11 +12,11 @@ from models.geometry.rotation import Array
 from models.simulation.crowds import (
     Crowd,
     FlowConfig,
-    Sites,
+    SimulatedSites,
     any_pixel,
     correlated,
     draw_crowd,
-    draw_sites,
+    draw_simulated_sites,
     unit_heading,
 )
 from models.simulation.poses import PoseSet
@@ -44,14 +44,14 @@ def simulate_sites(
     Raises:
         DegenerateGeometryError: a view in which no site sees enough ground for a walk.
     """
-    sites = draw_sites(intrinsics, views[0], flow, walk, rng)
+    sites = draw_simulated_sites(intrinsics, views[0], flow, walk, rng)
     return [_visit(intrinsics, poses, sites, people, flow, walk, rng) for poses in views]
 
 
 def _visit(
     intrinsics: Intrinsics,
     poses: PoseSet,
-    sites: "Sites",
+    sites: "SimulatedSites",
     people: int,
     flow: FlowConfig,
     walk: WalkConfig,
@@ -143,7 +143,7 @@ def _try_walks(
 
 
 def _stays(
-    intrinsics: Intrinsics, sites: Sites, site_idx: npt.NDArray[np.int64], path: Array
+    intrinsics: Intrinsics, sites: SimulatedSites, site_idx: npt.NDArray[np.int64], path: Array
 ) -> npt.NDArray[np.bool_]:
     """Which paths (B, T, 2), NaN at their ends, keep to the ground of their site."""
     stays = ~sites.bounded[site_idx]

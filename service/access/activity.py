@@ -1,4 +1,4 @@
-"""The log of who did what when: written with the deed that it tells of, never changed."""
+"""The log of who did what when: written with the activity that it tells of, never changed."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from service.kinds import Act, AlertKind, Outcome
+from service.kinds import Activity, AlertKind, Outcome
 from service.store.operation import activity
 from service.store.operation.actor import actor_of
 from service.store.tables.activity import ActivityRecord
@@ -14,7 +14,7 @@ from service.store.tables.activity import ActivityRecord
 
 def note(
     session: Session,
-    what: Act,
+    what: Activity,
     *,
     by: str | None,
     via: str | None = None,
@@ -31,7 +31,7 @@ def note(
     Where it is known in whose name the session writes, that is who did it.
 
     Args:
-        session: of the deed itself: what is rolled back was not done.
+        session: of the activity itself: what is rolled back was not done.
         what: was done.
         by: who; None where the service did it by itself, or nobody said a name.
         via: the id of the token that it was done with.

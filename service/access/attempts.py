@@ -46,10 +46,12 @@ class Attempts:
             while len(self._failures) > _MOST_ADDRESSES:
                 self._failures.popitem(last=False)
             self._lines = _recent(self._lines, now)
-            told = first and len(self._lines) < _MOST_LINES
-            if told:
+            worth_a_line = first and len(self._lines) < _MOST_LINES
+            if worth_a_line:
                 self._lines.append(now)
-        return Failure(wait_s=int(recent[0] + WITHIN_S - now) + 1 if over else 0, worth_a_line=told)
+        return Failure(
+            wait_s=int(recent[0] + WITHIN_S - now) + 1 if over else 0, worth_a_line=worth_a_line
+        )
 
 
 def _recent(times: list[float], now: float) -> list[float]:

@@ -11,7 +11,7 @@ from service.access.activity import note
 from service.access.callers import Caller
 from service.access.tokens import caller_of, caller_of_token, is_valid
 from service.errors import ForbiddenError, UnauthorizedError
-from service.kinds import Act, TokenScope
+from service.kinds import Activity, TokenScope
 from service.settings import Settings
 from service.store.operation import access
 from service.store.tables.access import SessionRecord
@@ -49,7 +49,11 @@ def log_in(session: Session, settings: Settings, caller: Caller) -> str:
         )
     )
     note(
-        session, Act.SESSION_BEGAN, by=caller.name, via=caller.token_id, subject_id=caller.token_id
+        session,
+        Activity.SESSION_BEGAN,
+        by=caller.name,
+        via=caller.token_id,
+        subject_id=caller.token_id,
     )
     return cookie
 
@@ -60,13 +64,17 @@ def log_out(session: Session, caller: Caller) -> None:
         return
     access.end_session(session, caller.session_hash)
     note(
-        session, Act.SESSION_ENDED, by=caller.name, via=caller.token_id, subject_id=caller.token_id
+        session,
+        Activity.SESSION_ENDED,
+        by=caller.name,
+        via=caller.token_id,
+        subject_id=caller.token_id,
     )
 
 
 def note_refused(session: Session, address: str) -> None:
     """Keep that somebody was not let in; never with what."""
-    note(session, Act.LOGIN_REFUSED, by=None, details={"address": address})
+    note(session, Activity.LOGIN_REFUSED, by=None, details={"address": address})
 
 
 def caller_of_session(session: Session, cookie: str) -> Caller | None:

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.access.callers import Caller
 from service.errors import FieldError, MalformedError, NotFoundError
-from service.kinds import Act, TokenScope
+from service.kinds import Activity, TokenScope
 from service.store.operation import access
 from service.store.tables.access import TokenRecord
 
@@ -64,7 +64,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     session.add(record)
     session.flush()
     details = {"name": record.name, "scopes": record.scopes, "cameras": record.cameras}
-    note(session, Act.TOKEN_ADDED, by=by, subject_id=token_id, details=details)
+    note(session, Activity.TOKEN_ADDED, by=by, subject_id=token_id, details=details)
     return MadeToken(record=record, text=f"{_PREFIX}_{token_id}_{secret}")
 
 
@@ -90,7 +90,7 @@ def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord
     if record.revoked_at is None:
         record.revoked_at = datetime.now(UTC)
         details = {"name": record.name}
-        note(session, Act.TOKEN_REVOKED, by=by, subject_id=token_id, details=details)
+        note(session, Activity.TOKEN_REVOKED, by=by, subject_id=token_id, details=details)
     access.end_sessions(session, token_id=token_id)
     return record
 

@@ -13,8 +13,8 @@ from service.delivery.outbox import json_time, queue_alert
 from service.errors import ConflictError, NotFoundError
 from service.formats.degrees import in_degrees
 from service.kinds import (
-    Act,
-    AlertAct,
+    Activity,
+    AlertActivity,
     AlertKind,
     AlertSource,
     AlertState,
@@ -33,20 +33,20 @@ from service.store.tables.alerts import AlertRecord
 from service.store.tracks import tracks
 
 _KEPT_AS = {
-    AlertAct.OPENED: Act.ALERT_OPENED,
-    AlertAct.ESCALATED: Act.ALERT_ESCALATED,
-    AlertAct.ACKNOWLEDGED: Act.ALERT_ACKNOWLEDGED,
-    AlertAct.SILENCED: Act.ALERT_SILENCED,
-    AlertAct.SILENCE_ENDED: Act.ALERT_SILENCE_ENDED,
-    AlertAct.RESOLVED: Act.ALERT_RESOLVED,
+    AlertActivity.OPENED: Activity.ALERT_OPENED,
+    AlertActivity.ESCALATED: Activity.ALERT_ESCALATED,
+    AlertActivity.ACKNOWLEDGED: Activity.ALERT_ACKNOWLEDGED,
+    AlertActivity.SILENCED: Activity.ALERT_SILENCED,
+    AlertActivity.SILENCE_ENDED: Activity.ALERT_SILENCE_ENDED,
+    AlertActivity.RESOLVED: Activity.ALERT_RESOLVED,
 }
-# What an act is told as; that an alert grew is told with what made it grow.
-_TOLD_AS = {
-    AlertAct.OPENED: MessageType.ALERT_OPENED,
-    AlertAct.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
-    AlertAct.SILENCED: MessageType.ALERT_SILENCED,
-    AlertAct.SILENCE_ENDED: MessageType.ALERT_UPDATED,
-    AlertAct.RESOLVED: MessageType.ALERT_RESOLVED,
+# What messages say of an activity; that an alert grew is told with what made it grow.
+_NOTIFIED_AS = {
+    AlertActivity.OPENED: MessageType.ALERT_OPENED,
+    AlertActivity.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
+    AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
+    AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
+    AlertActivity.RESOLVED: MessageType.ALERT_RESOLVED,
 }
 
 
@@ -78,7 +78,7 @@ def open_alert(
         if record.severity != severity or record.source != source:
             change = MessageType.ALERT_UPDATED
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
-            _keep_act(session, record, AlertAct.ESCALATED, None)
+            _keep_activity(session, record, AlertActivity.ESCALATED, None)
         record.drift, record.severity, record.updated_at = drift, severity, now
         record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
@@ -94,17 +94,17 @@ def open_alert(
             severity=severity,
             reasons=reasons,
             drift=drift,
-            told=False,
+            notified=False,
             opened_at=now,
             changed_at=changed_at,
             updated_at=now,
         )
         session.add(record)
         session.flush()
-        _keep_act(session, record, AlertAct.OPENED, None)
+        _keep_activity(session, record, AlertActivity.OPENED, None)
     group = group_with(session, settings, record)
     if group is not None:
-        _keep_act(session, group, AlertAct.OPENED, None)
+        _keep_activity(session, group, AlertActivity.OPENED, None)
         _tell(session, group, MessageType.ALERT_OPENED)
     if change is not None:
         _tell(session, record, change)
@@ -166,10 +166,10 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
     return record
 
 
-def acts_of(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
+def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
     """What was done with an alert since it opened, oldest first."""
     entries = activity.of_subject(session, alert_id)
-    return [entry for entry in entries if entry.what != Act.ALERT_OPENED]
+    return [entry for entry in entries if entry.what != Activity.ALERT_OPENED]
 
 
 def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
@@ -183,7 +183,7 @@ def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertR
     if record.acknowledged_at is None:
         record.acknowledged_by = by or "someone"
         record.acknowledged_at = datetime.now(UTC)
-        note_act(session, record, AlertAct.ACKNOWLEDGED, record.acknowledged_by)
+        note_on_alert(session, record, AlertActivity.ACKNOWLEDGED, record.acknowledged_by)
     return record
 
 
@@ -200,10 +200,10 @@ def require_firing(session: Session, alert_id: str) -> AlertRecord:
     return record
 
 
-def note_act(
+def note_on_alert(
     session: Session,
     record: AlertRecord,
-    act: AlertAct,
+    what: AlertActivity,
     by: str | None,
     *,
     until: datetime | None = None,
@@ -211,8 +211,8 @@ def note_act(
 ) -> None:
     """Keep what was done with an open alert, and tell of it."""
     record.updated_at = datetime.now(UTC)
-    _keep_act(session, record, act, by, until=until, note=note)
-    _tell(session, record, _TOLD_AS[act])
+    _keep_activity(session, record, what, by, until=until, note=note)
+    _tell(session, record, _NOTIFIED_AS[what])
 
 
 def _end(
@@ -222,7 +222,7 @@ def _end(
     record.state, record.outcome = AlertState.RESOLVED, outcome
     record.note, record.resolved_by = note, by
     record.resolved_at = record.updated_at = now
-    _keep_act(session, record, AlertAct.RESOLVED, by, outcome=outcome, note=note)
+    _keep_activity(session, record, AlertActivity.RESOLVED, by, outcome=outcome, note=note)
     session.flush()
     _tell(session, record, MessageType.ALERT_RESOLVED)
     group = None if record.group_id is None else alerts.find(session, record.group_id)
@@ -231,10 +231,10 @@ def _end(
         _end(session, group, outcome, note, by)
 
 
-def _keep_act(
+def _keep_activity(
     session: Session,
     record: AlertRecord,
-    act: AlertAct,
+    what: AlertActivity,
     by: str | None,
     *,
     until: datetime | None = None,
@@ -243,7 +243,7 @@ def _keep_act(
 ) -> None:
     note_activity(
         session,
-        _KEPT_AS[act],
+        _KEPT_AS[what],
         by=by,
         camera_id=record.camera_id,
         subject_id=record.id,
@@ -262,9 +262,11 @@ def _keep_act(
 def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
     """Tell of a change to an alert."""
     # A group speaks for its members; the end of one that was told by itself is told so, too.
-    if record.group_id is not None and not (record.told and record.state == AlertState.RESOLVED):
+    if record.group_id is not None and not (
+        record.notified and record.state == AlertState.RESOLVED
+    ):
         return
-    record.told = True
+    record.notified = True
     payload = {
         "id": record.id,
         "camera_id": record.camera_id,

@@ -55,7 +55,7 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
             severity=Severity.CRITICAL,
             reasons=(),
             drift={},
-            told=False,
+            notified=False,
             opened_at=now,
             changed_at=None,
             updated_at=now,

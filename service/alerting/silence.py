@@ -4,9 +4,9 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
-from service.alerting.alerts import note_act, require_firing
+from service.alerting.alerts import note_on_alert, require_firing
 from service.errors import FieldError, MalformedError
-from service.kinds import AlertAct
+from service.kinds import AlertActivity
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables.alerts import AlertRecord
@@ -38,7 +38,9 @@ def silence_alert(
     _check(until, datetime.now(UTC), settings.silence_max_days)
     record.silenced_until = until
     record.silence_reason, record.silenced_by = reason, by or "someone"
-    note_act(session, record, AlertAct.SILENCED, record.silenced_by, until=until, note=reason)
+    note_on_alert(
+        session, record, AlertActivity.SILENCED, record.silenced_by, until=until, note=reason
+    )
     return record
 
 
@@ -50,7 +52,7 @@ def end_silences(session: Session) -> None:
 
 def _lift(session: Session, record: AlertRecord, by: str | None, reason: str | None) -> None:
     record.silenced_until = record.silence_reason = record.silenced_by = None
-    note_act(session, record, AlertAct.SILENCE_ENDED, by, note=reason)
+    note_on_alert(session, record, AlertActivity.SILENCE_ENDED, by, note=reason)
 
 
 def _check(until: datetime, now: datetime, most_days: float) -> None:

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
 from service.alerting.alerts import end_alert, open_alert
-from service.kinds import AlertAct, AlertKind, AlertSource, Outcome, Severity
+from service.kinds import AlertActivity, AlertKind, AlertSource, Outcome, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras
@@ -75,7 +75,7 @@ class StaleWatch:
                     reasons=(reason,),
                     source=AlertSource.UPKEEP,
                 )
-                found[camera.id] = AlertAct.OPENED
+                found[camera.id] = AlertActivity.OPENED
         return found
 
     def _watched(self, camera_id: str, track_pk: int, now_s: float) -> _Waiting:

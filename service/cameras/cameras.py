@@ -17,7 +17,7 @@ from service.errors import (
     TooManyCamerasError,
 )
 from service.job_queue import JobQueue
-from service.kinds import Act, AlertState, Origin, Outcome
+from service.kinds import Activity, AlertState, Origin, Outcome
 from service.settings import Settings
 from service.store import cameras, references, trainings
 from service.store.alerts import AlertFilter
@@ -112,7 +112,7 @@ def register_camera(
     add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
     begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
     queue_training(session, queue, settings, camera_id)
-    note(session, Act.CAMERA_REGISTERED, by=None, camera_id=camera_id)
+    note(session, Activity.CAMERA_REGISTERED, by=None, camera_id=camera_id)
     return view_camera(session, camera_id)
 
 
@@ -176,7 +176,7 @@ def change_camera(
             session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
         )
     fields = [field for field in change.__slots__ if getattr(change, field) is not None]
-    note(session, Act.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
+    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
     session.flush()
     return view_camera(session, camera_id)
 
@@ -195,7 +195,7 @@ def remove_camera(session: Session, camera_id: str, etag: str) -> None:
     ):
         end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
     details = {"name": view.record.name}
-    note(session, Act.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
+    note(session, Activity.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
     session.delete(view.record)
 
 

@@ -3,6 +3,8 @@
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
 
+from dataclasses import dataclass
+
 from sqlalchemy.orm import Session
 
 from service.access.activity import note as note_activity
@@ -11,7 +13,7 @@ from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.poses import PoseView, view_pose
 from service.errors import ConflictError
 from service.job_queue import JobQueue
-from service.kinds import Act, AlertState, Answer, Origin, Outcome
+from service.kinds import Activity, AlertState, Answer, Origin, Outcome
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables.alerts import AlertRecord
@@ -20,13 +22,17 @@ from service.windows.references import begin_reference, keep_answer
 from service.windows.requests import request_estimate
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """What a person decides of a camera: who, if they say so, and why."""
+
+    camera_id: str
+    by: str | None
+    note: str | None = None
+
+
 def accept_pose(
-    session: Session,
-    queue: JobQueue,
-    settings: Settings,
-    camera_id: str,
-    by: str | None,
-    note: str | None = None,
+    session: Session, queue: JobQueue, settings: Settings, decision: Decision
 ) -> PoseView:
     """Make the served pose the new prior pose, close its alerts and begin a new reference.
 
@@ -34,56 +40,63 @@ def accept_pose(
         NotFoundError: there is no such camera.
         ConflictError: no pose has been estimated yet.
     """
-    view = view_pose(session, settings, camera_id)
-    if not view.told:
+    view = view_pose(session, settings, decision.camera_id)
+    if not view.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
-    close_pose_alerts(session, camera_id, Outcome.ACCEPTED, by, note)
-    note_activity(session, Act.POSE_ACCEPTED, by=by, camera_id=camera_id, text=note)
-    from_s = tracks.newest_end_s(session, camera_id)
-    renew_prior_pose(
-        session, queue, settings, camera_id, view.pose, Origin.ACCEPTED, from_s=from_s, by=by
+    close_pose_alerts(session, decision.camera_id, Outcome.ACCEPTED, decision.by, decision.note)
+    note_activity(
+        session,
+        Activity.POSE_ACCEPTED,
+        by=decision.by,
+        camera_id=decision.camera_id,
+        text=decision.note,
     )
-    return view_pose(session, settings, camera_id)
+    from_s = tracks.newest_end_s(session, decision.camera_id)
+    renew_prior_pose(
+        session,
+        queue,
+        settings,
+        decision.camera_id,
+        view.pose,
+        Origin.ACCEPTED,
+        from_s=from_s,
+        by=decision.by,
+    )
+    return view_pose(session, settings, decision.camera_id)
 
 
-def put_back(
-    session: Session,
-    queue: JobQueue,
-    settings: Settings,
-    camera_id: str,
-    by: str | None,
-    note: str | None = None,
-) -> PoseView:
+def put_back(session: Session, queue: JobQueue, settings: Settings, decision: Decision) -> PoseView:
     """Take a person's word that the camera is back at its prior pose; what was learned there holds.
 
     Raises:
         NotFoundError: there is no such camera.
     """
-    require_camera(session, camera_id)
-    _answer(session, queue, camera_id, Answer.PUT_BACK, by, note)
-    return view_pose(session, settings, camera_id)
+    require_camera(session, decision.camera_id)
+    _answer(session, queue, decision, Answer.PUT_BACK)
+    return view_pose(session, settings, decision.camera_id)
 
 
 def learn_anew(
-    session: Session,
-    queue: JobQueue,
-    settings: Settings,
-    camera_id: str,
-    by: str | None,
-    note: str | None = None,
+    session: Session, queue: JobQueue, settings: Settings, decision: Decision
 ) -> PoseView:
     """Take a person's word that the camera is at its prior pose, and learn it anew there.
 
     Raises:
         NotFoundError: there is no such camera.
     """
-    require_camera(session, camera_id)
-    close_pose_alerts(session, camera_id, Outcome.PUT_BACK, by, note)
-    note_activity(session, Act.REFERENCE_RESET, by=by, camera_id=camera_id, text=note)
-    from_s = tracks.newest_end_s(session, camera_id)
-    begin_reference(session, camera_id, Origin.RESET, from_s=from_s, by=by)
-    request_estimate(session, queue, camera_id)
-    return view_pose(session, settings, camera_id)
+    require_camera(session, decision.camera_id)
+    close_pose_alerts(session, decision.camera_id, Outcome.PUT_BACK, decision.by, decision.note)
+    note_activity(
+        session,
+        Activity.REFERENCE_RESET,
+        by=decision.by,
+        camera_id=decision.camera_id,
+        text=decision.note,
+    )
+    from_s = tracks.newest_end_s(session, decision.camera_id)
+    begin_reference(session, decision.camera_id, Origin.RESET, from_s=from_s, by=decision.by)
+    request_estimate(session, queue, decision.camera_id)
+    return view_pose(session, settings, decision.camera_id)
 
 
 def resolve_alert(
@@ -122,23 +135,19 @@ def _resolve(
 ) -> None:
     if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
         close_alert(session, record, Outcome(answer), note, by)
-    elif answer == Answer.ACCEPTED:
-        accept_pose(session, queue, settings, record.camera_id, by, note)
+        return
+    decision = Decision(camera_id=record.camera_id, by=by, note=note)
+    if answer == Answer.ACCEPTED:
+        accept_pose(session, queue, settings, decision)
     else:
-        _answer(session, queue, record.camera_id, answer, by, note)
+        _answer(session, queue, decision, answer)
 
 
-def _answer(
-    session: Session,
-    queue: JobQueue,
-    camera_id: str,
-    answer: Answer,
-    by: str | None,
-    note: str | None,
-) -> None:
+def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answer) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
+    camera_id, by, note = decision.camera_id, decision.by, decision.note
     close_pose_alerts(session, camera_id, Outcome(answer), by, note)
-    act = Act.POSE_PUT_BACK if answer == Answer.PUT_BACK else Act.POSE_FALSE_ALARM
-    note_activity(session, act, by=by, camera_id=camera_id, text=note)
+    what = Activity.POSE_PUT_BACK if answer == Answer.PUT_BACK else Activity.POSE_FALSE_ALARM
+    note_activity(session, what, by=by, camera_id=camera_id, text=note)
     keep_answer(session, camera_id, answer, by)
     request_estimate(session, queue, camera_id)

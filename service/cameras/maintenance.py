@@ -12,7 +12,7 @@ from service.cameras.cameras import require_camera
 from service.delivery.outbox import json_time
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
-from service.kinds import Act
+from service.kinds import Activity
 from service.settings import Settings
 from service.store import alerts, maintenance
 from service.store.tables.attendance import MaintenanceRecord
@@ -65,7 +65,7 @@ def open_window(
     )
     session.add(record)
     session.flush()
-    _note(session, Act.MAINTENANCE_PLANNED, record, by)
+    _note(session, Activity.MAINTENANCE_PLANNED, record, by)
     open_ = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
     if from_at <= now and not open_:
         forget_streak(session, camera_id)  # an open alert ends by its own rules
@@ -105,7 +105,7 @@ def change_window(
         record.ended_at = to_at if to_at <= now else None
     record.from_at, record.to_at, record.updated_at = from_at, to_at, now
     record.reason = record.reason if change.reason is None else change.reason
-    _note(session, Act.MAINTENANCE_CHANGED, record, None)
+    _note(session, Activity.MAINTENANCE_CHANGED, record, None)
     session.flush()
     request_estimate(session, queue, camera_id)
     return record
@@ -123,10 +123,10 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
     if record.until <= now:
         raise ConflictError(f"to: the window ended at {record.until.isoformat()} already")
     if record.from_at >= now:
-        _note(session, Act.MAINTENANCE_WITHDRAWN, record, None)
+        _note(session, Activity.MAINTENANCE_WITHDRAWN, record, None)
         session.delete(record)
     else:
-        _note(session, Act.MAINTENANCE_ENDED, record, None)
+        _note(session, Activity.MAINTENANCE_ENDED, record, None)
         record.ended_at = record.updated_at = now
     session.flush()
     request_estimate(session, queue, camera_id)
@@ -137,15 +137,15 @@ def note_ends(session: Session, camera_id: str, now: datetime) -> bool:
     over = maintenance.just_over(session, camera_id, now)
     for record in over:
         record.ended_at = record.to_at
-        _note(session, Act.MAINTENANCE_OVER, record, None)
+        _note(session, Activity.MAINTENANCE_OVER, record, None)
     return bool(over)
 
 
-def _note(session: Session, act: Act, record: MaintenanceRecord, by: str | None) -> None:
+def _note(session: Session, what: Activity, record: MaintenanceRecord, by: str | None) -> None:
     """Keep what was said of a window; its times as they are then."""
     note(
         session,
-        act,
+        what,
         by=by,
         camera_id=record.camera_id,
         subject_id=record.id,

@@ -59,9 +59,9 @@ class PoseView:
         return self.standing.estimate
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
-        return self.standing.told
+        return self.standing.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -94,9 +94,10 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     )
     model_id = None if model is None else model.id
     estimate_id = None if estimate is None else estimate.id
-    # All that the answers are made of, the lens of `pose.yaml` too.
-    lens = intrinsics_of(camera)
-    served = (standing.state.value, in_words(reasons), pose, estimate_id, reference, model_id, lens)
+    # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
+    # words round them.
+    why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
+    served = (standing.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
         standing=standing,

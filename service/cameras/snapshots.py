@@ -9,7 +9,7 @@ from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
 from service.formats.still import Still
-from service.kinds import Act
+from service.kinds import Activity
 from service.settings import Settings
 from service.store import snapshots
 from service.store.snapshots import SnapshotFacts
@@ -58,7 +58,7 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
             stored_at=now,
         ),
     )
-    note(session, Act.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
+    note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
     return SnapshotFacts(sha256=digest, width=still.width, height=still.height, stored_at=now)
 
 
@@ -86,7 +86,7 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     require_camera(session, camera_id)
     if not snapshots.remove(session, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
-    note(session, Act.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
+    note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 
 def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:

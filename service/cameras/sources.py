@@ -16,7 +16,7 @@ from service.alerting.alerts import end_alert, open_alert
 from service.cameras.cameras import require_camera
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.job_queue import JobQueue
-from service.kinds import Act, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
+from service.kinds import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references
@@ -132,7 +132,7 @@ def remove_source(session: Session, camera_id: str, name: str, by: str | None) -
     if references.newest(session, camera_id).source == name:
         raise ConflictError(f"source: {name!r} counts; say first which one is to count instead")
     sources.forget(session, record)
-    note(session, Act.SOURCE_REMOVED, by=by, camera_id=camera_id, text=name)
+    note(session, Activity.SOURCE_REMOVED, by=by, camera_id=camera_id, text=name)
 
 
 def watch_sources(
@@ -217,7 +217,7 @@ def _count(
         former.told_at = None  # should it come back, it is new again
     words = f"{record.name} instead of {last}"
     end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=f"now counts: {words}")
-    note(session, Act.SOURCE_USED, by=by, camera_id=camera_id, text=words)
+    note(session, Activity.SOURCE_USED, by=by, camera_id=camera_id, text=words)
     request_estimate(session, queue, camera_id)
 
 

@@ -1,7 +1,7 @@
 """How a camera stands: the one derivation that pages, API, metrics and lists of alerts share.
 
 While an alert that an estimate fired is open, the camera is taken for moved, whatever else is
-known of it, and the last pose that was told is served. Once a person has answered (it was put back,
+known of it, and the last identifiable pose is served. Once a person has answered (it was put back,
 it was a false alarm, its pose is accepted), nothing that was estimated before counts any more.
 """
 
@@ -17,7 +17,7 @@ from service.alerting.presence import is_no_data
 from service.delivery.outbox import is_silenced
 from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.settings import Settings
-from service.store import figures, fleet
+from service.store import fleet, metrics
 from service.store.alerts import POSE_KINDS
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.estimates import EstimateRecord
@@ -32,13 +32,13 @@ MOVED = (PoseState.DRIFTING, PoseState.OUT_OF_RANGE)
 class CameraFacts:
     """What is stored of a camera that its state follows from, at a moment.
 
-    `estimate` is the newest, `last_told` the newest that told anything. `silent` says that nobody
-    has been seen for longer than is usual.
+    `estimate` is the newest, `last_identifiable` the newest of which something is identifiable.
+    `silent` says that nobody has been seen for longer than is usual.
     """
 
     reference: SiteReferenceRecord
     estimate: EstimateRecord | None
-    last_told: EstimateRecord | None
+    last_identifiable: EstimateRecord | None
     attended: Attendance
     firing: Sequence[AlertRecord]
     last_track_s: float | None
@@ -49,9 +49,10 @@ class CameraFacts:
 class Standing:
     """How a camera stands. `alerts` are all that fire, what needs a person most first.
 
-    `estimate` is what is served, and may tell nothing; None where the prior pose is. It is `judged`
-    where it says how the camera stands now, against its reference; else it is the last that is
-    known, or of a reference that is being learned. `cause` is what is waited after until then.
+    `estimate` is what is served, maybe nothing identifiable; None where the prior pose is. It is
+    `judged` where it says how the camera stands now, against its reference; else it is the last
+    that is known, or of a reference that is being learned. `cause` is what is waited after until
+    then.
     """
 
     camera_id: str
@@ -67,9 +68,9 @@ class Standing:
     silent: bool
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
-        return () if self.estimate is None else tuple(self.estimate.told)
+        return () if self.estimate is None else tuple(self.estimate.identifiable)
 
 
 def standings(
@@ -77,27 +78,27 @@ def standings(
 ) -> dict[str, Standing]:
     """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
     now = datetime.now(UTC)
-    references = figures.newest_references(session, ids)
-    newest = figures.newest_estimates(session, ids)
-    ended_s = figures.last_tracks_s(session, ids)
+    references = metrics.newest_references(session, ids)
+    newest = metrics.newest_estimates(session, ids)
+    ended_s = metrics.last_tracks_s(session, ids)
     windows = fleet.maintenance_windows(session, ids)
     rhythms = fleet.rhythm_profiles(session, ids)
     firing: dict[str, list[AlertRecord]] = defaultdict(list)
     for alert in fleet.firing(session, ids):
         firing[str(alert.camera_id)].append(alert)
     held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
-    untold = [i for i in held if i in newest and not newest[i].told]
-    told_before = figures.newest_told_estimates(session, untold) if untold else {}
+    without = [i for i in held if i in newest and not newest[i].identifiable]
+    before = metrics.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, last_s in ended_s.items():
         known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
-        last_told = newest.get(camera_id)
-        if camera_id in untold:
-            last_told = told_before.get(camera_id)
+        last_identifiable = newest.get(camera_id)
+        if camera_id in without:
+            last_identifiable = before.get(camera_id)
         facts = CameraFacts(
             reference=references[camera_id],
             estimate=newest.get(camera_id),
-            last_told=last_told,
+            last_identifiable=last_identifiable,
             attended=attendance_by(windows[camera_id], now),
             firing=firing[camera_id],
             last_track_s=last_s,
@@ -117,7 +118,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
     holding = _holds(alerts)
     state: PoseState
     if holding:
-        estimate = estimate if judged else facts.last_told
+        estimate = estimate if judged else facts.last_identifiable
         drifts = any(alert.kind != AlertKind.OUT_OF_RANGE for alert in holding)
         state = PoseState.DRIFTING if drifts else PoseState.OUT_OF_RANGE
         if estimate is not None and estimate.state in MOVED:

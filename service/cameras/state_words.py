@@ -29,8 +29,8 @@ def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reas
     if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
         found += estimate.reasons
     elif standing.state in MOVED:
-        if estimate is not None and estimate.told:
-            found += [Reason(code=ServiceCode.LAST_TOLD), *estimate.reasons]
+        if estimate is not None and estimate.identifiable:
+            found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
         else:
             found += _of_alerts(standing)
     if not standing.judged:

@@ -109,12 +109,12 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
     """An alert as clients see it."""
     values = {name: getattr(record, name) for name in ALERT_FIELDS}
     values["drift"] = in_degrees(record.drift)
-    told = {
+    body = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
     flags = (record.acknowledged_at is not None, is_silenced(record, datetime.now(UTC)))
-    return {**told, **dict(zip(ALERT_FLAGS, flags, strict=True))}
+    return {**body, **dict(zip(ALERT_FLAGS, flags, strict=True))}
 
 
 def is_silenced(record: AlertRecord, now: datetime) -> bool:

@@ -15,7 +15,7 @@ from service.delivery.outbox import add_delivery, wake
 from service.delivery.signing import new_secret
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
-from service.kinds import Act, AlertKind, DeliveryState, MessageType, WebhookFormat
+from service.kinds import Activity, AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.settings import Settings
 from service.store import webhooks
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
@@ -91,7 +91,7 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
     )
     session.add(record)
     session.flush()
-    _note(session, Act.WEBHOOK_ADDED, record)
+    _note(session, Activity.WEBHOOK_ADDED, record)
     return SecretMade(record=record, secret=secret)
 
 
@@ -127,7 +127,7 @@ def change_webhook(
     for name, value in changes.items():
         setattr(record, name, value)
     record.updated_at = now
-    _note(session, Act.WEBHOOK_CHANGED, record, sorted(changes))
+    _note(session, Activity.WEBHOOK_CHANGED, record, sorted(changes))
     if changes.get("enabled") is False:
         record.disabled_reason = _BY_A_PERSON
     elif changes.get("enabled") or "url" in changes:
@@ -154,7 +154,7 @@ def rotate_secret(session: Session, settings: Settings, webhook_id: str) -> Secr
     record.old_secret, record.old_secret_until = record.secret, now + OLD_SECRET_STAYS
     secret = new_secret()
     record.secret, record.updated_at = sealed_secret(settings, webhook_id, secret), now
-    _note(session, Act.WEBHOOK_SECRET_CHANGED, record)
+    _note(session, Activity.WEBHOOK_SECRET_CHANGED, record)
     return SecretMade(record=record, secret=secret)
 
 
@@ -165,7 +165,7 @@ def remove_webhook(session: Session, webhook_id: str) -> None:
         NotFoundError: there is none of that id.
     """
     record = _require(session, webhook_id)
-    _note(session, Act.WEBHOOK_REMOVED, record)
+    _note(session, Activity.WEBHOOK_REMOVED, record)
     session.delete(record)
 
 
@@ -180,7 +180,7 @@ def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
     data = {"webhook_id": record.id, "name": record.name, "text": "This is a test of surefoot."}
     record.held_until = None
     delivery = add_delivery(session, record, MessageType.TEST, data, datetime.now(UTC))
-    _note(session, Act.WEBHOOK_TESTED, record)
+    _note(session, Activity.WEBHOOK_TESTED, record)
     session.flush()
     return DeliveryView(record=delivery, attempts=())
 
@@ -228,15 +228,17 @@ def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> Deli
     record.state, record.tries, record.finished_at = DeliveryState.PENDING, 0, None
     record.next_attempt_at = record.queued_at = now
     webhook.held_until = None
-    _note(session, Act.WEBHOOK_REPLAYED, webhook)
+    _note(session, Activity.WEBHOOK_REPLAYED, webhook)
     wake(session, queue, webhook, now)
     return view
 
 
-def _note(session: Session, act: Act, record: WebhookRecord, fields: Sequence[str] = ()) -> None:
+def _note(
+    session: Session, what: Activity, record: WebhookRecord, fields: Sequence[str] = ()
+) -> None:
     """Keep what was done with a webhook; its URL may be a secret, so its name says which."""
     details = {"name": record.name, **({"fields": list(fields)} if fields else {})}
-    note(session, act, by=None, subject_id=record.id, details=details)
+    note(session, what, by=None, subject_id=record.id, details=details)
 
 
 def _require(session: Session, webhook_id: str) -> WebhookRecord:

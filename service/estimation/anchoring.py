@@ -142,7 +142,9 @@ def compute_anchor_days(days: AnchorDays) -> bytes | None:
     """The log with some days more, as bytes."""
     first = first_site(
         CameraSite(
-            intrinsics=days.intrinsics, prior=days.prior, speeds=reference_from_bytes(days.site)
+            intrinsics=days.intrinsics,
+            prior=days.prior,
+            speed_reference=reference_from_bytes(days.site),
         ),
         days.anchor,
     )
@@ -173,7 +175,7 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     return CameraSite(
         intrinsics=site.intrinsics,
         prior=site.prior,
-        speeds=site.speeds,
+        speed_reference=site.speed_reference,
         flow=flow_from_bytes(anchor.flow),
         chart=chart_from_bytes(anchor.chart),
     )

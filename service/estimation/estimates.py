@@ -15,7 +15,7 @@ from models.drift.verdict import (
     judge,
     pose_after,
 )
-from models.estimation.numbers import NUMBERS
+from models.estimation.parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
 from models.reasons import Reason
 from models.recalibration import drift_of
@@ -29,7 +29,7 @@ from service.reasons import ServiceCode, some
 from service.settings import Settings
 from service.store import cameras, estimates, references
 from service.store.operation import events
-from service.store.packing import told_drift
+from service.store.packing import identifiable_drift
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.training.ranges import beyond_range, train_around
@@ -66,7 +66,7 @@ def save_estimate(
         "camera_id": record.camera_id,
         "state": record.state,
         "tracks": record.tracks,
-        "drift": in_degrees(told_drift(drift)) if record.told else None,
+        "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
     }
     events.add(session, EventType.POSE, payload, record.created_at)
     return record
@@ -96,7 +96,7 @@ def _judge(
     if firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
         # An alert of before this reference stands until what is seen after it ends it.
         before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
-        drifted = NUMBERS if before is None else tuple(before.drifted) or NUMBERS
+        drifted = PLANE_PARAMETERS if before is None else tuple(before.drifted) or PLANE_PARAMETERS
     if last is not None:
         since = last.drift_since
     limits = drift_limits(settings)
@@ -111,8 +111,8 @@ def _judge(
     verdict = judge(drift, limits, drifted, reading, earlier, creep)
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
-    edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.told)
-    record.state = PoseState.OK if drift.told else PoseState.LEARNING
+    edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.identifiable)
+    record.state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     if verdict.drifting:
         record.state = PoseState.DRIFTING
     training = None
@@ -129,12 +129,12 @@ def _judge(
         training,
         None if finding.reading is None else reason_of_reading(finding.reading),
         finding.fused.reason,
-        None if set(NUMBERS) <= set(drift.told) else finding.joint.reason,
+        None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
         *finding.lacks,
     )
     charted = reading is not None and reading.moved
-    if charted and clock is None and reading is not None and reading.number == CLOCK:
+    if charted and clock is None and reading is not None and reading.parameter == CLOCK:
         clock = reason_of_reading(reading)
     charted = charted or (creep is not None and creep.moved)
     _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
@@ -154,7 +154,7 @@ def _alert(
     """Open, update or end the alerts that an estimate stands behind."""
     camera_id = record.camera_id
     firing = fired_by_estimate(session, camera_id)
-    body = told_drift(drift)
+    body = identifiable_drift(drift)
     severity = Severity.CRITICAL if verdict.excess >= 2 else Severity.WARNING
     since = record.drift_since
     if edge is not None:
@@ -173,7 +173,7 @@ def _alert(
         kind, other = other, kind
     if other in firing:
         end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
-    if drift.told or charted:
+    if drift.identifiable or charted:
         reasons = record.reasons if clock is None else (clock,)
         open_alert(session, settings, camera_id, kind, severity, body, since, reasons=reasons)
 
@@ -216,7 +216,7 @@ def _record(
         model_id=evidence.model_id,
         prior_pose_id=reference.prior_pose_id,
         reference_id=reference.id,
-        told=[] if learning else list(drift.told),
+        identifiable=[] if learning else list(drift.identifiable),
         pose=PoseParameters.of_pose(pose),
         pose_sd=drift.sd,
         drift_by=drift.by,

@@ -222,7 +222,7 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
     """
     if evidence.site is None:
         return assume_site(observed, evidence.intrinsics, evidence.prior, evidence.walk)
-    speeds = reference_from_bytes(evidence.site)
+    speed_reference = reference_from_bytes(evidence.site)
     flow, chart = None, None
     if evidence.flow is not None:
         flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
@@ -231,7 +231,7 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
     return CameraSite(
         intrinsics=evidence.intrinsics,
         prior=evidence.prior,
-        speeds=speeds,
+        speed_reference=speed_reference,
         flow=flow,
         chart=chart,
     )
@@ -245,7 +245,7 @@ def _read(
         alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
-        calm_parties=evidence.limits.people,
+        calm_groups=evidence.limits.people,
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
     return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)

@@ -124,7 +124,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         period.intrinsics,
         period.prior,
         seed=seed,
-        speeds=reference_from_bytes(period.site),
+        speed_reference=reference_from_bytes(period.site),
         weights=weights,
     )
     return paths_of(grown)
@@ -178,7 +178,7 @@ def _in_doubt(
 ) -> bool:
     """Whether the camera may have moved by now, or people walk elsewhere than they did."""
     last = estimates.newest(session, reference.camera_id)
-    if last is None or not made_against(reference, last) or not last.told:
+    if last is None or not made_against(reference, last) or not last.identifiable:
         return True
     if is_outdated(last, window_of(session, reference, settings)):
         return True  # somebody was at the camera, and nobody knows yet how it stands since
@@ -211,7 +211,7 @@ def _is_explained(
 def _is_spoilt(
     kept: FlowMapRecord, reference_to_s: float, past: tuple[Doubt, ...], attended: Attendance
 ) -> bool:
-    if attended.told_late(kept.learned_at, kept.to_s):
+    if attended.announced_late(kept.learned_at, kept.to_s):
         return True
     return kept.to_s > reference_to_s and any(
         doubt.excluded and doubt.from_s <= kept.to_s and doubt.resolved_at > kept.learned_at

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.packing import reference_to_bytes
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
@@ -20,7 +20,7 @@ from service.alerting.alerts import open_alert
 from service.estimation.anchoring import anchor_by
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
-from service.kinds import Act, AlertKind, AlertSource, Severity
+from service.kinds import Activity, AlertKind, AlertSource, Severity
 from service.reasons import some
 from service.settings import Settings
 from service.store import cameras, maintenance, references
@@ -55,7 +55,7 @@ class ReferencePeriod:
 class LearnedReference:
     """What a reference has come to; `paths` are None where too few people walk."""
 
-    site: SiteReference
+    site: SpeedReference
     paths: LearnedPaths | None
 
 
@@ -94,7 +94,7 @@ def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | 
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    return LearnedReference(site=site.speeds, paths=paths_of(site))
+    return LearnedReference(site=site.speed_reference, paths=paths_of(site))
 
 
 def save_reference(
@@ -122,7 +122,7 @@ def save_reference(
     record.doubts = some(site.doubt)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
-    note(session, Act.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
+    note(session, Activity.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
     session.add(
         FlowMapRecord(
             reference_id=record.id,

@@ -16,7 +16,7 @@ class LearnedPaths:
 
 
 def paths_of(site: CameraSite) -> LearnedPaths | None:
-    """The map and the chart of a site; None where too few parties walk."""
+    """The map and the chart of a site; None where too few walking groups walk."""
     if site.flow is None:
         return None
     return LearnedPaths(

@@ -19,7 +19,6 @@ MAX_BYTES = 1024 * 1024
 MAX_DEPTH = 32  # brackets or tags in each other; OpenCV itself writes 4
 MAX_INDENT = 200  # columns, by which YAML nests, too
 MAX_SECONDS = 10.0
-MAX_ANSWER_BYTES = 64 * 1024
 _AT_ONCE = 2
 _READER = "service.formats.calibration_reader"
 

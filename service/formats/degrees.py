@@ -14,10 +14,10 @@ def degrees(radians: float) -> float:
 
 def in_degrees(body: Mapping[str, Any]) -> dict[str, Any]:
     """A body whose fields `*_rad` are `*_deg`, in bodies within it too; the rest as it is."""
-    return dict(_told(name, value) for name, value in body.items())
+    return dict(_as_read(name, value) for name, value in body.items())
 
 
-def _told(name: str, value: Any) -> tuple[str, Any]:
+def _as_read(name: str, value: Any) -> tuple[str, Any]:
     if isinstance(value, Mapping):
         return name, in_degrees(value)
     if name.endswith(_RAD):

@@ -62,7 +62,7 @@ CallerDep = Annotated[Caller | None, Depends(get_caller)]
 
 
 def get_actor(caller: CallerDep) -> Actor | None:
-    """In whose name an act is kept, whatever name its body says."""
+    """In whose name an activity is kept, whatever name its body says."""
     return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
 
 

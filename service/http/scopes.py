@@ -49,7 +49,7 @@ _GET: dict[Need, tuple[str, ...]] = {
         "/webhooks/{webhook_id}/deliveries",
     ),
 }
-_ACTS: dict[Need, tuple[str, ...]] = {
+_ENDPOINTS: dict[Need, tuple[str, ...]] = {
     None: ("POST /ui/login",),
     TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),
     TokenScope.READ: ("POST /ui/logout",),
@@ -92,7 +92,11 @@ _ACTS: dict[Need, tuple[str, ...]] = {
 }
 NEEDS: dict[tuple[str, str], Need] = {
     **{("GET", path): need for need, paths in _GET.items() for path in paths},
-    **{(act.split()[0], act.split()[1]): need for need, acts in _ACTS.items() for act in acts},
+    **{
+        (each.split()[0], each.split()[1]): need
+        for need, some in _ENDPOINTS.items()
+        for each in some
+    },
 }
 _PATTERNS = [(method, compile_path(path)[0], path, need) for (method, path), need in NEEDS.items()]
 # A path without parameters is only what it says, before those that fit it, too.

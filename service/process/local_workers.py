@@ -24,7 +24,7 @@ _TICK_S = 0.2
 _START_S = 120.0  # until its first sign of life: on a busy machine its imports take a while
 _SETTLED_S = 60.0  # who lives for so long did not die of how it starts
 _LONGEST_PAUSE_S = 60.0
-_TOLD_FROM = 3  # deaths in a row
+_REPORTED_FROM = 3  # deaths in a row
 # Matrices of estimates are small: on more threads OpenBLAS spins rather than works.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -83,7 +83,7 @@ class LocalWorkers:
         self._say(name, None)
         while not self._stopping.is_set():
             begun_s = time.monotonic()
-            status = self._run(name, told=deaths >= _TOLD_FROM)
+            status = self._run(name, reported=deaths >= _REPORTED_FROM)
             if self._stopping.is_set():
                 return
             if status == exits.REFUSED:
@@ -96,13 +96,13 @@ class LocalWorkers:
             words = exits.words_of(status)
             fields = {"worker": name, "status": status, "why": words, "again_in_s": rest_s}
             log.warning("worker_ended", extra=fields)
-            if deaths >= _TOLD_FROM:
+            if deaths >= _REPORTED_FROM:
                 self._say(
                     name, f"died {deaths} times in a row: {words}; started every {rest_s:g} s"
                 )
             self._stopping.wait(rest_s)
 
-    def _run(self, name: str, *, told: bool) -> int:
+    def _run(self, name: str, *, reported: bool) -> int:
         """Run a worker until it ends, hangs or is to end; returns its exit status."""
         with subprocess.Popen(
             [sys.executable, "-m", "service.cli", "worker", "--name", name, "--follow-stdin"],
@@ -119,9 +119,9 @@ class LocalWorkers:
                     log.error("worker_hangs", extra=fields)
                     process.kill()
                     process.wait()
-                if told and time.monotonic() - begun_s > _SETTLED_S:
+                if reported and time.monotonic() - begun_s > _SETTLED_S:
                     self._say(name, None)
-                    told = False
+                    reported = False
             if process.poll() is None:
                 process.terminate()
                 try:

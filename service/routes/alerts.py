@@ -84,4 +84,4 @@ def resolve(
 
 
 def _with_acts(session: Session, record: AlertRecord) -> AlertDetail:
-    return AlertDetail.from_records(record, alerts.acts_of(session, record.id))
+    return AlertDetail.from_records(record, alerts.activity_of_alert(session, record.id))

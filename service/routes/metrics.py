@@ -6,8 +6,8 @@ from fastapi import APIRouter, Header, Response
 from prometheus_client.exposition import choose_encoder
 
 from service.http.dependencies import ReadDep, StateDep
-from service.schemas.metrics import FiguresCollector
-from service.views.metrics import load_figures
+from service.schemas.metrics import MetricsCollector
+from service.views.metrics import load_metrics
 
 router = APIRouter(tags=["operation"])
 
@@ -18,8 +18,8 @@ _FORMATS = dict.fromkeys(
 
 @router.get("/metrics", response_class=Response, responses={200: {"content": _FORMATS}})
 def metrics(state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = "") -> Response:
-    """The figures now, as Prometheus text or OpenMetrics."""
+    """The metrics now, as Prometheus text or OpenMetrics."""
     encode, media_type = choose_encoder(accept)
-    figures = load_figures(session, state.settings)
-    text = encode(FiguresCollector(figures, state.instruments.registry))
+    found = load_metrics(session, state.settings)
+    text = encode(MetricsCollector(found, state.instruments.registry))
     return Response(text, media_type=media_type)

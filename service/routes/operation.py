@@ -23,7 +23,7 @@ def ready(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
     readiness = operation.check_readiness(state.store, state.settings)
     if not readiness.ready:
         response.status_code = 503
-    told = ReadyOut.from_value(readiness)
+    body = ReadyOut.from_value(readiness)
     if auth_on(state.settings) and caller is None:
-        told.problems = []  # they name cameras and files
-    return told
+        body.problems = []  # they name cameras and files
+    return body

@@ -90,9 +90,9 @@ def accept(
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
     said = body or AcceptBody()
-    by = name_of(actor, said.by)
+    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
     return ServedPoseOut.from_value(
-        decisions.accept_pose(session, state.queue, state.settings, camera_id, by, said.note)
+        decisions.accept_pose(session, state.queue, state.settings, decision)
     )
 
 
@@ -106,9 +106,9 @@ def put_back(
 ) -> ServedPoseOut:
     """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
     said = body or PutBackBody()
-    by = name_of(actor, said.by)
+    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
     return ServedPoseOut.from_value(
-        decisions.put_back(session, state.queue, state.settings, camera_id, by, said.note)
+        decisions.put_back(session, state.queue, state.settings, decision)
     )
 
 
@@ -122,7 +122,7 @@ def reset(
 ) -> ServedPoseOut:
     """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
     said = body or ResetBody()
-    by = name_of(actor, said.by)
+    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
     return ServedPoseOut.from_value(
-        decisions.learn_anew(session, state.queue, state.settings, camera_id, by, said.note)
+        decisions.learn_anew(session, state.queue, state.settings, decision)
     )

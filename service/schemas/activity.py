@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from service.kinds import Act, AlertKind, Outcome
+from service.kinds import Activity, AlertKind, Outcome
 
 
 class EntryOut(BaseModel):
@@ -15,7 +15,7 @@ class EntryOut(BaseModel):
 
     id: int
     at: datetime
-    what: Act
+    what: Activity
     by: str | None
     via: str | None
     camera_id: str | None

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from service.delivery.outbox import is_silenced
 from service.formats.degrees import in_degrees
-from service.kinds import AlertAct, AlertKind, AlertState, Answer, Outcome, Severity
+from service.kinds import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.schemas.base import Body, Moment, Who
 from service.schemas.reasons import ReasonCode, ReasonValues
 from service.store.tables.activity import ActivityRecord
@@ -90,7 +90,7 @@ class ActOut(BaseModel):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: AlertAct
+    act: AlertActivity
     by: str | None
     until: datetime | None
     outcome: Outcome | None

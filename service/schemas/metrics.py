@@ -14,33 +14,33 @@ from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily
 from prometheus_client.registry import Collector
 
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from service.kinds import AlertKind, PoseState, Severity, TrainingState
-from service.views.metrics import Figures
+from service.views.metrics import Metrics
 
 
-class FiguresCollector(Collector):
-    """The figures of a moment and what others collect, as metrics."""
+class MetricsCollector(Collector):
+    """The metrics of a moment and what others collect, as metrics."""
 
-    def __init__(self, figures: Figures, *others: Collector) -> None:
-        self._figures = figures
+    def __init__(self, metrics: Metrics, *others: Collector) -> None:
+        self._metrics = metrics
         self._others = others
 
     def collect(self) -> Iterator[Metric]:
         """All metrics."""
         yield InfoMetricFamily("surefoot_build", "Version.", value={"version": version("surefoot")})
-        yield from _of_cameras(self._figures)
-        yield from _of_looks(self._figures)
-        yield from _of_alerts(self._figures)
-        yield from _of_webhooks(self._figures)
-        yield from _of_service(self._figures)
+        yield from _of_cameras(self._metrics)
+        yield from _of_looks(self._metrics)
+        yield from _of_alerts(self._metrics)
+        yield from _of_webhooks(self._metrics)
+        yield from _of_service(self._metrics)
         for other in self._others:
             yield from other.collect()
 
 
-def _of_cameras(figures: Figures) -> Iterator[Metric]:
-    count = Counter(camera.state for camera in figures.cameras)
-    drifts = [(c.camera_id, c.drift) for c in figures.cameras if c.drift is not None]
+def _of_cameras(metrics: Metrics) -> Iterator[Metric]:
+    count = Counter(camera.state for camera in metrics.cameras)
+    drifts = [(c.camera_id, c.drift) for c in metrics.cameras if c.drift is not None]
     yield _gauge(
         "surefoot_cameras", "Cameras by state.", ["state"], {(s,): count[s] for s in PoseState}
     )
@@ -48,48 +48,48 @@ def _of_cameras(figures: Figures) -> Iterator[Metric]:
         "surefoot_camera_state",
         "1 for the state that a camera is in.",
         ["camera_id", "state"],
-        {(c.camera_id, state): c.state == state for c in figures.cameras for state in PoseState},
+        {(c.camera_id, state): c.state == state for c in metrics.cameras for state in PoseState},
     )
     yield _gauge(
         "surefoot_camera_last_track_timestamp_seconds",
         "When the newest track of a camera ended, by the tracks' own clock.",
         ["camera_id"],
-        {(c.camera_id,): c.last_track_s for c in figures.cameras if c.last_track_s is not None},
+        {(c.camera_id,): c.last_track_s for c in metrics.cameras if c.last_track_s is not None},
     )
     yield _gauge(
         "surefoot_camera_drift_radians",
-        "Drift of tilt, roll or heading against the prior pose, where it is told.",
+        "Drift of tilt, roll or heading against the prior pose, where it is identifiable.",
         ["camera_id", "number"],
-        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.told},
+        {(i, n): drift.by.of(n) for i, drift in drifts for n in ANGLES if n in drift.identifiable},
     )
     yield _gauge(
         "surefoot_camera_drift_height_meters",
-        "Drift of the height against the prior pose, where it is told.",
+        "Drift of the height against the prior pose, where it is identifiable.",
         ["camera_id"],
-        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.told},
+        {(i,): drift.by.height_m for i, drift in drifts if "height" in drift.identifiable},
     )
 
 
-def _of_looks(figures: Figures) -> Iterator[Metric]:
+def _of_looks(metrics: Metrics) -> Iterator[Metric]:
     yield _gauge(
         "surefoot_camera_oldest_unseen_track_seconds",
         "Age of a camera's oldest track that nothing has looked at; 0: there is none.",
         ["camera_id"],
-        {(c.camera_id,): figures.unseen_s.get(c.camera_id, 0.0) for c in figures.cameras},
+        {(c.camera_id,): metrics.unseen_s.get(c.camera_id, 0.0) for c in metrics.cameras},
     )
     yield _gauge(
         "surefoot_camera_estimate_failing",
         "1 for a camera whose last look failed.",
         ["camera_id"],
-        {(c.camera_id,): c.camera_id in figures.failing for c in figures.cameras},
+        {(c.camera_id,): c.camera_id in metrics.failing for c in metrics.cameras},
     )
     failing = "Cameras whose last look failed."
-    yield GaugeMetricFamily("surefoot_cameras_failing", failing, value=len(figures.failing))
+    yield GaugeMetricFamily("surefoot_cameras_failing", failing, value=len(metrics.failing))
 
 
-def _of_alerts(figures: Figures) -> Iterator[Metric]:
+def _of_alerts(metrics: Metrics) -> Iterator[Metric]:
     zeros = dict.fromkeys(product(AlertKind, Severity), 0)
-    alone = [alert for alert in figures.alerts if not alert.grouped]
+    alone = [alert for alert in metrics.alerts if not alert.grouped]
     count = Counter((alert.kind, alert.severity) for alert in alone)
     yield _gauge(
         "surefoot_alerts_firing",
@@ -101,51 +101,51 @@ def _of_alerts(figures: Figures) -> Iterator[Metric]:
         (
             "firing",
             "1 for an alert that fires, silenced or not, in a group or not.",
-            figures.alerts,
+            metrics.alerts,
         ),
-        ("silenced", "is silenced.", [a for a in figures.alerts if a.silenced]),
-        ("grouped", "is in a group.", [a for a in figures.alerts if a.grouped]),
+        ("silenced", "is silenced.", [a for a in metrics.alerts if a.silenced]),
+        ("grouped", "is in a group.", [a for a in metrics.alerts if a.grouped]),
     ):
         words = text if name == "firing" else f"1 for an alert that fires and {text}"
         found = {(alert.camera_id, alert.kind): 1 for alert in chosen}
         yield _gauge(f"surefoot_alert_{name}", words, ["camera_id", "kind"], found)
 
 
-def _of_webhooks(figures: Figures) -> Iterator[Metric]:
+def _of_webhooks(metrics: Metrics) -> Iterator[Metric]:
     for name, text, field in (
         ("surefoot_webhook_enabled", "1 while messages are sent to a webhook.", "enabled"),
         ("surefoot_webhook_failing_seconds", "Since its last success; 0: fine.", "failing_s"),
         ("surefoot_deliveries_pending", "Messages that wait for a webhook.", "pending"),
         ("surefoot_delivery_oldest_pending_seconds", "Age of the oldest of them.", "oldest_s"),
     ):
-        found = {(w.webhook_id, w.name): getattr(w, field) for w in figures.webhooks}
+        found = {(w.webhook_id, w.name): getattr(w, field) for w in metrics.webhooks}
         yield _gauge(name, text, ["webhook_id", "webhook_name"], found)
 
 
-def _of_service(figures: Figures) -> Iterator[Metric]:
+def _of_service(metrics: Metrics) -> Iterator[Metric]:
     yield _gauge(
         "surefoot_trainings",
         "Trainings that are stored, by state.",
         ["state"],
-        {(state,): figures.trainings.get(state, 0) for state in TrainingState},
+        {(state,): metrics.trainings.get(state, 0) for state in TrainingState},
     )
     yield _gauge(
         "surefoot_worker_last_heartbeat_timestamp_seconds",
         "When a worker was last heard of.",
         ["worker"],
-        {(name,): at_s for name, at_s in figures.heartbeats_s.items()},
+        {(name,): at_s for name, at_s in metrics.heartbeats_s.items()},
     )
     restarts = CounterMetricFamily(
         "surefoot_worker_restarts",
         "How often a worker has been started anew, by whoever minds it.",
         labels=["worker"],
     )
-    for name, starts in figures.worker_starts.items():
+    for name, starts in metrics.worker_starts.items():
         restarts.add_metric([name], max(starts - 1, 0))
     yield restarts
     lag = "Age of the oldest track that nothing has looked at, of all cameras."
-    yield GaugeMetricFamily("surefoot_queue_lag_seconds", lag, value=figures.queue_lag_s)
-    yield CounterMetricFamily("surefoot_events", "Events ever written.", value=figures.events)
+    yield GaugeMetricFamily("surefoot_queue_lag_seconds", lag, value=metrics.queue_lag_s)
+    yield CounterMetricFamily("surefoot_events", "Events ever written.", value=metrics.events)
 
 
 def _gauge(

@@ -20,7 +20,7 @@ from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
-from service.store.figures import Ids, among, newest_of
+from service.store.metrics import Ids, among, newest_of
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
 from service.store.tables.cameras import CameraRecord
@@ -170,7 +170,7 @@ def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
 def _ratio(
     name: str, drift: Any, sd: Any, limits: DriftLimits, floor: float
 ) -> ColumnElement[float]:
-    """A number's drift in units of its limit; -1 where it is not told."""
-    told = type_coerce(EstimateRecord.told, String).contains(f'"{name}"')
+    """A number's drift in units of its limit; -1 where it is not identifiable."""
+    identifiable = type_coerce(EstimateRecord.identifiable, String).contains(f'"{name}"')
     limit = func.max(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
-    return case((told, func.abs(drift) / limit), else_=-1.0)
+    return case((identifiable, func.abs(drift) / limit), else_=-1.0)

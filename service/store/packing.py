@@ -64,21 +64,23 @@ def pose_of_prior(record: PriorPoseRecord) -> CameraPose:
     )
 
 
-def told_drift(drift: Drift) -> dict[str, float | None]:
-    """The told drift as an alert keeps it; None where the tracks cannot tell."""
+def identifiable_drift(drift: Drift) -> dict[str, float | None]:
+    """The identifiable drift as an alert keeps it; None where the tracks leave it open."""
     angle_rad = drift.angle_rad if drift.turned else None
-    return {**_told(drift.by, drift.told), "angle_rad": angle_rad}
+    return {**_where_identifiable(drift.by, drift.identifiable), "angle_rad": angle_rad}
 
 
-def told_sd(drift: Drift) -> dict[str, float | None]:
-    """The standard deviations of what is told, likewise."""
-    return _told(drift.sd, drift.told)
+def identifiable_sd(drift: Drift) -> dict[str, float | None]:
+    """The standard deviations of what is identifiable, likewise."""
+    return _where_identifiable(drift.sd, drift.identifiable)
 
 
-def _told(parameters: PoseParameters, told: tuple[str, ...]) -> dict[str, float | None]:
+def _where_identifiable(
+    parameters: PoseParameters, identifiable: tuple[str, ...]
+) -> dict[str, float | None]:
     return {
-        "height_m": parameters.height_m if "height" in told else None,
-        "tilt_rad": parameters.tilt_rad if "tilt" in told else None,
-        "roll_rad": parameters.roll_rad if "roll" in told else None,
-        "heading_rad": parameters.heading_rad if "heading" in told else None,
+        "height_m": parameters.height_m if "height" in identifiable else None,
+        "tilt_rad": parameters.tilt_rad if "tilt" in identifiable else None,
+        "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
+        "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
     }

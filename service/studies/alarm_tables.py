@@ -64,12 +64,12 @@ def _still_cells(name: str, results: Sequence[AlarmResults]) -> list[str]:
     low, high = rate_interval(results)
     return [
         name,
-        f"{np.median([result.parties for result in results]):.0f}",
+        f"{np.median([result.walking_groups for result in results]):.0f}",
         f"{years:.1f}",
         str(alarms),
         f"{alarms / years:.2f} ({low:.2f} to {high:.2f})",
         f"{max(result.highest for result in results):.2f}",
-        f"{max(result.told for result in results):.2f}",
+        f"{max(result.pose_excess for result in results):.2f}",
     ]
 
 
@@ -77,6 +77,6 @@ def _delay_cell(angle_deg: float, delays: Sequence[Delay]) -> str:
     if not delays:
         return "-"
     median = float(np.median([delay.tracks for delay in delays]))
-    told = f"{median:.0f}" if np.isfinite(median) else "never"
+    tracks = f"{median:.0f}" if np.isfinite(median) else "never"
     within = BARS[angle_deg][0] if angle_deg in BARS else np.inf
-    return f"{share_within(delays, within):.0%}, {told}"
+    return f"{share_within(delays, within):.0%}, {tracks}"

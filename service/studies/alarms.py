@@ -80,7 +80,7 @@ def _run(
         console.print(still_table(f"still: {what}; {set_to}", found))
         console.print(delay_table("share of alarms within so many tracks, median tracks", found))
     if without:
-        console.print(f"{without} of {len(tasks)} cases have no chart: too few parties walk")
+        console.print(f"{without} of {len(tasks)} cases have no chart: too few walking groups")
     console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
 
 

@@ -59,7 +59,7 @@ def creep_table(cases: Sequence[CreepCase]) -> Table:
                 for case in cases
                 if (case.number, case.rate_deg) == (number, rate_deg)
             ]
-            quantiles = np.quantile(told, [0.5, 0.9, 1.0], method="higher") if told else []
+            quantiles = np.quantile(told, [0.5, 0.9, 1.0], method="higher") if told else np.zeros(0)
             cells.append(", ".join(f"{each:.2f}" for each in quantiles) + f" (n {len(told)})")
         table.add_row(f"{rate_deg:g}", *cells)
     return table

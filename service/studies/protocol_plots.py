@@ -6,7 +6,13 @@ from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
-from models.evaluation.protocol.cases import KNOCKED, PANNED, Outcome, draw_case, pose_of_numbers
+from models.evaluation.protocol.cases import (
+    KNOCKED,
+    PANNED,
+    Outcome,
+    draw_case,
+    pose_of_plane_parameters,
+)
 from models.evaluation.protocol.flow_curves import CurvePoint, flow_errors
 from models.evaluation.protocol.flow_plots import plot_flow, plot_flow_errors
 from models.evaluation.protocol.flow_runs import fused
@@ -60,7 +66,7 @@ def _draw_flow(scene: Path, path: Path) -> None:
     if learned.site.flow is None or answer.heading_rad is None:
         return
     prior = learned.case.prior_pose
-    told = replace(pose_of_numbers(answer.values, prior), heading_rad=answer.heading_rad)
+    told = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)
     plot_flow(learned, {"new tracks by the prior pose": prior, "by the fused pose": told}, path)
 
 

@@ -21,9 +21,9 @@ _SAME_M = 1.0
 
 
 def beyond_range(
-    session: Session, camera_id: str, pose: CameraPose, told: tuple[str, ...]
+    session: Session, camera_id: str, pose: CameraPose, identifiable: tuple[str, ...]
 ) -> Reason | None:
-    """Which told number is at the edge of what the model in use was trained for."""
+    """Which identifiable number is at the edge of what the model in use was trained for."""
     model = trainings.newest_model(session, camera_id)
     if model is None:
         return None
@@ -37,7 +37,7 @@ def beyond_range(
         ),
     }
     for name, (offset, reach) in offsets.items():
-        if name in told and abs(offset) > _EDGE * reach:
+        if name in identifiable and abs(offset) > _EDGE * reach:
             return Reason(code=ServiceCode.RANGE_EDGE, values={"number": name})
     return None
 

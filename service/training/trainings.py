@@ -15,7 +15,7 @@ from models.trajectory import choose_step_s
 from service.access.activity import note
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
-from service.kinds import Act, EventType, TrainingState
+from service.kinds import Activity, EventType, TrainingState
 from service.settings import Settings
 from service.store import cameras, trainings
 from service.store.operation import events
@@ -29,9 +29,9 @@ from service.windows.requests import request_estimate
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
 _KEPT_AS = {
-    TrainingState.SUCCEEDED: Act.TRAINING_SUCCEEDED,
-    TrainingState.FAILED: Act.TRAINING_FAILED,
-    TrainingState.CANCELLED: Act.TRAINING_CANCELLED,
+    TrainingState.SUCCEEDED: Activity.TRAINING_SUCCEEDED,
+    TrainingState.FAILED: Activity.TRAINING_FAILED,
+    TrainingState.CANCELLED: Activity.TRAINING_CANCELLED,
 }
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
@@ -95,7 +95,7 @@ def request_training(
     if cameras.find(session, camera_id) is None:
         raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
     record = queue_training(session, queue, settings, camera_id, recipe, seed)
-    note(session, Act.TRAINING_REQUESTED, by=by, camera_id=camera_id, subject_id=record.id)
+    note(session, Activity.TRAINING_REQUESTED, by=by, camera_id=camera_id, subject_id=record.id)
     return record
 
 

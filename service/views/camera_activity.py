@@ -5,14 +5,14 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
-from service.kinds import Act, AlertKind, Outcome
+from service.kinds import Activity, AlertKind, Outcome
 from service.store.operation import activity
 
 _MOST = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Deed:
+class ActivityEntry:
     """What was done; `by` is None where the service did it by itself, or nobody said a name.
 
     `what` is as the log has it (`access.activity`). `kind` is the alert's, `until` of a
@@ -20,7 +20,7 @@ class Deed:
     """
 
     at: datetime
-    what: Act
+    what: Activity
     by: str | None
     kind: AlertKind | None = None
     until: datetime | None = None
@@ -28,10 +28,10 @@ class Deed:
     note: str | None = None
 
 
-def deeds_of(session: Session, camera_id: str) -> tuple[Deed, ...]:
+def activity_of(session: Session, camera_id: str) -> tuple[ActivityEntry, ...]:
     """What was done last at a camera, newest first."""
     return tuple(
-        Deed(
+        ActivityEntry(
             at=entry.at,
             what=entry.what,
             by=entry.by,

@@ -26,7 +26,7 @@ from service.store.tables.attendance import MaintenanceRecord
 from service.store.tables.cameras import PriorPoseRecord
 from service.store.tables.trainings import TrainingRecord
 from service.store.tracks import tracks
-from service.views.camera_activity import Deed, deeds_of
+from service.views.camera_activity import ActivityEntry, activity_of
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 5, 20, 5
@@ -63,7 +63,7 @@ class CameraPage:
     priors: tuple[PriorPoseRecord, ...]
     windows: tuple[MaintenanceRecord, ...]
     trainings: tuple[TrainingRecord, ...]
-    deeds: tuple[Deed, ...]
+    activity: tuple[ActivityEntry, ...]
     sources: tuple[SourceView, ...]
     snapshot: SnapshotFacts | None
     snapshots_allowed: bool
@@ -109,7 +109,11 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     )
     misplaced: tuple[Misplacement, ...] = ()
     # Of a camera that stands still it would tell of the estimate's noise.
-    if estimate is not None and estimate.told and (estimate.drifted or estimate.drift_streak > 0):
+    if (
+        estimate is not None
+        and estimate.identifiable
+        and (estimate.drifted or estimate.drift_streak > 0)
+    ):
         misplaced = misplacements(camera.intrinsics, pose.pose, camera.prior_pose, DISTANCES_M)
     return CameraPage(
         now=now,
@@ -123,7 +127,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
-        deeds=deeds_of(session, camera_id),
+        activity=activity_of(session, camera_id),
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,

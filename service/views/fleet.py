@@ -62,8 +62,8 @@ class FleetTraining:
 class FleetCamera:
     """A camera in one line.
 
-    `history` has the drift of its newest estimates in units of the limits, oldest first, None
-    where nothing was told. `drift` tells only what is sure. `learned` and `wanted` are people of
+    `history` has the drift of its newest estimates in units of the limits, oldest first, None where
+    nothing was identifiable. `drift` has only what is sure. `learned` and `wanted` are people of
     the reference being learned. `judged` says whether the drift is of how it stands now, and not
     only the last that is known.
     """
@@ -178,12 +178,12 @@ def _alert(record: AlertRecord, now: datetime) -> FleetAlert:
 
 def _drift(estimate: EstimateRecord | None) -> Drift | None:
     """What is sure enough to be said: beyond 2 sd, or what has been found to drift."""
-    if estimate is None or not estimate.told:
+    if estimate is None or not estimate.identifiable:
         return None
     drift, drifted = estimate.drift, estimate.drifted
-    said = {name: drift.of(name) for name in drift.told}
+    said = {name: drift.of(name) for name in drift.identifiable}
     sure = [name for name, (by, sd) in said.items() if name in drifted or abs(by) > 2 * sd]
-    return replace(drift, told=tuple(sure))
+    return replace(drift, identifiable=tuple(sure))
 
 
 def _learns(standing: Standing) -> bool:

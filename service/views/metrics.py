@@ -1,4 +1,4 @@
-"""The figures of a moment: what operators of the service watch, for metrics."""
+"""The metrics of a moment: what operators of the service watch, for metrics."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,13 +10,13 @@ from service.cameras.standing import Standing, standings
 from service.delivery.outbox import is_silenced
 from service.kinds import AlertKind, PoseState, Severity, TrainingState
 from service.settings import Settings
-from service.store import cameras, figures, webhooks
+from service.store import cameras, metrics, webhooks
 from service.store.operation import events
 from service.store.tracks import unseen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraFigures:
+class CameraMetrics:
     """A camera: its state, its newest track and its drift, where there is an estimate."""
 
     camera_id: str
@@ -26,7 +26,7 @@ class CameraFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AlertFigures:
+class AlertMetrics:
     """An alert that fires; `camera_id` is empty where it is of no one camera.
 
     It is `grouped` where another one speaks for it.
@@ -40,7 +40,7 @@ class AlertFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WebhookFigures:
+class WebhookMetrics:
     """A webhook: what waits for it, how long it has, and how long it has been failing."""
 
     webhook_id: str
@@ -52,16 +52,16 @@ class WebhookFigures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Figures:
+class Metrics:
     """Everything at one moment. Heartbeats are seconds since the Unix epoch.
 
     `unseen_s` is the age of the oldest track of a camera that nothing has looked at, where there is
     one; `failing` are the cameras whose last look failed.
     """
 
-    cameras: tuple[CameraFigures, ...]
-    alerts: tuple[AlertFigures, ...]
-    webhooks: tuple[WebhookFigures, ...]
+    cameras: tuple[CameraMetrics, ...]
+    alerts: tuple[AlertMetrics, ...]
+    webhooks: tuple[WebhookMetrics, ...]
     trainings: dict[TrainingState, int]
     heartbeats_s: dict[str, float]
     worker_starts: dict[str, int]
@@ -71,28 +71,28 @@ class Figures:
     events: int
 
 
-def load_figures(session: Session, settings: Settings) -> Figures:
-    """The figures now, by a dozen statements for all cameras."""
+def load_metrics(session: Session, settings: Settings) -> Metrics:
+    """The metrics now, by a dozen statements for all cameras."""
     now = datetime.now(UTC)
     unseen_s = {
         camera_id: max((now - at).total_seconds(), 0.0)
         for camera_id, (_, at) in unseen.since(session).items()
     }
-    workers = figures.workers(session)
-    return Figures(
+    workers = metrics.workers(session)
+    return Metrics(
         cameras=_cameras(standings(session, settings)),
         alerts=tuple(
-            AlertFigures(
+            AlertMetrics(
                 camera_id=alert.camera_id or "",
                 kind=alert.kind,
                 severity=alert.severity,
                 silenced=is_silenced(alert, now),
                 grouped=alert.group_id is not None,
             )
-            for alert in figures.firing(session)
+            for alert in metrics.firing(session)
         ),
         webhooks=_webhooks(session, now),
-        trainings=figures.trainings_by_state(session),
+        trainings=metrics.trainings_by_state(session),
         heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in workers},
         worker_starts={worker.name: worker.starts for worker in workers},
         unseen_s=unseen_s,
@@ -102,9 +102,9 @@ def load_figures(session: Session, settings: Settings) -> Figures:
     )
 
 
-def _cameras(standing: dict[str, Standing]) -> tuple[CameraFigures, ...]:
+def _cameras(standing: dict[str, Standing]) -> tuple[CameraMetrics, ...]:
     return tuple(
-        CameraFigures(
+        CameraMetrics(
             camera_id=camera_id,
             state=each.state,
             last_track_s=each.last_track_s,
@@ -114,14 +114,14 @@ def _cameras(standing: dict[str, Standing]) -> tuple[CameraFigures, ...]:
     )
 
 
-def _webhooks(session: Session, now: datetime) -> tuple[WebhookFigures, ...]:
-    backlogs = figures.backlogs(session)
+def _webhooks(session: Session, now: datetime) -> tuple[WebhookMetrics, ...]:
+    backlogs = metrics.backlogs(session)
     found = []
     for record in webhooks.every(session):
         backlog = backlogs.get(record.id)
         failing = record.failing_since
         found.append(
-            WebhookFigures(
+            WebhookMetrics(
                 webhook_id=record.id,
                 name=record.name,
                 enabled=record.enabled,

@@ -15,17 +15,17 @@ class Attendance:
     """The times, from and to, in which somebody was or will be at a camera, by its windows.
 
     `judged_from_s` is when the last of them ended, or will, that has begun; what the camera saw
-    before does not say how it stands after it. `told` has when each window began, and when it was
-    last told of or changed.
+    before does not say how it stands after it. `announced` has when each window began, and when it
+    was last told of or changed.
     """
 
     spans: tuple[tuple[float, float], ...]
     judged_from_s: float | None
-    told: tuple[tuple[float, datetime], ...]
+    announced: tuple[tuple[float, datetime], ...]
 
-    def told_late(self, known_at: datetime, known_to_s: float) -> bool:
+    def announced_late(self, known_at: datetime, known_to_s: float) -> bool:
         """Whether a window was told of after a time that reaches into what was known then."""
-        return any(from_s <= known_to_s and at > known_at for from_s, at in self.told)
+        return any(from_s <= known_to_s and at > known_at for from_s, at in self.announced)
 
     def free_since_s(self, now: datetime) -> float | None:
         """When somebody last left the camera; None where nobody was there."""
@@ -55,5 +55,5 @@ def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attend
     return Attendance(
         spans=tuple(spans),
         judged_from_s=begun[-1] if begun else None,
-        told=tuple((record.from_at.timestamp(), record.updated_at) for record in records),
+        announced=tuple((record.from_at.timestamp(), record.updated_at) for record in records),
     )

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from models.drift.change_point import find_change
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import KNOCKED, PRIOR, in_time, seen, tracks_of
 
@@ -33,7 +33,7 @@ def main() -> None:
 def _measure(form: str) -> float:
     known, after = tracks_of(0, (PRIOR, 200), (KNOCKED, TRACKS), boxes=form == "boxes")
     started = time.perf_counter()
-    reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     learned_s = time.perf_counter() - started
     after = in_time(after)
     estimate_s = median_s(lambda: joint_estimate(seen(after), PRIOR, reference))

@@ -14,7 +14,7 @@ from pathlib import Path
 from rich.console import Console
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.reference import learn_flow
 from models.simulation.walkers import WalkConfig
@@ -33,7 +33,7 @@ def main() -> None:
     console.print(f"{_processor()}, one core, {platform.python_version()}; medians of {RUNS}")
     known, after = tracks_of(0, (PRIOR, max(MAPS)), (PANNED, TRACKS))
     tracks = seen(after)
-    speeds = learn_reference(seen(known[: min(MAPS)]), PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(seen(known[: min(MAPS)]), PRIOR, WalkConfig(), 0)
     joint = joint_estimate(tracks, PRIOR, speeds)
     joint_s = median_s(lambda: joint_estimate(tracks, PRIOR, speeds))
     console.print(f"joint estimate of {TRACKS} tracks: {joint_s:.2f} s")

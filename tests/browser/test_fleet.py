@@ -54,6 +54,34 @@ def test_an_alert_comes_up_by_itself(page, fleet):
     assert fetched == ["ui/fleet/rows?ids=beta"]
 
 
+@pytest.mark.parametrize("width", [920, 1280])
+def test_cells_stand_under_their_heads_and_keep_to_themselves(page, fleet, width):
+    fleet.add("alpha", "Alpha")
+    fleet.now -= timedelta(minutes=20)  # "29 minutes ago" is as wide as such words become
+    fleet.knock("alpha", tilt_deg=4.0)
+    page.set_viewport_size({"width": width, "height": 700})
+    page.goto("/")
+    page.locator("#row-alpha.drifting").wait_for()
+    heads, rights, texts = page.evaluate(
+        """() => {
+          const inner = (cell) => {
+            const range = document.createRange();
+            range.selectNodeContents(cell);
+            return range.getBoundingClientRect();
+          };
+          const cells = [...document.querySelectorAll("#row-alpha > span")];
+          return [
+            [...document.querySelectorAll(".heads > span")].map((cell) => inner(cell).left),
+            cells.map((cell) => cell.getBoundingClientRect().right),
+            cells.map((cell) => [inner(cell).left, inner(cell).right]),
+          ];
+        }"""
+    )
+    for column in (1, 2, 4, 5):  # a badge and a drawing have edges of their own
+        assert texts[column][0] == pytest.approx(heads[column], abs=1)
+        assert texts[column][1] <= rights[column] + 1
+
+
 def test_a_camera_that_comes_and_one_that_goes(page, fleet, server):
     fleet.add("alpha", "Alpha")
     page.goto("/")

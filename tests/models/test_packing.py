@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from safetensors.numpy import load
 
 from models.errors import CheckpointError
-from models.packing import Format, flattened, pack, restored, under, unpack
+from models.packing import Format, flattened, pack, restored, stored_as, under, unpack
 
 FORM = Format(name="site", version=3)
 VALUES = {
@@ -39,6 +39,12 @@ class Outer:
     first: Inner
     second: Inner | None
     tracks: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Renamed:
+    inner: Inner = stored_as("paces")
+    groups: int = stored_as("parties")
 
 
 def test_what_is_packed_comes_back_to_the_bit():
@@ -102,6 +108,16 @@ def test_dataclasses_in_dataclasses_have_dotted_names():
     assert both.second.usual == 2.0
     assert under(values, "first") == {"mean": whole.first.mean, "usual": 1.0}
     assert restored(Outer, {"tracks": 3}, first=both.first, second=None).first is both.first
+
+
+def test_a_field_may_be_stored_under_an_older_name():
+    whole = Renamed(inner=Inner(mean=np.ones(2), usual=1.0), groups=3)
+    values = flattened(whole)
+    assert set(values) == {"paces.mean", "paces.usual", "parties"}
+    again = restored(Renamed, values)
+    assert (again.groups, again.inner.usual) == (3, 1.0)
+    with pytest.raises(CheckpointError, match=r"^Renamed: parties is missing$"):
+        restored(Renamed, {"groups": 3}, inner=whole.inner)
 
 
 @pytest.mark.parametrize(

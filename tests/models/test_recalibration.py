@@ -7,7 +7,7 @@ import pytest
 
 from models.drift.change_point import find_change
 from models.drift.chart_learning import learn_chart
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.drift.verdict import DriftLimits
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
@@ -116,11 +116,13 @@ def test_the_second_look_leaves_the_newest_people_out_where_a_verdict_may_change
 
 def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, tracks):
     every = seen([*tracks[0], *tracks[1]])
-    evenly = learn_site(every, LENS, PRIOR, speeds=site.speeds)
+    evenly = learn_site(every, LENS, PRIOR, speed_reference=site.speed_reference)
     weights = np.linspace(0.05, 1, every.tracks)
-    faded = learn_site(every, LENS, PRIOR, speeds=site.speeds, weights=weights)
-    assert evenly.speeds is faded.speeds is site.speeds
-    assert evenly.chart.parties > site.chart.parties
+    faded = learn_site(
+        every, LENS, PRIOR, speed_reference=site.speed_reference, weights=weights, chart=False
+    )
+    assert evenly.speed_reference is faded.speed_reference is site.speed_reference
+    assert evenly.chart.walking_groups > site.chart.walking_groups
     assert site.flow.people < evenly.flow.people
     assert faded.flow.people < evenly.flow.people
 
@@ -128,7 +130,7 @@ def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, trac
 def test_speeds_of_the_first_tracks_and_a_map_of_all(site, tracks):
     every = seen([*tracks[0], *tracks[1]])
     found = learn_site(every, LENS, PRIOR, speed_tracks=150, chart=False)
-    np.testing.assert_array_equal(found.speeds.offset, site.speeds.offset)
+    np.testing.assert_array_equal(found.speed_reference.offset, site.speed_reference.offset)
     assert found.chart is None
     assert found.flow.people > site.flow.people
 
@@ -148,7 +150,7 @@ def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
     site = assume_site(window, LENS, PRIOR)
     assert not site.learned
     found = estimate_pose(window, site, SecondLook(limits=LIMITS, drifting=False))
-    joint = joint_estimate(window, PRIOR, site.speeds)
+    joint = joint_estimate(window, PRIOR, site.speed_reference)
     np.testing.assert_array_equal(found.joint.values, joint.values)
     np.testing.assert_array_equal(found.fused.values, by_speeds_alone(joint, PRIOR).values)
     assert (found.change_idx, found.earlier) == (None, None)
@@ -187,7 +189,9 @@ def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, 
         reference=tuple(tracks[0]),
         seen=tuple(in_time([*tracks[1], *tracks[2]])),
     )
-    learned = Learned(case=case, seen=window, site=site, feet=window, feet_speeds=site.speeds)
+    learned = Learned(
+        case=case, seen=window, site=site, feet=window, feet_speed_reference=site.speed_reference
+    )
     answer, found = fused(learned), estimate_pose(window, site)
     np.testing.assert_array_equal(answer.values, found.fused.values[:3])
     assert answer.tracks == found.joint.walkers < window.walkers - 50
@@ -201,9 +205,9 @@ def refusals(site, tracks):
         "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
         "estimate_pose": lambda: estimate_pose(mixed, site),
         "read_alarm_chart": lambda: read_alarm_chart(mixed, site, ONE_A_YEAR),
-        "score_parties": lambda: score_parties(mixed, site.usual(site.flow, site.chart)),
-        "find_change": lambda: find_change(mixed, PRIOR, site.speeds),
-        "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speeds, folds, 0),
+        "score_groups": lambda: score_groups(mixed, site.usual(site.flow, site.chart)),
+        "find_change": lambda: find_change(mixed, PRIOR, site.speed_reference),
+        "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speed_reference, folds, 0),
     }
 
 
@@ -213,7 +217,7 @@ def refusals(site, tracks):
         "learn_site",
         "estimate_pose",
         "read_alarm_chart",
-        "score_parties",
+        "score_groups",
         "find_change",
         "learn_chart",
     ],

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
+from models.estimation.parameters import PLANE_PARAMETERS
 from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
@@ -61,14 +62,14 @@ class Bench:
         batch = [track(str(first + n), start_s=self.clock_s + n) for n in range(people)]
         self.http.post("/cameras/corner/tracks", json={"tracks": batch}).raise_for_status()
 
-    def see(self, pose: CameraPose, people: int = 20, **told):
+    def see(self, pose: CameraPose, people: int = 20, **known):
         """Post people, who come to a pose, and bring the estimate up to date."""
         self.post(people)
         with self.store.write() as session:
             evidence = load_evidence(session, self.settings, "corner")
             if evidence is None:
                 return None
-            finding = made_up(evidence, pose, **told)
+            finding = made_up(evidence, pose, **known)
             return save_estimate(session, self.queue, self.settings, evidence, finding)
 
     def refresh(self):
@@ -95,16 +96,17 @@ def made_up(
     *,
     sd_deg=0.2,
     sd_log=0.01,
-    weak=(),
+    unidentifiable=(),
     change=None,
     paths=False,
     earlier: CameraPose | None = None,
 ) -> Finding:
-    """What the tracks of a window come to: a pose, whose heading they tell by their `paths`.
+    """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
     Without the newest of them, they come to the `earlier` one: the same, if it is not said.
     """
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
+    missing = f"the tracks cannot tell {' and '.join(unidentifiable)}"
     sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
     joint = JointEstimate(
         values=values,
@@ -112,9 +114,9 @@ def made_up(
         bound=np.diag(sd**2),
         raw=values + 0.01,
         walkers=len(evidence.tracks),
-        parties=len(evidence.tracks),
-        weak=tuple(weak),
-        reason=as_said(f"the tracks cannot tell {' and '.join(weak)}")[0] if weak else None,
+        walking_groups=len(evidence.tracks),
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name not in unidentifiable),
+        reason=as_said(missing)[0] if unidentifiable else None,
     )
     fused = by_speeds_alone(joint, evidence.prior)
     if paths:
@@ -122,7 +124,7 @@ def made_up(
         fused = FusedEstimate(
             values=np.append(values, pose.heading_rad),
             covariance=np.diag(sds**2),
-            told=(*fused.told, "heading"),
+            identifiable=(*fused.identifiable, "heading"),
             reason=None,
             raw=np.append(values, pose.heading_rad) + 0.01,
         )

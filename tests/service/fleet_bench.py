@@ -95,7 +95,7 @@ class Fleet:
         with self.store.write() as session:
             reference = references.newest(session, camera_id)
             (last,) = self._estimates(camera_id, reference, "learning", 1, {}, still=0.0)
-            last.told, last.created_at = [], self.now
+            last.identifiable, last.created_at = [], self.now
             session.add(last)
 
     def attend(self, camera_id, hours=1.0, began_h=0.0):
@@ -142,7 +142,7 @@ class Fleet:
                 reference_id=reference.id,
                 state=state if share and state != "no_data" else "ok",
                 reasons=as_said("made up"),
-                told=["tilt", "roll", "height", "heading"],
+                identifiable=["tilt", "roll", "height", "heading"],
                 height_m=6.0 + height * share, tilt_rad=POSE.tilt_rad + tilt * share,
                 roll_rad=POSE.roll_rad, heading_rad=pan * share,
                 height_sd_m=0.03, tilt_sd_rad=0.001, roll_sd_rad=0.002, heading_sd_rad=0.002,

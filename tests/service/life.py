@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from models.estimation.joint.observations import observe
-from models.estimation.joint.reference import learn_reference
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
@@ -147,13 +147,13 @@ class Life:
             evidence = load_evidence(session, self.settings, camera_id)
         return Look(camera_id=camera_id, evidence=evidence, newest_pk=newest_pk)
 
-    def end_look(self, look: Look, weak: tuple[str, ...]) -> bool:
+    def end_look(self, look: Look, unidentifiable: tuple[str, ...]) -> bool:
         """The job from there on, its numbers made up; says whether an estimate was stored."""
         record = None
         with self.store.write() as session:
             if look.evidence is not None:
                 pose, change = self._seen(session, look.evidence)
-                finding = made_up(look.evidence, pose, weak=weak, change=change)
+                finding = made_up(look.evidence, pose, unidentifiable=unidentifiable, change=change)
                 record = save_estimate(session, self.queue, self.settings, look.evidence, finding)
             end_look(session, look.camera_id, look.newest_pk)
         return record is not None
@@ -198,10 +198,10 @@ class Life:
 
 
 @lru_cache(maxsize=1)
-def some_site() -> SiteReference:
+def some_site() -> SpeedReference:
     """A reference that was really learned."""
     observations = observe(walks_of("prior"), LENS)
-    return learn_reference(observations, PRIOR, WalkConfig(speed_sd_mps=0.2), 0)
+    return learn_speed_reference(observations, PRIOR, WalkConfig(speed_sd_mps=0.2), 0)
 
 
 @lru_cache(maxsize=8)

@@ -23,7 +23,7 @@ CAMERAS = ("one", "two")
 STREET = "street"  # is looked at by the real job
 NUMBERS = ("height_m", "tilt_deg", "roll_deg", "heading_deg")
 MOVED = ("drifting", "out_of_range")
-WEAK = st.sampled_from([(), (), (), ("tilt",), ("tilt", "roll", "height")])
+UNIDENTIFIABLE = st.sampled_from([(), (), (), ("tilt",), ("tilt", "roll", "height")])
 
 some = st.integers(0, 10)
 names = st.sampled_from([None, "Ada", "Bo"])
@@ -113,11 +113,11 @@ class LifeEvents(RuleBasedStateMachine):
         self.life.post(self.camera(n), people)
 
     @has_camera
-    @rule(n=some, weak=WEAK, times=st.integers(1, 4))
-    def be_seen(self, n: int, weak: tuple[str, ...], times: int) -> None:
+    @rule(n=some, unidentifiable=UNIDENTIFIABLE, times=st.integers(1, 4))
+    def be_seen(self, n: int, unidentifiable: tuple[str, ...], times: int) -> None:
         camera_id = self.camera(n)
         for _ in range(times if camera_id != STREET else 1):
-            self.see(camera_id, weak)
+            self.see(camera_id, unidentifiable)
 
     @has_camera
     @rule(n=some, place=st.sampled_from(sorted(PLACES)))
@@ -145,21 +145,21 @@ class LifeEvents(RuleBasedStateMachine):
             self.maintain(camera_id, None, 0.5)
             self.stop_maintaining(camera_id, 0)
 
-    def see(self, camera_id: str, weak: tuple[str, ...]) -> None:
+    def see(self, camera_id: str, unidentifiable: tuple[str, ...]) -> None:
         """People walk, and the job looks at them."""
         self.life.post(camera_id, WANTED if camera_id != STREET else 4 * WANTED)
-        self.look_at(camera_id, weak)
+        self.look_at(camera_id, unidentifiable)
 
     @has_camera
-    @rule(n=some, weak=WEAK)
-    def look(self, n: int, weak: tuple[str, ...]) -> None:
-        self.look_at(self.camera(n), weak)
+    @rule(n=some, unidentifiable=UNIDENTIFIABLE)
+    def look(self, n: int, unidentifiable: tuple[str, ...]) -> None:
+        self.look_at(self.camera(n), unidentifiable)
 
-    def look_at(self, camera_id: str, weak: tuple[str, ...]) -> None:
+    def look_at(self, camera_id: str, unidentifiable: tuple[str, ...]) -> None:
         if camera_id == STREET:
             self.life.really_look(camera_id)
             self.answered.discard(camera_id)  # it may have stored one, or not
-        elif self.life.end_look(self.life.begin_look(camera_id), weak):
+        elif self.life.end_look(self.life.begin_look(camera_id), unidentifiable):
             self.answered.discard(camera_id)
 
     @has_camera
@@ -170,10 +170,10 @@ class LifeEvents(RuleBasedStateMachine):
             self.looks.append(self.life.begin_look(camera_id))
 
     @precondition(lambda self: self.looks)
-    @rule(weak=WEAK)
-    def end_a_look(self, weak: tuple[str, ...]) -> None:
+    @rule(unidentifiable=UNIDENTIFIABLE)
+    def end_a_look(self, unidentifiable: tuple[str, ...]) -> None:
         look = self.looks.pop(0)
-        if look.camera_id in self.life.stands and self.life.end_look(look, weak):
+        if look.camera_id in self.life.stands and self.life.end_look(look, unidentifiable):
             self.answered.discard(look.camera_id)
 
     @has_camera

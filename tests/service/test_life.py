@@ -20,7 +20,7 @@ from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.store.alerts import POSE_KINDS
 from service.store.tables.alerts import AlertRecord
-from tests.service.life_acts import LifeActs
+from tests.service.life_activity import LifeActs
 from tests.service.life_events import (
     MOVED,
     NUMBERS,
@@ -30,7 +30,7 @@ STEPS = int(os.environ.get("SUREFOOT_TEST_LIFE_STEPS", "0"))
 
 
 class LifeOfCameras(LifeActs):
-    """What holds after every act."""
+    """What holds after every activity."""
 
     @invariant()
     def history_only_grows(self) -> None:
@@ -50,17 +50,17 @@ class LifeOfCameras(LifeActs):
         pairs = [(a["camera_id"], a["kind"]) for a in firing if a["camera_id"] is not None]
         assert len(pairs) == len(set(pairs)), "two alerts of a camera and kind fire"
         fleet = self.life.call("GET", "/").text
-        figures = self.figures()
-        assert figures.pop("alerts") == {(a["camera_id"] or "", a["kind"]) for a in firing}
+        metrics = self.metrics()
+        assert metrics.pop("alerts") == {(a["camera_id"] or "", a["kind"]) for a in firing}
         rows = re.findall(r'<li class="row (\w+)" id="row-(\w+)".*?data-alerts="([^"]*)"', fleet)
-        assert {row[1] for row in rows} == set(self.life.stands) == set(figures["state"])
+        assert {row[1] for row in rows} == set(self.life.stands) == set(metrics["state"])
         for alert in firing:
             if alert["camera_id"] is None:
                 assert alert["track_source"] in fleet  # a banner
         for state, camera_id, ids in rows:
             mine = [alert for alert in firing if alert["camera_id"] == camera_id]
             assert set(ids.split()) == {alert["id"] for alert in mine}
-            self.one_camera(camera_id, state, mine, fleet, figures)
+            self.one_camera(camera_id, state, mine, fleet, metrics)
 
     def one_camera(
         self,
@@ -68,18 +68,18 @@ class LifeOfCameras(LifeActs):
         state: str,
         mine: list[dict[str, Any]],
         fleet: str,
-        figures: dict[str, Any],
+        metrics: dict[str, Any],
     ) -> None:
         answer = self.life.call("GET", f"/cameras/{camera_id}/pose")
         body = answer.json()
         page = self.life.call("GET", f"/ui/cameras/{camera_id}").text
-        assert body["state"] == state == figures["state"][camera_id]
+        assert body["state"] == state == metrics["state"][camera_id]
         assert f'<section class="summary {state}"' in page
         for alert in mine:
             assert f'id="alert-{alert["id"]}"' in page, "an alert fires and is not on the page"
         self.seen[" and ".join([state, *sorted(alert["kind"] for alert in mine)])] += 1
         self.alerts_and_state(camera_id, state, mine, page)
-        self.numbers(camera_id, body, state, figures)
+        self.numbers(camera_id, body, state, metrics)
         known = self.bodies.setdefault(camera_id, {})
         tag = answer.headers["etag"]
         assert known.setdefault(tag, answer.text) == answer.text, "one ETag, two bodies"
@@ -105,7 +105,7 @@ class LifeOfCameras(LifeActs):
             assert "The camera" not in headline, headline
 
     def numbers(
-        self, camera_id: str, body: dict[str, Any], state: str, figures: dict[str, Any]
+        self, camera_id: str, body: dict[str, Any], state: str, metrics: dict[str, Any]
     ) -> None:
         prior = self.life.call("GET", f"/cameras/{camera_id}").json()["prior_pose"]
         for name in NUMBERS:
@@ -116,12 +116,12 @@ class LifeOfCameras(LifeActs):
             else:
                 assert moved == pytest.approx(body["drift"][name], abs=1e-6)
             number = name.split("_")[0]
-            gauge = figures["drift"].get((camera_id, number))
+            gauge = metrics["drift"].get((camera_id, number))
             assert (gauge is not None) == told, f"{name} in metrics and in the pose"
         if state in ("learning", "ok") and not body["estimated"]:
             assert body["drift"] is None
 
-    def figures(self) -> dict[str, Any]:
+    def metrics(self) -> dict[str, Any]:
         found: dict[str, Any] = {"state": {}, "drift": {}, "alerts": set()}
         for family in families(self.life.call("GET", "/metrics").text):
             for sample in family.samples:

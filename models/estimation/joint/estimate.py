@@ -1,4 +1,8 @@
-"""The joint estimate: one pose for all tracks, with a covariance, and what it cannot tell."""
+"""The joint estimate: one pose for all tracks, with a covariance, and what it leaves open.
+
+Ours: covariance = variance inflation * H^-1 + spread of other modes + what is not known of the
+offset; the modes are a mixture, weighed by their posterior at their ends.
+"""
 
 import math
 from dataclasses import dataclass
@@ -6,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.fit import Fit, fit_pose
-from models.estimation.joint.groups import count_parties
+from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import SiteReference, channels_of, pose_prior
+from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
 from models.estimation.joint.starts import starts
-from models.estimation.numbers import NUMBERS, TELLING_SD, numbers_of
+from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of, plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
@@ -18,7 +22,7 @@ from models.reasons import Reason, TracksCode, Value
 
 _STARTS = 2
 _START_TRACKS = 80
-_FEWEST_PARTIES = 5
+_FEWEST_GROUPS = 5
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
 
@@ -26,10 +30,10 @@ _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
-    `raw` (3,) is before that. `weak` names those of tilt, roll, height that the tracks cannot
-    tell; `reason` says why, and is None where they tell all. `walkers` is the number of
-    tracks that were used, `parties` that of people or groups who walked independently. `bound`
-    (3, 3) is the Cramer-Rao bound of the likelihood.
+    `raw` (3,) is before that. `identifiable` names those of tilt, roll, height that the tracks
+    determine; `reason` says what is missing, and is None where they determine all. `walkers` is
+    the parameter of tracks that were used, `walking_groups` that of people or groups who walked
+    independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood.
     """
 
     values: Array
@@ -37,8 +41,8 @@ class JointEstimate:
     raw: Array
     bound: Array
     walkers: int
-    parties: int
-    weak: tuple[str, ...]
+    walking_groups: int
+    identifiable: tuple[str, ...]
     reason: Reason | None
 
     @property
@@ -48,32 +52,32 @@ class JointEstimate:
 
 
 def joint_estimate(
-    observations: Observations, prior: CameraPose, reference: SiteReference
+    observations: Observations, prior: CameraPose, reference: SpeedReference
 ) -> JointEstimate:
     """The pose that explains all tracks best, whatever it was before."""
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
     few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-    begin = starts(few, numbers_of(prior), _STARTS)
+    begin = starts(few, plane_parameters_of(prior), _STARTS)
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     best = ends[0]
-    covariance = best.covariance * reference.inflation + _elsewhere(ends, reference)
-    parties = count_parties(channels[0].measure(best.candidate))
-    # One party is one draw of pace and pauses, however many tracks it has.
-    covariance = covariance * max(1.0, _FEWEST_PARTIES / max(parties, 1))
+    covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
+    walking_groups = count_walking_groups(channels[0].measure(best.candidate))
+    # One walking group is one draw of pace and pauses, however many tracks it has.
+    covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
     covariance = covariance + reference.offset_covariance
     sd = np.sqrt(np.diag(covariance))
-    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
-    reason = _reason(weak, sd, covariance)
-    if parties < _FEWEST_PARTIES:
-        weak = NUMBERS
+    identifiable = identifiable_of(PLANE_PARAMETERS, sd)
+    reason = _reason(identifiable, sd, covariance)
+    if walking_groups < _FEWEST_GROUPS:
+        identifiable = ()
         reason = Reason(
-            code=TracksCode.TOO_FEW_PARTIES,
+            code=TracksCode.TOO_FEW_GROUPS,
             values={
                 "tracks": observations.walkers,
-                "parties": int(parties),
-                "least_parties": _FEWEST_PARTIES,
+                "parties": int(walking_groups),
+                "least_parties": _FEWEST_GROUPS,
             },
         )
     return JointEstimate(
@@ -82,8 +86,8 @@ def joint_estimate(
         raw=best.candidate,
         bound=best.bound,
         walkers=observations.walkers,
-        parties=parties,
-        weak=weak,
+        walking_groups=walking_groups,
+        identifiable=identifiable,
         reason=reason,
     )
 
@@ -104,24 +108,27 @@ def _distinct(ends: list[Fit]) -> list[Fit]:
     return distinct
 
 
-def _elsewhere(ends: list[Fit], reference: SiteReference) -> Array:
+def _elsewhere(ends: list[Fit], reference: SpeedReference) -> Array:
     """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
     best = ends[0]
-    chances = np.exp([(end.score - best.score) / reference.inflation for end in ends])
-    chances = chances / chances.sum()
+    odds = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
+    odds = odds / odds.sum()
     apart = np.array([end.candidate - best.candidate for end in ends])
-    return np.asarray((apart * chances[:, None]).T @ apart)
+    return np.asarray((apart * odds[:, None]).T @ apart)
 
 
-def _reason(weak: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
-    """What the tracks cannot tell; `alike` names two numbers that make up for one another."""
-    if not weak:
+def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
+    """What is not identifiable; `alike` names two parameters that make up for one another."""
+    missing = [name for name in PLANE_PARAMETERS if name not in identifiable]
+    if not missing:
         return None
     said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
-    values: dict[str, Value] = {said[name]: float(sd[NUMBERS.index(name)]) for name in weak}
+    values: dict[str, Value] = {
+        said[name]: float(sd[PLANE_PARAMETERS.index(name)]) for name in missing
+    }
     together = covariance / np.outer(sd, sd)
     pairs = [(0, 2), (1, 2), (0, 1)]
     first, second = max(pairs, key=lambda pair: abs(together[pair]))
     if abs(together[first, second]) > 0.9:
-        values["alike"] = [NUMBERS[first], NUMBERS[second]]
-    return Reason(code=TracksCode.NUMBERS_UNTOLD, values=values)
+        values["alike"] = [PLANE_PARAMETERS[first], PLANE_PARAMETERS[second]]
+    return Reason(code=TracksCode.UNIDENTIFIABLE, values=values)

@@ -1,4 +1,10 @@
-"""What is usual at a site: the mean of log speed or log stature by place and direction."""
+"""What is usual at a site: the mean of log speed or log stature by place and direction.
+
+m(x, d) = c + a d_x + b d_y + g (d_x^2 - d_y^2) + 2 e d_x d_y + sum_k w_k exp(-|x - x_k|^2 / 2 l^2)
+is linear in its coefficients, which have Gaussian priors.
+
+Source: Bishop 2006, Pattern Recognition and Machine Learning, section 3.3, for such regression.
+"""
 
 from dataclasses import dataclass, replace
 

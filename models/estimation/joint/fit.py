@@ -1,25 +1,32 @@
-"""Gauss-Newton on one pose for all tracks, with the site's own mean as a nuisance."""
+"""Gauss-Newton on one pose for all tracks, with the site's own mean as a nuisance.
+
+The coefficients beta of the site's field are eliminated from the normal equations,
+H = A - B C^-1 B', as a Schur complement.
+
+Source: Triggs, McLauchlan, Hartley and Fitzgibbon 2000, Bundle Adjustment, for the elimination; the
+weights of each round are those of `hierarchy`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.estimation.joint.direction_noise import corrected_covariance, noise_information
 from models.estimation.joint.field import Field
 from models.estimation.joint.hierarchy import (
     FISHER,
     Curvature,
     Spread,
     Weights,
+    composite_log_likelihoods,
     curvature,
-    fitness,
-    goodness,
+    hierarchical_log_likelihood,
     relearn,
     reweigh,
     track_curvatures,
 )
 from models.estimation.joint.measures import Measured
-from models.estimation.joint.sway import faked, honest_covariance
 from models.geometry.rotation import Array
 
 _MOST_ROUNDS = 40
@@ -63,7 +70,7 @@ class Fit:
     """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
     `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao). `score`
-    compares ends of different starts: goodness, less the prior's penalty.
+    compares ends of different starts: the composite log likelihood, less the prior's penalty.
     """
 
     candidate: Array
@@ -107,23 +114,23 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
             spread = relearn(
                 residual, measured.value, measured.valid, measured.rows, weights, spread
             )
-    usual = weights.usual
+    inlier = weights.inlier
     return Learned(
         field=start.field,
         mean=mean,
         covariance=covariance,
         spread=spread,
-        usual=float((usual * (features @ mean)).sum() / max(float(usual.sum()), 1e-9)),
+        usual=float((inlier * (features @ mean)).sum() / max(float(inlier.sum()), 1e-9)),
     )
 
 
-def foretold(measured: Measured, learned: Learned) -> float:
-    """How well a learned field foretells what other tracks measured at the same pose."""
+def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
+    """The log likelihood, by a learned field, of what other tracks measured at the same pose."""
     residual = measured.value - learned.field.features(measured) @ learned.mean
     residual = np.where(measured.valid, residual, 0.0)
     rows, spread = measured.rows, learned.spread
     weights = reweigh(residual, measured.value, measured.valid, rows, spread)
-    return fitness(residual, weights, rows, spread)
+    return hierarchical_log_likelihood(residual, weights, rows, spread)
 
 
 def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit:
@@ -148,7 +155,7 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
             both = np.linalg.solve(own, np.column_stack([cross.T, own_gradient]))
             matrix += sums.matrix[:3, :3] - cross @ both[:, :3]
             gradient += sums.gradient[:3] - cross @ both[:, 3]
-            noise += faked(measured, weights, spread)
+            noise += noise_information(measured, weights, spread)
             solved.append(both)
         move = -np.linalg.solve(matrix, gradient)
         share = min(1.0, 1 / max(float((np.abs(move) / _LONGEST_MOVE).max()), 1e-12))
@@ -161,10 +168,10 @@ def fit_pose(channels: Sequence[Channel], start: Array, prior: PosePrior) -> Fit
             break
     score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):
-        score += float(_goodness(channel, candidate, mean).sum())
+        score += float(_log_likelihoods(channel, candidate, mean).sum())
     return Fit(
         candidate=candidate,
-        covariance=honest_covariance(matrix, noise),
+        covariance=corrected_covariance(matrix, noise),
         bound=FISHER * np.asarray(np.linalg.inv(matrix)),
         score=score,
     )
@@ -184,9 +191,9 @@ def per_track(channels: Sequence[Channel], candidate: Array) -> Curvature:
     )
 
 
-def track_goodness(channels: Sequence[Channel], candidate: Array) -> Array:
-    """How well a candidate explains each track (N,)."""
-    each = [_goodness(channel, candidate, channel.learned.mean) for channel in channels]
+def track_log_likelihoods(channels: Sequence[Channel], candidate: Array) -> Array:
+    """The composite log likelihood (N,) of each track at a candidate."""
+    each = [_log_likelihoods(channel, candidate, channel.learned.mean) for channel in channels]
     return np.asarray(np.sum(each, axis=0))
 
 
@@ -204,7 +211,9 @@ def _linear(
     return measured, jacobian, residual, weights
 
 
-def _goodness(channel: Channel, candidate: Array, mean: Array) -> Array:
+def _log_likelihoods(channel: Channel, candidate: Array, mean: Array) -> Array:
     measured = channel.measure(candidate)
     residual = measured.value - channel.learned.field.features(measured) @ mean
-    return goodness(residual, measured.value, measured.valid, measured.rows, channel.learned.spread)
+    return composite_log_likelihoods(
+        residual, measured.value, measured.valid, measured.rows, channel.learned.spread
+    )

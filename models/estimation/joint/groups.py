@@ -1,4 +1,8 @@
-"""People who walk together: how many independent parties there are among the tracks."""
+"""People who walk together: how many independent walking groups there are among the tracks.
+
+Ours: two tracks are one group where they are within 4 m and 37 deg of one another for 60 % of the
+shorter; groups are the connected components of such pairs.
+"""
 
 from collections import Counter
 from itertools import combinations
@@ -13,18 +17,19 @@ _BIN_S = 3.0
 _NEAR_M = 4.0
 _SAME_WAY = 0.8  # cosine: 37 deg
 _STANDING_MPS = 0.4
-_SHARE = 0.6  # of the shorter walk that two people spend side by side to be one party
+_SHARE = 0.6  # of the shorter walk that two people spend side by side to be one walking group
 
 
-def count_parties(speeds: Measured) -> int:
-    """Parties of people who walk side by side the same way; someone alone is one.
+def count_walking_groups(speeds: Measured) -> int:
+    """Walking groups: people who walk side by side the same way; someone alone is one.
 
-    People of one party share their pace and their pauses: twenty of them tell hardly more than one.
+    People of one walking group share their pace and their pauses: twenty of them tell hardly more
+    than one.
     """
     assert speeds.direction is not None
     walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(_STANDING_MPS)))
     rows = speeds.rows
-    labels = parties_of(
+    labels = walking_groups_of(
         rows.time_s[walking],
         rows.owner_idx[walking],
         speeds.place[walking],
@@ -34,17 +39,17 @@ def count_parties(speeds: Measured) -> int:
     return int(np.unique(labels[np.unique(rows.owner_idx[walking])]).size)
 
 
-def parties_of(
+def walking_groups_of(
     time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array, owners: int
 ) -> npt.NDArray[np.int64]:
-    """The party (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
+    """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
 
     Args:
         time_s: when each step was (M,).
         owner_idx: the track of each (M,).
         place: where it was on the ground (M, 2), metres.
         way: unit vectors (M, 2) of where it went.
-        owners: how many tracks there are; those without steps are each a party.
+        owners: how many tracks there are; those without steps are each a walking group.
     """
     bins, positions, ways, owner_idx = _sampled(time_s, owner_idx, place, way)
     together: Counter[tuple[int, int]] = Counter()
@@ -69,9 +74,9 @@ def _joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
     from scipy.sparse.csgraph import connected_components
 
     links = coo_array((np.ones(len(pairs)), pairs.T), shape=(owners, owners))
-    _, party_idx = connected_components(links, directed=False)
-    _, firsts = np.unique(party_idx, return_index=True)
-    return np.asarray(firsts[party_idx])
+    _, group_idx = connected_components(links, directed=False)
+    _, firsts = np.unique(group_idx, return_index=True)
+    return np.asarray(firsts[group_idx])
 
 
 def _sampled(

@@ -1,10 +1,16 @@
-"""The robust, hierarchical likelihood of logarithms: within a track, between tracks, others.
+"""A robust linear mixed model of logarithms, fitted by iterated re-weighting (IRLS) and EM.
 
-A row's residual is its track's own level and trend in time plus a deviation. Levels are Student-t
-between tracks, trends Gaussian, deviations Student-t within one and correlated from row to row.
-Rows that belong to something else (standing, sitting, a tracker's mistake) are a broad second
-kind. All is worked out by iterated re-weighting: given the weights, it is a Gaussian model whose
-levels and trends are integrated out.
+Row j of track i, at a time w after the track's middle, is y_ij = x_ij' beta + a_i + b_i w_ij +
+e_ij: the site's field, the track's own level and trend, and a deviation. a_i is Student-t between
+tracks, b_i Gaussian, e_ij Student-t within a track and a first-order autoregression. Rows that
+belong to something else (standing, sitting, a tracker's mistake) are outliers: a broad Gaussian of
+y itself, of which each track has a share of its own. Given the weights of rows and tracks it is a
+Gaussian mixed model, whose a_i and b_i are integrated out.
+
+Source: Laird and Ware 1982 for the mixed model and its EM; Lange, Little and Taylor 1989 for the
+Student-t's weights, (nu + 1) / (nu + u^2), at 4 degrees of freedom; the outliers are the mixture of
+Aitkin and Tunnicliffe Wilson 1980. Ours are weights by the predicted a_i, without its variance, the
+tracks' own shares, and a correlation by moments.
 """
 
 import math
@@ -15,12 +21,13 @@ import numpy.typing as npt
 
 from models.estimation.joint.observations import Rows
 from models.geometry.rotation import Array, Mask
+from models.packing import stored_as
 
 _FREEDOM = 4.0  # of both Student-t
 # The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
-# average, say 1.
+# average, say 1. Source: Lange, Little and Taylor 1989.
 FISHER = (_FREEDOM + 3) / (_FREEDOM + 1)
-_OTHER_CLIP = 30.0
+_ODDS_CLIP = 30.0
 _SHARE_WEIGHT = 2.0  # rows that the site's share counts for in a track's own
 _SHARE_ROUNDS = 4
 _INDEPENDENT_ROWS = 4  # a long track says no more than so many about which start is the best
@@ -31,7 +38,7 @@ class Spread:
     """How logarithms scatter at a site.
 
     `between_sd` of the levels of tracks, `trend_sd` of their trends in 10 s, `within_sd` of
-    deviations, `correlation` from one row to the next; the other kind's share, and its mean and
+    deviations, `correlation` from one row to the next; the outliers' share, and their mean and
     spread (of the value, not the residual).
     """
 
@@ -39,9 +46,9 @@ class Spread:
     trend_sd: float
     within_sd: float
     correlation: float
-    other_share: float
-    other_mean: float
-    other_sd: float
+    outlier_share: float = stored_as("other_share")
+    outlier_mean: float = stored_as("other_mean")
+    outlier_sd: float = stored_as("other_sd")
 
     @property
     def total_sd(self) -> float:
@@ -53,13 +60,13 @@ class Spread:
 class Weights:
     """What re-weighting found: rows (M,) and tracks (N,).
 
-    `usual` (M,) is the chance of a row to be of the usual kind; `own` (N, 2) level and trend of
+    `inlier` (M,) is the probability of a row to be no outlier; `own` (N, 2) level and trend of
     each track with their covariance `own_covariance` (N, 2, 2).
     """
 
     row: Array
     track: Array
-    usual: Array
+    inlier: Array
     own: Array
     own_covariance: Array
 
@@ -81,29 +88,29 @@ class Curvature:
 
 
 def log_density(residual: Array, value: Array, spread: Spread) -> tuple[Array, Array]:
-    """Log densities (M,) of the usual kind and of the other one."""
+    """Log densities (M,) of inliers and of outliers."""
     scaled = residual / spread.total_sd
     half = (_FREEDOM + 1) / 2
     constant = math.lgamma(half) - math.lgamma(_FREEDOM / 2) - 0.5 * math.log(_FREEDOM * math.pi)
-    usual = constant - half * np.log1p(scaled**2 / _FREEDOM) - np.log(spread.total_sd)
-    other = -0.5 * ((value - spread.other_mean) / spread.other_sd) ** 2
-    other = other - np.log(spread.other_sd) - 0.5 * np.log(2 * np.pi)
-    return np.asarray(usual), np.asarray(other)
+    inlier = constant - half * np.log1p(scaled**2 / _FREEDOM) - np.log(spread.total_sd)
+    outlier = -0.5 * ((value - spread.outlier_mean) / spread.outlier_sd) ** 2
+    outlier = outlier - np.log(spread.outlier_sd) - 0.5 * np.log(2 * np.pi)
+    return np.asarray(inlier), np.asarray(outlier)
 
 
 def reweigh(
     residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread, rounds: int = 3
 ) -> Weights:
     """Weights at given residuals (M,); rows that are not valid count for nothing."""
-    usual, other = log_density(residual, value, spread)
-    odds = np.exp(np.clip(other - usual, -_OTHER_CLIP, _OTHER_CLIP))
-    chance = _chances(odds, valid, rows, spread)
+    inlier, outlier = log_density(residual, value, spread)
+    odds = np.exp(np.clip(outlier - inlier, -_ODDS_CLIP, _ODDS_CLIP))
+    probability = _inlier_probabilities(odds, valid, rows, spread)
     # Correlated rows count as fewer.
     precision = (1 - spread.correlation) / (1 + spread.correlation) / spread.within_sd**2
     weights = Weights(
-        row=chance,
+        row=probability,
         track=np.ones(rows.owners),
-        usual=chance,
+        inlier=probability,
         own=np.zeros((rows.owners, 2)),
         own_covariance=np.zeros((rows.owners, 2, 2)),
     )
@@ -112,20 +119,20 @@ def reweigh(
     return weights
 
 
-def _chances(odds: Array, valid: Mask, rows: Rows, spread: Spread) -> Array:
-    """The chance (M,) of each row to be of the usual kind, each track with a share of its own.
+def _inlier_probabilities(odds: Array, valid: Mask, rows: Rows, spread: Spread) -> Array:
+    """The probability (M,) of each row to be an inlier, each track with a share of its own.
 
     Someone who stands through most of a track stands in the rest of it too, whatever the noise
     makes of it.
     """
     number = np.bincount(rows.owner_idx, valid, rows.owners)
-    share = np.full(rows.owners, spread.other_share)
+    share = np.full(rows.owners, spread.outlier_share)
     for _ in range(_SHARE_ROUNDS):
-        strange = share[rows.owner_idx] * odds
-        chance = np.where(valid, 1 - strange / (strange + 1 - share[rows.owner_idx]), 0.0)
-        others = number - np.bincount(rows.owner_idx, chance, rows.owners)
-        share = (_SHARE_WEIGHT * spread.other_share + others) / (_SHARE_WEIGHT + number)
-    return np.asarray(chance)
+        outlier = share[rows.owner_idx] * odds
+        inlier = np.where(valid, 1 - outlier / (outlier + 1 - share[rows.owner_idx]), 0.0)
+        outliers = number - np.bincount(rows.owner_idx, inlier, rows.owners)
+        share = (_SHARE_WEIGHT * spread.outlier_share + outliers) / (_SHARE_WEIGHT + number)
+    return np.asarray(inlier)
 
 
 def _reweighed(
@@ -143,7 +150,7 @@ def _reweighed(
     found = replace(weights, track=track, own=own, own_covariance=covariance)
     deviation = found.deviation(residual, rows)
     doubt = (_FREEDOM + 1) / (_FREEDOM + (deviation / spread.within_sd) ** 2)
-    return replace(found, row=weights.usual * doubt)
+    return replace(found, row=weights.inlier * doubt)
 
 
 def _held(one: Array, mixed: Array, square: Array, track: Array, spread: Spread) -> Array:
@@ -197,7 +204,7 @@ def _whitened(
 ) -> Array:
     """Rows (M, P + 3): derivatives, residual, level and trend, of unit variance, uncorrelated.
 
-    Deviations are a first-order autoregression.
+    Deviations are a first-order autoregression. Source: Prais and Winsten 1954.
     """
     own = np.stack([np.ones(len(rows)), rows.when], axis=1)
     stacked = np.concatenate([jacobian, residual[:, None], own], axis=1)
@@ -216,25 +223,30 @@ def _by_track(values: Array, rows: Rows) -> tuple[npt.NDArray[np.int64], Array]:
     return rows.owner_idx[firsts], np.asarray(np.add.reduceat(values, firsts, axis=0))
 
 
-def goodness(residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread) -> Array:
-    """How well a candidate explains each track (N,): log density, long tracks as short ones.
+def composite_log_likelihoods(
+    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread
+) -> Array:
+    """The composite log likelihood (N,) of each track, by its rows apart; long ones are as short.
 
     For comparing candidates far apart; a row above the horizon counts as all but impossible.
+    Source: Varin, Reid and Firth 2011, an independence likelihood; its weights are ours.
     """
-    usual, other = log_density(residual, value, spread)
-    share = spread.other_share
-    both = np.logaddexp(usual + math.log1p(-share), other + math.log(share))
+    inlier, outlier = log_density(residual, value, spread)
+    share = spread.outlier_share
+    both = np.logaddexp(inlier + math.log1p(-share), outlier + math.log(share))
     density = np.where(valid, both, -8.0)
     total = np.bincount(rows.owner_idx, density, rows.owners)
     number = np.bincount(rows.owner_idx, minlength=rows.owners)
     return np.asarray(total / np.maximum(number, 1) * np.minimum(number, _INDEPENDENT_ROWS))
 
 
-def fitness(residual: Array, weights: Weights, rows: Rows, spread: Spread) -> float:
-    """How well a field explains tracks: a log density, but for what the spread alone decides."""
+def hierarchical_log_likelihood(
+    residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> float:
+    """The h-likelihood (Lee and Nelder 1996), but for what the spread alone decides."""
     half = (_FREEDOM + 1) / 2
     scaled = weights.deviation(residual, rows) / spread.within_sd
-    within = (weights.usual * np.log1p(scaled**2 / _FREEDOM)).sum()
+    within = (weights.inlier * np.log1p(scaled**2 / _FREEDOM)).sum()
     # Correlated rows count as fewer.
     within *= (1 - spread.correlation) / (1 + spread.correlation)
     level, trend = weights.own.T
@@ -246,31 +258,31 @@ def relearn(
     residual: Array, value: Array, valid: Mask, rows: Rows, weights: Weights, spread: Spread
 ) -> Spread:
     """The spread that explains residuals best, given the weights: a step of EM."""
-    usual_rows = np.bincount(rows.owner_idx, weights.usual, rows.owners)
-    seen = usual_rows > 1.5
+    inlier_rows = np.bincount(rows.owner_idx, weights.inlier, rows.owners)
+    seen = inlier_rows > 1.5
     if seen.sum() < 3:
         return spread
     own = weights.own[seen] ** 2 + np.diagonal(weights.own_covariance[seen], axis1=1, axis2=2)
     between, trend = weights.track[seen] * own[:, 0], own[:, 1]
     deviation = weights.deviation(residual, rows)
-    usual = float(weights.usual[valid].sum())
-    freedom = max(0.3, 1 - float(seen.sum()) / max(usual, 1.0))
-    within = float((weights.row * deviation**2)[valid].sum()) / max(usual, 1.0) / freedom
-    correlation = _correlation(deviation, weights.row, valid, rows, usual / float(seen.sum()))
-    other_mean, other_sd = spread.other_mean, spread.other_sd
-    strange = (1 - weights.usual)[valid]
-    if strange.sum() > 20:
-        other_mean = float((strange * value[valid]).sum() / strange.sum())
-        deviation_other = (strange * (value[valid] - other_mean) ** 2).sum() / strange.sum()
-        other_sd = float(np.sqrt(deviation_other))
+    inlier = float(weights.inlier[valid].sum())
+    freedom = max(0.3, 1 - float(seen.sum()) / max(inlier, 1.0))
+    within = float((weights.row * deviation**2)[valid].sum()) / max(inlier, 1.0) / freedom
+    correlation = _correlation(deviation, weights.row, valid, rows, inlier / float(seen.sum()))
+    outlier_mean, outlier_sd = spread.outlier_mean, spread.outlier_sd
+    outlier = (1 - weights.inlier)[valid]
+    if outlier.sum() > 20:
+        outlier_mean = float((outlier * value[valid]).sum() / outlier.sum())
+        outlier_square = (outlier * (value[valid] - outlier_mean) ** 2).sum() / outlier.sum()
+        outlier_sd = float(np.sqrt(outlier_square))
     return Spread(
         between_sd=float(np.clip(np.sqrt(between.mean()), 0.02, 0.5)),
         trend_sd=float(np.clip(np.sqrt(trend.mean()), 0.005, 0.3)),
         within_sd=float(np.clip(np.sqrt(within), 0.01, 0.5)),
         correlation=correlation,
-        other_share=float(np.clip((1 - weights.usual)[valid].mean(), 0.02, 0.8)),
-        other_mean=float(np.clip(other_mean, -3.0, 1.0)),
-        other_sd=float(np.clip(other_sd, 0.3, 1.5)),
+        outlier_share=float(np.clip((1 - weights.inlier)[valid].mean(), 0.02, 0.8)),
+        outlier_mean=float(np.clip(outlier_mean, -3.0, 1.0)),
+        outlier_sd=float(np.clip(outlier_sd, 0.3, 1.5)),
     )
 
 

@@ -2,6 +2,9 @@
 
 A candidate is (tilt, roll, log height). Places are on the ground relative to the camera's foot
 point, in metres, axes as the world's.
+
+Ours: with the flow F of ground points under a small change of the pose, a step of direction u has
+d log speed = u' (grad F) u.
 """
 
 from dataclasses import dataclass
@@ -22,10 +25,10 @@ class Measured:
     """M logarithms at one candidate pose, where they were measured, and derivatives.
 
     `value` (M,) is a log speed (m/s) or log stature (m); `place` (M, 2); `direction` (M, 2) unit
-    vectors of the walk, none for statures; `valid` (M,): below the horizon.
-    `d_value` (M, 3), `d_place` and `d_direction` (M, 2, 3) are derivatives by tilt, roll, log
-    height. What is not valid is 0. `d_sway` (M, 3) is how much `d_value` changes when the
-    direction is off by one standard deviation of its noise.
+    vectors of the walk, none for statures; `valid` (M,): below the horizon. `d_value` (M, 3),
+    `d_place` and `d_direction` (M, 2, 3) are derivatives by tilt, roll, log height. What is not
+    valid is 0. `d_direction_noise` (M, 3) is how much `d_value` changes when the direction is off
+    by one standard deviation of its noise.
     """
 
     value: Array
@@ -35,7 +38,7 @@ class Measured:
     d_value: Array
     d_place: Array
     d_direction: Array | None
-    d_sway: Array
+    d_direction_noise: Array
     rows: Rows
 
 
@@ -56,11 +59,11 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
     direction = across / np.maximum(length, 1e-12)[:, None]
     place = (start + end) / 2
     aside = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-    swayed, swayed_valid = ground_of_rays(steps.swayed_rays, rotation, beyond=0.0)
-    off = np.where(swayed_valid, ((swayed - end) * aside).sum(axis=1), 0.0)
+    noisy_end, noisy_valid = ground_of_rays(steps.noisy_end_rays, rotation, beyond=0.0)
+    off = np.where(noisy_valid, ((noisy_end - end) * aside).sum(axis=1), 0.0)
     turned = off / np.maximum(length / 2, 1e-12)
     toward, beside = (direction * place).sum(axis=1), (aside * place).sum(axis=1)
-    d_sway = np.zeros((len(place), 3))
+    d_direction_noise = np.zeros((len(place), 3))
     d_value = np.ones((len(place), 3))
     d_place = np.empty((len(place), 2, 3))
     d_direction = np.zeros((len(place), 2, 3))
@@ -68,7 +71,7 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
         d_place[:, :, number], fall = ground_flow(place, turn)
         along = direction @ turn[:2, 2]
         d_value[:, number] = fall + toward * along
-        d_sway[:, number] = turned * (beside * along + toward * (aside @ turn[:2, 2]))
+        d_direction_noise[:, number] = turned * (beside * along + toward * (aside @ turn[:2, 2]))
         bent = direction @ turn[:2, :2] + place * along[:, None]
         across = (bent * direction).sum(axis=1)
         d_direction[:, :, number] = bent - across[:, None] * direction
@@ -83,7 +86,7 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
         d_value=np.where(valid[:, None], d_value, 0.0),
         d_place=d_place * height_m,
         d_direction=d_direction,
-        d_sway=np.where(valid[:, None], d_sway, 0.0),
+        d_direction_noise=np.where(valid[:, None], d_direction_noise, 0.0),
         rows=steps.rows,
     )
 
@@ -117,7 +120,7 @@ def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measur
         d_value=np.where(valid[:, None], d_value, 0.0),
         d_place=d_place * height_m,
         d_direction=None,
-        d_sway=np.zeros((len(place), 3)),
+        d_direction_noise=np.zeros((len(place), 3)),
         rows=tops.rows,
     )
 

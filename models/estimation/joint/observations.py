@@ -1,6 +1,6 @@
 """What the joint estimator reads of tracks: steps of walkers and the tops of their boxes.
 
-Nothing here depends on the pose, so it is worked out once for all poses that are tried.
+Nothing here depends on the pose. Source of the smoothing: Cleveland 1979, local straight lines.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ _KERNEL_S = 0.7  # half the width of the smoothing around a node
 _LONGEST_GAP_S = 1.1
 _FEWEST_POINTS = 3
 _WAY_NODES = 2  # on both sides of a step: 4.5 s
-_LARGEST_SWAY = 0.5
+_LARGEST_DIRECTION_NOISE = 0.5
 _LEAST_CHORD = 1e-7  # of a ray: far less than a pixel
 
 
@@ -49,13 +49,13 @@ class Steps:
 
     The ends lie along the longer chord around a step, in the image, as far apart as the step
     went along it: what noise adds sideways is not walked. Left in, its share in a speed would
-    depend on the pose, and poses that hide noise would be taken for likely ones. `swayed_rays`
+    depend on the pose, and poses that hide noise would be taken for likely ones. `noisy_end_rays`
     (M, 3) are the far ends if the chord is turned by one standard deviation of its own noise.
     """
 
     start_rays: Array
     end_rays: Array
-    swayed_rays: Array
+    noisy_end_rays: Array
     seconds: Array
     rows: Rows
 
@@ -90,7 +90,7 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     Each run of points inside the image without a gap is smoothed by a local straight line at nodes
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
-    starts, ends, swayed, seconds, feet, tops = [], [], [], [], [], []
+    starts, ends, noisy_ends, seconds, feet, tops = [], [], [], [], [], []
     step_owners: list[int] = []
     step_runs: list[int] = []
     step_times: list[Array] = []
@@ -105,10 +105,10 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             if time_s.size < 2 or not valid.all():
                 continue
             run += 1
-            start, end, sway = _steps(rays)
+            start, end, noisy_end = _steps(rays)
             starts.append(start)
             ends.append(end)
-            swayed.append(sway)
+            noisy_ends.append(noisy_end)
             seconds.append(np.diff(time_s))
             step_owners += [owner] * (time_s.size - 1)
             step_runs += [run] * (time_s.size - 1)
@@ -124,7 +124,7 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
         steps=Steps(
             start_rays=_joined(starts, (0, 3)),
             end_rays=_joined(ends, (0, 3)),
-            swayed_rays=_joined(swayed, (0, 3)),
+            noisy_end_rays=_joined(noisy_ends, (0, 3)),
             seconds=_joined(seconds, (0,)),
             rows=_rows(step_owners, step_runs, step_times, count),
         ),
@@ -183,7 +183,7 @@ def steps_where(steps: Steps, kept: Mask) -> Steps:
     return Steps(
         start_rays=steps.start_rays[kept],
         end_rays=steps.end_rays[kept],
-        swayed_rays=steps.swayed_rays[kept],
+        noisy_end_rays=steps.noisy_end_rays[kept],
         seconds=steps.seconds[kept],
         rows=_kept(replace(rows, linked=linked), kept, same, rows.owners),
     )
@@ -227,14 +227,14 @@ def _nodes(trajectory: Trajectory, indices: npt.NDArray[np.int64]) -> tuple[Arra
 
 
 def _steps(rays: Array) -> tuple[Array, Array, Array]:
-    """Rays (K - 1, 3) to both ends of the steps between nodes (K, 3), and to swayed far ends."""
+    """Rays (K - 1, 3) to both ends of the steps between nodes (K, 3), and to the noisy far ends."""
     way, lever = _ways(rays)
     along = np.abs(((rays[1:] - rays[:-1]) * way).sum(axis=1))
     middle = (rays[1:] + rays[:-1]) / 2
     half = np.maximum(along, _LEAST_CHORD)[:, None] / 2
     aside = np.stack([-way[:, 1], way[:, 0], np.zeros(len(way))], axis=1)
-    sway = np.minimum(_noise(rays, aside) / lever, _LARGEST_SWAY)[:, None]
-    return middle - half * way, middle + half * way, middle + half * (way + sway * aside)
+    noise = np.minimum(_noise(rays, aside) / lever, _LARGEST_DIRECTION_NOISE)[:, None]
+    return middle - half * way, middle + half * way, middle + half * (way + noise * aside)
 
 
 def _ways(rays: Array) -> tuple[Array, Array]:
@@ -253,7 +253,7 @@ def _ways(rays: Array) -> tuple[Array, Array]:
 
 
 def _noise(rays: Array, aside: Array) -> float:
-    """Standard deviation of a node of one run, sideways, by second differences."""
+    """Standard deviation of a node of a run, sideways, by differences (Gasser et al. 1986)."""
     if len(rays) < 3:
         return 0.0  # two nodes make one step, and one step has no track to differ from
     bend = ((rays[2:] - 2 * rays[1:-1] + rays[:-2]) * aside[1:]).sum(axis=1)

@@ -2,21 +2,21 @@
 
 from dataclasses import replace
 
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.packing import Format, flattened, pack, restored, unpack
 
 _FORMAT = Format(name="site", version=1)
 
 
-def reference_to_bytes(reference: SiteReference) -> bytes:
-    """A reference as it is stored, but for its doubt, which is told once."""
+def reference_to_bytes(reference: SpeedReference) -> bytes:
+    """A reference as it is stored, but for its doubt, which has a column of its own."""
     return pack(_FORMAT, flattened(replace(reference, doubt=None)))
 
 
-def reference_from_bytes(data: bytes) -> SiteReference:
+def reference_from_bytes(data: bytes) -> SpeedReference:
     """The reference of `reference_to_bytes`.
 
     Raises:
         CheckpointError: the bytes are no reference of this format.
     """
-    return restored(SiteReference, unpack(_FORMAT, data), doubt=None)
+    return restored(SpeedReference, unpack(_FORMAT, data), doubt=None)

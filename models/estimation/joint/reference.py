@@ -1,4 +1,8 @@
-"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there."""
+"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there.
+
+Ours: the offset is shrunk by its own noise, K = P (P + S)^-1 for a plausible P and its covariance
+S; the variance inflation is the mean of e' S^-1 e / 3 over halves of the reference, held out.
+"""
 
 from dataclasses import replace
 
@@ -7,18 +11,18 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
-from models.estimation.joint.fit import assumed, fit_pose, foretold, learn
+from models.estimation.joint.fit import assumed, fit_pose, held_out_log_likelihood, learn
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.site import (
+from models.estimation.joint.speed_reference import (
     USUAL_SPEEDS_MPS,
     USUAL_STATURES_M,
-    SiteReference,
+    SpeedReference,
     channels_of,
     pose_prior,
 )
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
@@ -36,38 +40,38 @@ _SPEED_SPREAD = Spread(
     trend_sd=0.05,
     within_sd=0.11,
     correlation=0.45,
-    other_share=0.2,
-    other_mean=float(np.log(0.2)),
-    other_sd=1.0,
+    outlier_share=0.2,
+    outlier_mean=float(np.log(0.2)),
+    outlier_sd=1.0,
 )
 _TOPS_SPREAD = Spread(
     between_sd=0.06,
     trend_sd=0.02,
     within_sd=0.04,
     correlation=0.5,
-    other_share=0.05,
-    other_mean=float(np.log(1.4)),
-    other_sd=0.5,
+    outlier_share=0.05,
+    outlier_mean=float(np.log(1.4)),
+    outlier_sd=0.5,
 )
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
 _SPREAD_ROUNDS = 5
 _FREEDOMS = (0.03, 0.3, 1.0)  # of the field's variation by place and direction, shares of the most
-_TELLING_GAIN = 1.0  # of the log density, for a freer field to be worth it
+_LEAST_GAIN = 1.0  # of the log likelihood, for a freer field to be worth it
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
 _DOUBT_RAD = float(np.radians(4.0))
 _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
 _PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
-# Squared errors against predicted ones, before any is seen, and what that guess weighs.
-_SURPRISE = 3.0
-_SURPRISE_WEIGHT = 6.0
-_LARGEST_SURPRISE = 9.0
+# Squared errors over predicted variances: before any are seen, and what that guess weighs.
+_ASSUMED_INFLATION = 3.0
+_ASSUMED_INFLATION_WEIGHT = 6.0
+_LARGEST_RATIO = 9.0
 
 
-def assumed_reference(
+def assumed_speed_reference(
     observations: Observations, prior: CameraPose, walk: WalkConfig
-) -> SiteReference:
+) -> SpeedReference:
     """A site of which nothing is known but an assumed walking speed.
 
     Raises:
@@ -78,7 +82,7 @@ def assumed_reference(
             f"tracks: at least {FEWEST_WALKERS} that walk for a few seconds inside the image are "
             f"needed, got {observations.walkers}"
         )
-    at = numbers_of(prior)
+    at = plane_parameters_of(prior)
     relative_sd = walk.speed_sd_mps / walk.speed_mean_mps
     shape = FieldShape(
         level=float(np.log(walk.speed_mean_mps)),
@@ -91,20 +95,20 @@ def assumed_reference(
     tops = measure_statures(observations.tops, at, prior.heading_rad)
     usable, words = _judge_boxes(tops)
     statures = assumed(field_over(tops, _TOPS_SHAPE), _TOPS_SPREAD) if usable else None
-    return SiteReference(
+    return SpeedReference(
         speeds=assumed(field_over(speeds, shape), _SPEED_SPREAD),
         statures=statures,
         offset=np.zeros(3),
         offset_covariance=np.zeros((3, 3)),
-        inflation=_SURPRISE,
+        pose_variance_inflation=_ASSUMED_INFLATION,
         tracks=0,
         boxes=words,
     )
 
 
-def learn_reference(
+def learn_speed_reference(
     observations: Observations, prior: CameraPose, walk: WalkConfig, seed: int
-) -> SiteReference:
+) -> SpeedReference:
     """What is usual at a site whose camera stands at its prior pose, and our own bias there.
 
     The bias is what the estimator says of the very tracks that the site was learned from; how far
@@ -114,12 +118,16 @@ def learn_reference(
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
-    blank = assumed_reference(observations, prior, walk)
+    blank = assumed_speed_reference(observations, prior, walk)
     blank = _suited(observations, prior, blank, seed)
     site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
-    whole = fit_pose(channels_of(observations, site, prior), numbers_of(prior), pose_prior(prior))
-    offset = whole.candidate - numbers_of(prior)
-    inflation = _inflation(observations, prior, _with_spreads(blank, site), offset, seed)
+    whole = fit_pose(
+        channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
+    )
+    offset = whole.candidate - plane_parameters_of(prior)
+    inflation = _pose_variance_inflation(
+        observations, prior, _with_spreads(blank, site), offset, seed
+    )
     # A bias is of a degree or so: what the tracks leave free is not taken for one.
     plausible = np.diag(_PLAUSIBLE_OFFSET**2)
     noise = whole.covariance * inflation
@@ -128,13 +136,15 @@ def learn_reference(
         site,
         offset=kept @ offset,
         offset_covariance=kept @ noise,
-        inflation=inflation,
+        pose_variance_inflation=inflation,
         tracks=observations.walkers,
     )
     return replace(site, doubt=_doubt(observations, prior, blank, site))
 
 
-def relearned(observations: Observations, prior: CameraPose, site: SiteReference) -> SiteReference:
+def relearned(
+    observations: Observations, prior: CameraPose, site: SpeedReference
+) -> SpeedReference:
     """A site whose fields are learned of other tracks at the prior pose, by the spread it has.
 
     What was doubted of the first tracks is not said of these.
@@ -151,7 +161,7 @@ def relearned(observations: Observations, prior: CameraPose, site: SiteReference
 
 
 def _doubt(
-    observations: Observations, prior: CameraPose, blank: SiteReference, site: SiteReference
+    observations: Observations, prior: CameraPose, blank: SpeedReference, site: SpeedReference
 ) -> Reason | None:
     """What of a reference is too far off to be a bias; None where nothing is."""
     slow, fast = USUAL_SPEEDS_MPS
@@ -166,8 +176,9 @@ def _doubt(
             code=TracksCode.STATURE_UNUSUAL,
             values={"stature_m": site.stature_m, "short_m": short, "tall_m": tall},
         )
-    free = joint_estimate(observations, prior, replace(blank, inflation=site.inflation))
-    apart = (free.raw - numbers_of(prior))[:2]
+    inflated = replace(blank, pose_variance_inflation=site.pose_variance_inflation)
+    free = joint_estimate(observations, prior, inflated)
+    apart = (free.raw - plane_parameters_of(prior))[:2]
     sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
     if ((np.abs(apart) > _DOUBT_RAD) & (sigmas > _DOUBT_SIGMAS)).any():
         tilt, roll = (float(angle) for angle in apart)
@@ -177,11 +188,11 @@ def _doubt(
 
 
 def _suited(
-    observations: Observations, prior: CameraPose, blank: SiteReference, seed: int
-) -> SiteReference:
+    observations: Observations, prior: CameraPose, blank: SpeedReference, seed: int
+) -> SpeedReference:
     """A blank site whose speeds may vary by place and direction as much as its tracks show.
 
-    One half of the tracks must foretell the other: a field that is freer than the site needs costs
+    One half of the tracks must predict the other: a field that is freer than the site needs costs
     every estimate some of its precision.
     """
     rng = np.random.default_rng(seed)
@@ -190,30 +201,30 @@ def _suited(
         order = rng.permutation(observations.tracks)
         first, second = np.array_split(order, 2)
         halves += [(np.sort(first), np.sort(second)), (np.sort(second), np.sort(first))]
-    at = numbers_of(prior)
-    # One spread for all, so that they differ in what they foretell alone.
+    at = plane_parameters_of(prior)
+    # One spread for all, so that they differ in what they predict alone.
     spread = _learned(observations, prior, blank, 1).speeds.spread
     best, found = -np.inf, blank
     for freedom in _FREEDOMS:
         speeds = assumed(blank.speeds.field.freer(freedom), blank.speeds.spread)
         tried = replace(blank, speeds=speeds, statures=None)
-        foretelling = replace(tried, speeds=replace(tried.speeds, spread=spread))
-        told = 0.0
+        candidate_site = replace(tried, speeds=replace(tried.speeds, spread=spread))
+        log_likelihood = 0.0
         for known, unknown in halves:
-            site = _learned(of_tracks(observations, known), prior, foretelling, 0)
-            told += foretold(
+            site = _learned(of_tracks(observations, known), prior, candidate_site, 0)
+            log_likelihood += held_out_log_likelihood(
                 measure_speeds(of_tracks(observations, unknown).steps, at, prior.heading_rad),
                 site.speeds,
             )
-        if told > best + _TELLING_GAIN * len(halves):
-            best, found = told, replace(tried, statures=blank.statures)
+        if log_likelihood > best + _LEAST_GAIN * len(halves):
+            best, found = log_likelihood, replace(tried, statures=blank.statures)
     return found
 
 
 def _learned(
-    observations: Observations, prior: CameraPose, blank: SiteReference, rounds: int
-) -> SiteReference:
-    at = numbers_of(prior)
+    observations: Observations, prior: CameraPose, blank: SpeedReference, rounds: int
+) -> SpeedReference:
+    at = plane_parameters_of(prior)
     speeds = learn(
         measure_speeds(observations.steps, at, prior.heading_rad),
         blank.speeds,
@@ -226,7 +237,7 @@ def _learned(
     return replace(blank, speeds=speeds, statures=statures)
 
 
-def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
+def _with_spreads(blank: SpeedReference, site: SpeedReference) -> SpeedReference:
     """The blank site's fields with the learned site's spreads."""
     statures = None
     if blank.statures is not None and site.statures is not None:
@@ -235,17 +246,17 @@ def _with_spreads(blank: SiteReference, site: SiteReference) -> SiteReference:
     return replace(blank, speeds=speeds, statures=statures)
 
 
-def _inflation(
+def _pose_variance_inflation(
     observations: Observations,
     prior: CameraPose,
-    blank: SiteReference,
+    blank: SpeedReference,
     offset: Array,
     seed: int,
 ) -> float:
     """How much larger squared errors are than predicted, by halves of the reference itself."""
     rng = np.random.default_rng(seed)
-    at = numbers_of(prior)
-    surprises = []
+    at = plane_parameters_of(prior)
+    ratios = []
     for _ in range(_FOLDS):
         order = rng.permutation(observations.tracks)
         half = observations.tracks // 2
@@ -257,9 +268,9 @@ def _inflation(
             fit = fit_pose(channels_of(unknown, site, prior), at, pose_prior(prior))
             error = fit.candidate - at - offset
             squared = float(error @ np.linalg.solve(fit.covariance, error)) / 3
-            surprises.append(min(squared, _LARGEST_SURPRISE))
-    guess = _SURPRISE * _SURPRISE_WEIGHT
-    return max(1.0, (sum(surprises) + guess) / (len(surprises) + _SURPRISE_WEIGHT))
+            ratios.append(min(squared, _LARGEST_RATIO))
+    guess = _ASSUMED_INFLATION * _ASSUMED_INFLATION_WEIGHT
+    return max(1.0, (sum(ratios) + guess) / (len(ratios) + _ASSUMED_INFLATION_WEIGHT))
 
 
 def _judge_boxes(tops: Measured) -> tuple[bool, str]:

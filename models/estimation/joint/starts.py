@@ -1,11 +1,15 @@
-"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us."""
+"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us.
+
+Ours: at each tilt and roll of a grid, log height = usual log speed - quantile of log speed at
+height 1.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from models.estimation.joint.fit import Channel
-from models.estimation.joint.hierarchy import goodness
+from models.estimation.joint.hierarchy import composite_log_likelihoods
 from models.geometry.rotation import Array
 
 _REACH_RAD = np.radians(20)
@@ -50,7 +54,7 @@ def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Arra
             value = measured.value + taller
             residual = np.where(measured.valid, value - channel.learned.usual, 0.0)
             spread = channel.learned.spread
-            each = goodness(residual, value, measured.valid, measured.rows, spread)
+            each = composite_log_likelihoods(residual, value, measured.valid, measured.rows, spread)
             total += float(each.sum())
         found.append((total, candidate + [0.0, 0.0, taller]))
     return found

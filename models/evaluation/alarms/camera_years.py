@@ -6,11 +6,16 @@ from itertools import islice
 import numpy as np
 
 from models.drift.chart import trace
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.errors import DegenerateGeometryError
 from models.evaluation.alarms.results import DAYS, AlarmResults, Delay, knocks_of
 from models.evaluation.alarms.watch import Watch, first_alarm, watch_over
-from models.evaluation.studies.study_site import SPEED_TRACKS, Place, draw_place, observe_feet
+from models.evaluation.studies.simulated_site import (
+    SPEED_TRACKS,
+    SimulatedSite,
+    draw_simulated_site,
+    observe_feet,
+)
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.recalibration import learn_site
@@ -39,46 +44,52 @@ def live_year(
         DegenerateGeometryError: no site could be drawn whose people are seen.
     """
     rng = np.random.default_rng([seed, site, 7])
-    place = draw_place(rng)
+    simulated = draw_simulated_site(rng)
     habits_seed = int(rng.integers(2**31))
-    life = _life(place, place.prior, tracks_a_day, 0, habits_seed)
+    life = _life(simulated, simulated.prior, tracks_a_day, 0, habits_seed)
     # The first that the life drew: after a knock, too, people take the lanes that they took.
-    mixes = draw_mixes(len(place.lanes), HabitConfig(), np.random.default_rng(habits_seed))
+    mixes = draw_mixes(len(simulated.lanes), HabitConfig(), np.random.default_rng(habits_seed))
     first: list[Trajectory] = []
     day = 0
     while len(first) < reference_tracks:
         first += next(life)
         day += 1
-    reference = observe_feet(first[:reference_tracks], place.intrinsics)
-    learned = learn_site(reference, place.intrinsics, place.prior, speed_tracks=SPEED_TRACKS)
-    watch = watch_over(learned, alarms_a_year=alarms_a_year, parties_a_day=tracks_a_day)
+    reference = observe_feet(first[:reference_tracks], simulated.intrinsics)
+    learned = learn_site(
+        reference, simulated.intrinsics, simulated.prior, speed_tracks=SPEED_TRACKS
+    )
+    watch = watch_over(learned, alarms_a_year=alarms_a_year, groups_a_day=tracks_a_day)
     assert watch is not None
     apart = []
     for _ in range(0, days, _WEEK):
         week = [track for tracks in islice(life, _WEEK) for track in tracks]
         if week:
-            seen = observe_feet(week, place.intrinsics)
-            apart.append(watch.apart(score_parties(seen, watch.usual)))
+            seen = observe_feet(week, simulated.intrinsics)
+            apart.append(watch.apart(score_groups(seen, watch.usual)))
     walked = np.concatenate(apart)
     delays = [
         delay
         for asked, knock in knocks_of(angles_deg, rng)
-        if (delay := _knocked(place, mixes, asked, knock.apply(place.prior), watch, day, rng))
+        if (
+            delay := _knocked(
+                simulated, mixes, asked, knock.apply(simulated.prior), watch, day, rng
+            )
+        )
     ]
     return AlarmResults(
         name=f"site {site}",
         seed=seed,
-        parties=int(watch.chart.parties),
+        walking_groups=int(watch.chart.walking_groups),
         years=days / DAYS,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, walked).statistic.max()) / watch.level,
-        told=0.0,
+        pose_excess=0.0,
         delays=tuple(delays),
     )
 
 
 def _knocked(
-    place: Place,
+    simulated: SimulatedSite,
     mixes: Array,
     asked: Delay,
     moved: CameraPose,
@@ -90,26 +101,26 @@ def _knocked(
     seen: list[Trajectory] = []
     try:
         seed = int(rng.integers(2**31))
-        for tracks in _life(place, moved, _LONGEST_TRACKS / 5, day, seed, mixes):
+        for tracks in _life(simulated, moved, _LONGEST_TRACKS / 5, day, seed, mixes):
             seen += tracks
             if len(seen) >= _LONGEST_TRACKS:
                 break
     except DegenerateGeometryError:
         return None
-    observations = observe_feet(seen[:_LONGEST_TRACKS], place.intrinsics)
-    scores = score_parties(observations, watch.usual)
+    observations = observe_feet(seen[:_LONGEST_TRACKS], simulated.intrinsics)
+    scores = score_groups(observations, watch.usual)
     if not scores.last.size:
         return None
-    parties_a_track = observations.tracks / scores.last.size
+    groups_a_track = observations.tracks / scores.last.size
     return Delay(
         angle_deg=asked.angle_deg,
         pan=asked.pan,
-        tracks=first_alarm(watch, watch.apart(scores), parties_a_track),
+        tracks=first_alarm(watch, watch.apart(scores), groups_a_track),
     )
 
 
 def _life(
-    place: Place,
+    simulated: SimulatedSite,
     pose: CameraPose,
     tracks_a_day: float,
     day: int,
@@ -117,10 +128,10 @@ def _life(
     mixes: Array | None = None,
 ) -> Iterator[list[Trajectory]]:
     return walk_days(
-        place.intrinsics,
+        simulated.intrinsics,
         pose,
-        place.lanes,
-        place.config,
+        simulated.lanes,
+        simulated.config,
         HabitConfig(),
         tracks_a_day=tracks_a_day,
         days=range(day, 10**6),

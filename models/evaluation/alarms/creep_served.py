@@ -11,7 +11,7 @@ import numpy as np
 
 from models.drift.creep import SHARE, read_creep
 from models.evaluation.alarms.creep_years import MONTH_DAYS, CreepPlan, Life, turned
-from models.evaluation.studies.study_site import observe_feet
+from models.evaluation.studies.simulated_site import observe_feet
 from models.recalibration import (
     begin_creep_log,
     estimate_pose,
@@ -53,7 +53,7 @@ def serve_creeping(
         DegenerateGeometryError: no site could be drawn whose people are seen.
     """
     life = Life(site, seed, plan)
-    lens, prior = life.place.intrinsics, life.place.prior
+    lens, prior = life.simulated.intrinsics, life.simulated.prior
     log = begin_creep_log(life.first, life.to_s)
     assert log is not None
     grown, known, grown_to_s = life.first, plan.reference_tracks, life.to_s
@@ -78,7 +78,7 @@ def serve_creeping(
                     true_deg=true_deg,
                     served_deg=math.degrees(by),
                     sd_deg=math.degrees(sd),
-                    told=number in pose.drift.told,
+                    told=number in pose.drift.identifiable,
                     crept=crept,
                 )
             )
@@ -95,7 +95,7 @@ def serve_creeping(
             observe_feet(seen, lens),
             lens,
             prior,
-            speeds=life.first.speeds,
+            speed_reference=life.first.speed_reference,
             weights=0.5 ** (ages_s / _HALF_LIFE_S),
             chart=False,
         )

@@ -9,7 +9,11 @@ from typing import Self
 import numpy as np
 
 from models.drift.creep import SHARE, Creep, read_creep
-from models.evaluation.studies.study_site import Place, draw_place, observe_feet
+from models.evaluation.studies.simulated_site import (
+    SimulatedSite,
+    draw_simulated_site,
+    observe_feet,
+)
 from models.geometry.pose import CameraPose
 from models.recalibration import CameraSite, begin_creep_log, learn_site, log_creep
 from models.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
@@ -44,7 +48,7 @@ class CreepCase:
     `told_deg` is how far it had gone when that was told first, after so many `days`; `said_deg`
     with `said_sd_deg` is what was said then of `said_number`. All are None where it never was.
     `alarms` are all of them; after each the log begins anew, as after a person's answer. `highest`
-    is the largest statistic, in units of its level, `parties` made the reference.
+    is the largest statistic, in units of its level, `groups` made the reference.
     """
 
     site: int
@@ -52,7 +56,7 @@ class CreepCase:
     number: str
     rate_deg: float
     days: int
-    parties: float
+    groups: float
     told_deg: float | None
     said_number: str | None
     said_deg: float | None
@@ -71,19 +75,21 @@ class Life:
 
     def __init__(self, site: int, seed: int, plan: CreepPlan) -> None:
         rng = np.random.default_rng([seed, site, 11])
-        self.place: Place = draw_place(rng)
+        self.simulated: SimulatedSite = draw_simulated_site(rng)
         self.site, self.seed, self.plan = site, seed, plan
         self._rng = np.random.default_rng(int(rng.integers(2**31)))
-        self._mixes = draw_mixes(len(self.place.lanes), HabitConfig(), self._rng)
+        self._mixes = draw_mixes(len(self.simulated.lanes), HabitConfig(), self._rng)
         self.day = -1
         tracks: list[Trajectory] = []
         while len(tracks) < plan.reference_tracks:
-            tracks += self.next_day(self.place.prior)
+            tracks += self.next_day(self.simulated.prior)
         tracks = tracks[: plan.reference_tracks]
         self.reference = tuple(tracks)
-        reference = observe_feet(tracks, self.place.intrinsics)
+        reference = observe_feet(tracks, self.simulated.intrinsics)
         self.to_s = float(tracks[-1].time_s[-1])
-        self.first: CameraSite = learn_site(reference, self.place.intrinsics, self.place.prior)
+        self.first: CameraSite = learn_site(
+            reference, self.simulated.intrinsics, self.simulated.prior
+        )
 
     def again(self) -> Self:
         """The same from after the reference on."""
@@ -95,10 +101,10 @@ class Life:
         """The tracks of the next day, seen from a pose."""
         self.day += 1
         days: Iterator[list[Trajectory]] = walk_days(
-            self.place.intrinsics,
+            self.simulated.intrinsics,
             pose,
-            self.place.lanes,
-            self.place.config,
+            self.simulated.lanes,
+            self.simulated.config,
             HabitConfig(),
             tracks_a_day=self.plan.tracks_a_day,
             days=range(self.day, self.day + 1),
@@ -142,10 +148,10 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
         turned_deg = rate_deg * days / MONTH_DAYS
         if turned_deg > _FARTHEST_DEG:
             break
-        tracks += life.next_day(turned(life.place.prior, number, turned_deg))
+        tracks += life.next_day(turned(life.simulated.prior, number, turned_deg))
         if days % _EVERY_DAYS or not tracks:
             continue
-        log = log_creep(log, observe_feet(tracks, life.place.intrinsics), life.first)
+        log = log_creep(log, observe_feet(tracks, life.simulated.intrinsics), life.first)
         tracks = []
         found = read_creep(log, SHARE * life.plan.alarms_a_year, from_s)
         if found is None:
@@ -163,9 +169,9 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
         number=number,
         rate_deg=rate_deg,
         days=days,
-        parties=log.reference_parties,
+        groups=log.reference_groups,
         told_deg=told_deg,
-        said_number=None if told is None else _NAMES[told.number],
+        said_number=None if told is None else _NAMES[told.parameter],
         said_deg=None if told is None else math.degrees(told.by),
         said_sd_deg=None if told is None else math.degrees(told.sd),
         alarms=alarms,

@@ -28,16 +28,16 @@ class AlarmResults:
     """One case: false alarms in some camera-years, and delays after knocks.
 
     `highest` is the largest statistic of the still half as it was recorded, in units of the level,
-    `told` the largest drift that the pose by that half tells, in units of its limit.
+    `pose_excess` the largest identifiable drift of the pose by that half, in units of its limit.
     """
 
     name: str
     seed: int
-    parties: int
+    walking_groups: int
     years: float
     false_alarms: int
     highest: float
-    told: float
+    pose_excess: float
     delays: tuple[Delay, ...]
 
 

@@ -1,7 +1,7 @@
 """Simulated years of people before a camera: false alerts of silence, and how long real ones take.
 
-Places differ in their hours, flows, parties, rain, holidays, seasons and in how their tracks are
-posted; some are stations, where people come by the train.
+Places differ in their hours, flows, walking groups, rain, holidays, seasons and in how their tracks
+are posted; some are stations, where people come by the train.
 
     python -m models.evaluation.alarms.rhythm_study --years 50
 """
@@ -164,8 +164,8 @@ def _simulate(rng: np.random.Generator, kind: str, posts: str, noon: float) -> _
         crowd = rng.poisson(np.repeat(rates / 3, 3))
         ended_s = np.repeat(trains_s + 300, crowd) + rng.exponential(60, crowd.sum())
     else:
-        parties = rng.poisson(rates / 1.6)
-        starts_s = np.repeat(_HOUR_S * np.arange(len(rates)), parties)
+        walking_groups = rng.poisson(rates / 1.6)
+        starts_s = np.repeat(_HOUR_S * np.arange(len(rates)), walking_groups)
         starts_s = starts_s + _HOUR_S * rng.random(len(starts_s))
         sizes = 1 + rng.poisson(0.6, len(starts_s))
         ended_s = np.repeat(starts_s, sizes) + rng.exponential(3, sizes.sum())

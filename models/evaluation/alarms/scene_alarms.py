@@ -1,8 +1,8 @@
 """False alarms and delays on recorded scenes, by the protocol's halves.
 
-One half is the reference, and the people of the other are drawn some parties after one another (a
-block bootstrap) for as long as is asked. An alarm is the chart's or the told pose's, whichever
-comes first, as in the service.
+One half is the reference, and the people of the other are drawn some walking groups after one
+another (a block bootstrap) for as long as is asked. An alarm is the chart's or the pose's,
+whichever comes first, as in the service.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from models.drift.chart import trace
 from models.drift.chart_learning import drawn_blocks
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.drift.verdict import DriftLimits, judge
 from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
@@ -30,7 +30,7 @@ from models.recalibration import Observations, observe
 from models.simulation.knocked import knock_trajectory
 from models.trajectory import Trajectory
 
-_LONGEST = 1200  # parties that a knock is waited for
+_LONGEST = 1200  # walking groups that a knock is waited for
 _DRAWS = 10
 _LOOKS = (20, 40, 60, 100, 200, 400)  # tracks after which a pose is asked for
 
@@ -50,45 +50,46 @@ def judge_scene(
     learned = learn_case(case, chart=True)
     reference = observe(case.reference, case.intrinsics)
     rng = np.random.default_rng([seed, 5])
-    parties_a_track = _parties_a_track(reference, case.prior_pose)
+    groups_a_track = _groups_a_track(reference, case.prior_pose)
     watch = watch_over(
         learned.site,
         alarms_a_year=alarms_a_year,
-        parties_a_day=tracks_a_day * parties_a_track,
+        groups_a_day=tracks_a_day * groups_a_track,
     )
     if watch is None:
         return None
-    still = watch.apart(score_parties(learned.seen, watch.usual))
-    wanted = round(years * DAYS * tracks_a_day * parties_a_track)
+    still = watch.apart(score_groups(learned.seen, watch.usual))
+    wanted = round(years * DAYS * tracks_a_day * groups_a_track)
     walked = still[drawn_blocks(rng, len(still), wanted)]
     delays = []
     for asked, knock in knocks_of(angles_deg, rng):
         moved = knock.apply(scene.true_pose)
         seen = _seen(scene, case.seen, moved)
-        apart = watch.apart(score_parties(seen, watch.usual))
+        apart = watch.apart(score_groups(seen, watch.usual))
         if len(apart):
-            told = _told_after(learned, seen, limits)
+            by_pose = _tracks_until_drifting(learned, seen, limits)
             drawn = (apart[drawn_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
             tracks = seen.tracks / len(apart)
             delays += [
-                replace(asked, tracks=min(told, first_alarm(watch, one, tracks))) for one in drawn
+                replace(asked, tracks=min(by_pose, first_alarm(watch, one, tracks)))
+                for one in drawn
             ]
     return AlarmResults(
         name=scene.scene_id,
         seed=seed,
-        parties=int(watch.chart.parties),
+        walking_groups=int(watch.chart.walking_groups),
         years=years,
         false_alarms=len(watch.alarms(walked)),
         highest=float(trace(watch.ratios, still).statistic.max()) / watch.level,
-        told=_told(learned, learned.seen, limits),
+        pose_excess=_pose_excess(learned, learned.seen, limits),
         delays=tuple(delays),
     )
 
 
-def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
-    """Tracks after which the pose by all until then tells a drift beyond its limit; inf: never.
+def _tracks_until_drifting(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """Tracks after which the pose by all until then has drifted beyond its limit; inf: never.
 
-    And told it without the newest people, too. Looked at after some numbers of tracks only: a pose
+    And had so without the newest people, too. Looked at after some numbers of tracks only: a pose
     takes half a second.
     """
     for number in _LOOKS:
@@ -96,15 +97,15 @@ def _told_after(learned: Learned, seen: Observations, limits: DriftLimits) -> fl
         if held > seen.tracks:
             break
         if all(
-            _told(learned, of_tracks(seen, np.arange(count)), limits) >= 1
+            _pose_excess(learned, of_tracks(seen, np.arange(count)), limits) >= 1
             for count in (number, held)
         ):
             return float(held)
     return math.inf
 
 
-def _told(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
-    """The largest told drift of the pose by what is seen, in units of its limit."""
+def _pose_excess(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
+    """The largest identifiable drift of the pose by what is seen, in units of its limit."""
     if learned.site.flow is None or seen.walkers < FEWEST_WALKERS:
         return 0.0
     return judge(served_pose(seen, learned.site).drift, limits, ()).excess
@@ -118,6 +119,6 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
     return observe(sorted(kept, key=lambda track: float(track.time_s[-1])), scene.intrinsics)
 
 
-def _parties_a_track(observations: Observations, prior: CameraPose) -> float:
+def _groups_a_track(observations: Observations, prior: CameraPose) -> float:
     walkers = walkers_of(observations, candidate_of(prior))
-    return max(walkers.parties, 1) / observations.tracks
+    return max(walkers.walking_groups, 1) / observations.tracks

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.drift.chart import RUN, DriftChart, Ratios, ratios_of, trace
-from models.drift.party_scores import PartyScores, Usual
+from models.drift.group_scores import GroupScores, Usual
 from models.evaluation.alarms.results import DAYS
 from models.geometry.rotation import Array
 from models.recalibration import CameraSite
@@ -23,12 +23,12 @@ class Watch:
     ratios: Ratios
     level: float
 
-    def apart(self, scores: PartyScores) -> Array:
-        """How far parties (P, 14) are from what is usual."""
+    def apart(self, scores: GroupScores) -> Array:
+        """How far walking groups (P, 14) are from what is usual."""
         return self.chart.bounded(scores.values) - self.chart.mean
 
     def alarms(self, apart: Array) -> list[int]:
-        """After which of parties (P, 14) there was an alarm; the chart begins anew after each."""
+        """After which of groups (P, 14) there was an alarm; the chart begins anew after each."""
         found: list[int] = []
         while len(found) < _MOST_ALARMS:
             first = found[-1] if found else 0
@@ -39,7 +39,7 @@ class Watch:
         return found
 
 
-def watch_over(site: CameraSite, *, alarms_a_year: float, parties_a_day: float) -> Watch | None:
+def watch_over(site: CameraSite, *, alarms_a_year: float, groups_a_day: float) -> Watch | None:
     """The chart of a learned site at a level; None where too few people walked to learn one."""
     if site.flow is None or site.chart is None:
         return None
@@ -47,11 +47,11 @@ def watch_over(site: CameraSite, *, alarms_a_year: float, parties_a_day: float) 
         chart=site.chart,
         usual=site.usual(site.flow, site.chart),
         ratios=ratios_of(site.chart),
-        level=site.chart.level(RUN * alarms_a_year / (parties_a_day * DAYS)),
+        level=site.chart.level(RUN * alarms_a_year / (groups_a_day * DAYS)),
     )
 
 
-def first_alarm(watch: Watch, apart: Array, tracks_a_party: float) -> float:
-    """Tracks until the first alarm among parties (P, 14); inf where there is none."""
+def first_alarm(watch: Watch, apart: Array, tracks_a_group: float) -> float:
+    """Tracks until the first alarm among walking groups (P, 14); inf where there is none."""
     beyond = np.flatnonzero(trace(watch.ratios, apart).statistic > watch.level)
-    return (int(beyond[0]) + 1) * tracks_a_party if beyond.size else math.inf
+    return (int(beyond[0]) + 1) * tracks_a_group if beyond.size else math.inf

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import PLANE_PARAMETERS, plane_parameters_of
 from models.evaluation.scenes import Knock, Scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -15,7 +15,6 @@ from models.quantiles import Z90
 from models.simulation.knocked import knock_trajectory
 from models.trajectory import Trajectory
 
-NUMBERS = ("tilt", "roll", "log_height")  # the order of every (3,) and (3, 3) here
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
 
 
@@ -62,14 +61,14 @@ class ProtocolCase:
 class Answer:
     """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
 
-    `weak` names those of the three that it declares the tracks cannot tell. `heading_rad` and its
+    `identifiable` names those of the three that it says the tracks determine. `heading_rad` and its
     standard deviation are what it says of the heading; None is the prior's.
     """
 
     values: Array
     covariance: Array
     tracks: int
-    weak: tuple[str, ...] = ()
+    identifiable: tuple[str, ...] = PLANE_PARAMETERS
     heading_rad: float | None = None
     heading_sd_rad: float | None = None
 
@@ -142,12 +141,12 @@ def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
 
 def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: float) -> Outcome:
     """An estimator's answer beside the truth."""
-    true, prior = numbers_of(case.true_pose), numbers_of(case.prior_pose)
+    true, prior = plane_parameters_of(case.true_pose), plane_parameters_of(case.prior_pose)
     error = answer.values - true
     error[1] = math.remainder(error[1], 2 * math.pi)
     sd = np.sqrt(np.diag(answer.covariance))
-    pose = pose_of_numbers(answer.values, case.prior_pose)
-    level = pose_of_numbers(answer.values, case.true_pose)
+    pose = pose_of_plane_parameters(answer.values, case.prior_pose)
+    level = pose_of_plane_parameters(answer.values, case.true_pose)
     heading_error = heading_covered = None
     if answer.heading_rad is not None and answer.heading_sd_rad is not None:
         pose = replace(pose, heading_rad=answer.heading_rad)
@@ -171,24 +170,24 @@ def judge_answer(case: ProtocolCase, estimator: str, answer: Answer, seconds: fl
         ),
         height_error=abs(math.expm1(error[2])),
         covered=(bool(covered[0]), bool(covered[1]), bool(covered[2])),
-        degenerate=bool(answer.weak),
+        degenerate=len(answer.identifiable) < len(PLANE_PARAMETERS),
         seconds=seconds,
         heading_error_deg=heading_error,
         heading_covered=heading_covered,
     )
 
 
-def nothing_told(case: ProtocolCase) -> Answer:
+def nothing_identifiable(case: ProtocolCase) -> Answer:
     """The answer to too few tracks: the prior pose, and that nothing is known of it."""
     return Answer(
-        values=numbers_of(case.prior_pose),
+        values=plane_parameters_of(case.prior_pose),
         covariance=np.diag(np.square(_UNKNOWN_SD)),
         tracks=0,
-        weak=NUMBERS,
+        identifiable=(),
     )
 
 
-def pose_of_numbers(numbers: Array, prior: CameraPose) -> CameraPose:
+def pose_of_plane_parameters(numbers: Array, prior: CameraPose) -> CameraPose:
     """The pose of tilt, roll and log height; x, y and heading are the prior pose's."""
     tilt, roll, log_height = (float(number) for number in numbers)
     return CameraPose(

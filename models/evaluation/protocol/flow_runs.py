@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.numbers import NUMBERS, TELLING_SD
-from models.evaluation.protocol.cases import Answer, nothing_told
+from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of
+from models.evaluation.protocol.cases import Answer, nothing_identifiable
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.protocol.served import served_pose
 from models.flow.fusion import elsewhere
@@ -37,57 +37,69 @@ def served_answer(seen: Observations, site: CameraSite) -> Answer:
         values=pose.values[:3],
         covariance=pose.covariance[:3, :3],
         tracks=found.joint.walkers,
-        weak=tuple(name for name in NUMBERS if name not in pose.told),
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name in pose.identifiable),
     )
-    return _with_heading(answer, pose.values, pose.covariance) if "heading" in pose.told else answer
+    return (
+        _with_heading(answer, pose.values, pose.covariance)
+        if "heading" in pose.identifiable
+        else answer
+    )
 
 
 def registration(learned: Learned) -> Answer:
     """The flow map alone, around the prior pose: nothing is known of speeds."""
     case, reference = learned.case, learned.site.flow
     if reference is None:
-        return nothing_told(case)
+        return nothing_identifiable(case)
     mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
-    if walkers.parties < _FEWEST:
-        return nothing_told(case)
-    site, temper = reference.site(case.intrinsics), reference.temper_for(walkers.people)
+    if walkers.walking_groups < _FEWEST:
+        return nothing_identifiable(case)
+    site, variance_inflation = (
+        reference.site(case.intrinsics),
+        reference.variance_inflation_for(walkers.people),
+    )
     belief = Belief(mean=mean, precision=_BROAD)
-    peaks = _peaks(walkers, site, belief, temper)
+    peaks = _peaks(walkers, site, belief, variance_inflation)
     best = peaks[0]
     known = reference.precision(best, walkers.people, best.candidate - mean)
     values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    chances = np.exp([peak.value - best.value for peak in peaks])
-    covariance = covariance + elsewhere(peaks, chances)
+    odds = np.exp([peak.value - best.value for peak in peaks])
+    covariance = covariance + elsewhere(peaks, odds)
     sd = np.sqrt(np.diag(covariance))[:3]
-    weak = tuple(n for n, is_weak in zip(NUMBERS, sd > TELLING_SD[:3], strict=True) if is_weak)
-    answer = replace(nothing_told(case), tracks=int(walkers.people), weak=weak)
+    answer = replace(
+        nothing_identifiable(case),
+        tracks=int(walkers.people),
+        identifiable=identifiable_of(PLANE_PARAMETERS, sd),
+    )
     return _with_heading(answer, values, covariance)
 
 
-def _peaks(walkers: Walkers, site: Site, belief: Belief, temper: float) -> list[Peak]:
+def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
 
-    def chance(candidate: Array) -> float:
-        return float(site.log_chances(walkers, candidate).sum()) / temper + belief.log_density(
-            candidate
-        )
+    def log_posterior(candidate: Array) -> float:
+        return float(
+            site.track_log_likelihoods(walkers, candidate).sum()
+        ) / variance_inflation + belief.log_density(candidate)
 
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
-        number: max(chance(belief.mean + node + turn) for turn in turns)
+        number: max(log_posterior(belief.mean + node + turn) for turn in turns)
         for number, node in enumerate(_NODES)
     }
     likeliest = sorted(starts, key=lambda number: -starts[number])
     peaks: list[Peak] = []
     for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
         around = replace(belief, mean=belief.mean + node)
-        for peak in register(walkers, site, around, temper=temper, headings=_HEADINGS):
+        for peak in register(
+            walkers, site, around, variance_inflation=variance_inflation, headings=_HEADINGS
+        ):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            posterior = peak.curvature / temper + belief.precision
+            posterior = peak.curvature / variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
-                peaks.append(replace(peak, candidate=candidate, value=chance(candidate)))
+                peaks.append(replace(peak, candidate=candidate, value=log_posterior(candidate)))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

@@ -5,9 +5,15 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, observe, of_tracks
-from models.estimation.joint.reference import assumed_reference, learn_reference
-from models.estimation.numbers import numbers_of
-from models.evaluation.protocol.cases import KNOCKED, Answer, KnockRange, draw_case, nothing_told
+from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
+from models.estimation.parameters import plane_parameters_of
+from models.evaluation.protocol.cases import (
+    KNOCKED,
+    Answer,
+    KnockRange,
+    draw_case,
+    nothing_identifiable,
+)
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.scenes import Scene
 from models.simulation.walkers import WalkConfig
@@ -17,21 +23,25 @@ _SEED = 0
 
 def joint(learned: Learned) -> Answer:
     """By speeds alone: the site learned from the reference, boxes where they tell something."""
-    return joint_answer(joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speeds))
+    return joint_answer(
+        joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speed_reference)
+    )
 
 
 def joint_feet(learned: Learned) -> Answer:
     """Without boxes."""
-    return joint_answer(joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speeds))
+    return joint_answer(
+        joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speed_reference)
+    )
 
 
 def joint_assumed(learned: Learned) -> Answer:
     """Without a reference: people are assumed to walk at 1.4 m/s, everywhere alike."""
     prior = learned.case.prior_pose
     try:
-        reference = assumed_reference(learned.seen, prior, WalkConfig())
+        reference = assumed_speed_reference(learned.seen, prior, WalkConfig())
     except TooFewTrajectoriesError:
-        return nothing_told(learned.case)
+        return nothing_identifiable(learned.case)
     return joint_answer(joint_estimate(learned.seen, prior, reference))
 
 
@@ -41,7 +51,7 @@ def joint_answer(estimate: JointEstimate) -> Answer:
         values=estimate.values,
         covariance=estimate.covariance,
         tracks=estimate.walkers,
-        weak=estimate.weak,
+        identifiable=estimate.identifiable,
     )
 
 
@@ -54,7 +64,7 @@ def track_errors(
     variances of tilt and roll.
     """
     case = draw_case(scene, seed, knock_range)
-    reference = learn_reference(
+    reference = learn_speed_reference(
         observe(case.reference, case.intrinsics), case.prior_pose, WalkConfig(), _SEED
     )
     seen = observe(case.seen, case.intrinsics)
@@ -65,7 +75,7 @@ def track_errors(
             break
         some: Observations = of_tracks(seen, np.sort(order[:count]))
         estimate = joint_estimate(some, case.prior_pose, reference)
-        error = np.degrees(estimate.values - numbers_of(case.true_pose))[:2]
+        error = np.degrees(estimate.values - plane_parameters_of(case.true_pose))[:2]
         bound = np.degrees(np.sqrt(np.trace(estimate.bound[:2, :2])))
         found.append((count, float(np.hypot(*error)), float(bound)))
     return found

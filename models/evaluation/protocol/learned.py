@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from models.estimation.joint.reference import learn_reference
-from models.estimation.joint.site import SiteReference
+from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.evaluation.protocol.cases import Answer, ProtocolCase
 from models.recalibration import CameraSite, Observations, WalkConfig, learn_site, observe
 
@@ -15,14 +15,14 @@ _SEED = 0
 class Learned:
     """A case with what is read of its tracks and learned of its site.
 
-    `site` is what the service would learn; `feet` and `feet_speeds` are without boxes.
+    `site` is what the service would learn; `feet` and `feet_speed_reference` are without boxes.
     """
 
     case: ProtocolCase
     seen: Observations
     site: CameraSite
     feet: Observations
-    feet_speeds: SiteReference
+    feet_speed_reference: SpeedReference
 
 
 LearnedEstimator = Callable[[Learned], Answer]
@@ -36,11 +36,17 @@ def learn_case(case: ProtocolCase, *, chart: bool = False) -> Learned:
     """
     known, seen = (observe(tracks, case.intrinsics) for tracks in (case.reference, case.seen))
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=_SEED, chart=chart)
-    feet, feet_speeds = seen, site.speeds
-    if site.speeds.statures is not None:  # else boxes are not used, and the feet's are the same
+    feet, feet_speed_reference = seen, site.speed_reference
+    if (
+        site.speed_reference.statures is not None
+    ):  # else boxes are not used, and the feet's are the same
         known_feet, feet = (
             observe([replace(track, top_v=None) for track in tracks], case.intrinsics)
             for tracks in (case.reference, case.seen)
         )
-        feet_speeds = learn_reference(known_feet, case.prior_pose, WalkConfig(), _SEED)
-    return Learned(case=case, seen=seen, site=site, feet=feet, feet_speeds=feet_speeds)
+        feet_speed_reference = learn_speed_reference(
+            known_feet, case.prior_pose, WalkConfig(), _SEED
+        )
+    return Learned(
+        case=case, seen=seen, site=site, feet=feet, feet_speed_reference=feet_speed_reference
+    )

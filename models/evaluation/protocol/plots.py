@@ -1,4 +1,4 @@
-"""Plots of the protocol: drift told against true, the ground re-projected, errors over tracks."""
+"""Plots of the protocol: drift found against true, the ground re-projected, errors over tracks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.evaluation.protocol.cases import Outcome, ProtocolCase, pose_of_numbers
+from models.evaluation.protocol.cases import Outcome, ProtocolCase, pose_of_plane_parameters
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -47,7 +47,7 @@ def plot_ground(case: ProtocolCase, values: Array, path: Path) -> None:
     for trajectory in case.seen:
         panel.plot(*trajectory.uv.T, color="#bbb", linewidth=0.6)
     feet = np.concatenate([trajectory.uv for trajectory in case.seen])
-    estimated = pose_of_numbers(values, case.prior_pose)
+    estimated = pose_of_plane_parameters(values, case.prior_pose)
     for pose, color, label in (
         (case.prior_pose, "#c60", "prior pose"),
         (case.true_pose, "black", "true pose"),

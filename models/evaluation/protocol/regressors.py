@@ -7,9 +7,13 @@ import numpy as np
 
 from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import average_windows, averaged_estimate
-from models.estimation.calibrated import calibrated_estimate, mean_numbers, sampling_covariance
-from models.estimation.numbers import NumbersEstimate, without_offset
-from models.evaluation.protocol.cases import NUMBERS, Answer, Estimator, ProtocolCase, nothing_told
+from models.estimation.calibrated import (
+    calibrated_estimate,
+    mean_plane_parameters,
+    sampling_covariance,
+)
+from models.estimation.parameters import PLANE_PARAMETERS, PlaneEstimate, without_offset
+from models.evaluation.protocol.cases import Answer, Estimator, ProtocolCase, nothing_identifiable
 from models.evaluation.scenes import Scene
 from models.geometry.pose import CameraPose
 from models.regression.calibration import learn_calibration
@@ -22,12 +26,12 @@ from models.simulation.crowds import FlowConfig
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory, choose_step_s, cut_windows
 
-# An answer less sure than this of a number declares it weak.
-_WEAK_SD = (math.radians(3), math.radians(3), 0.2)
+# A number of which an answer is less sure than this is not identifiable.
+_IDENTIFIABLE_SD = (math.radians(3), math.radians(3), 0.2)
 _TRAINING_SHARE = 0.5  # of the time: the other half is the set network's
 
 Tracks = Sequence[Trajectory]
-Reading = Callable[[Tracks], NumbersEstimate]
+Reading = Callable[[Tracks], PlaneEstimate]
 
 
 def prepare_regressors(
@@ -67,18 +71,18 @@ def prepare_regressors(
         set_plan, lambda share: on_progress(_TRAINING_SHARE + (1 - _TRAINING_SHARE) * share)
     )
 
-    def averaged(tracks: Tracks) -> NumbersEstimate:
+    def averaged(tracks: Tracks) -> PlaneEstimate:
         windows = cut_windows(tracks, scene.intrinsics, step_s)
         height_m, q = predict_windows(network, windows, plan)
         _, predictions = average_windows(height_m, q, windows.owner_idx)
         count = averaged_estimate(predictions, seed).tracks  # refuses too few
-        return NumbersEstimate(
-            values=mean_numbers(predictions),
+        return PlaneEstimate(
+            values=mean_plane_parameters(predictions),
             covariance=sampling_covariance(predictions, seed),
             tracks=count,
         )
 
-    def calibrated(tracks: Tracks) -> NumbersEstimate:
+    def calibrated(tracks: Tracks) -> PlaneEstimate:
         windows = cut_windows(tracks, scene.intrinsics, step_s)
         height_m, q = predict_windows(network, windows, plan)
         _, predictions = average_windows(height_m, q, windows.owner_idx)
@@ -109,7 +113,7 @@ def _declaring(estimator: Estimator) -> Estimator:
         try:
             return estimator(case)
         except TooFewTrajectoriesError:
-            return nothing_told(case)
+            return nothing_identifiable(case)
 
     return answer
 
@@ -119,9 +123,12 @@ def _with_offset(reading: Reading, case: ProtocolCase) -> Answer:
     return _answer(without_offset(reading(case.seen), reading(case.reference), prior))
 
 
-def _answer(estimate: NumbersEstimate) -> Answer:
+def _answer(estimate: PlaneEstimate) -> Answer:
     sd = np.sqrt(np.diag(estimate.covariance))
-    weak = tuple(name for name, has, most in zip(NUMBERS, sd, _WEAK_SD, strict=True) if has > most)
+    known = zip(PLANE_PARAMETERS, sd <= _IDENTIFIABLE_SD, strict=True)
     return Answer(
-        values=estimate.values, covariance=estimate.covariance, tracks=estimate.tracks, weak=weak
+        values=estimate.values,
+        covariance=estimate.covariance,
+        tracks=estimate.tracks,
+        identifiable=tuple(name for name, is_known in known if is_known),
     )

@@ -8,7 +8,7 @@ import numpy as np
 from models.evaluation.protocol.cases import Outcome
 from models.geometry.rotation import Array
 
-ENOUGH_TRACKS = 70  # slopes are told over scenes with so many tracks after the knock
+ENOUGH_TRACKS = 70  # slopes are of scenes with so many tracks after the knock
 _ALARM_SIGMAS = 4.0
 _ALARM_FLOOR = np.array([1.0, 1.0, 0.04])  # deg, deg, log height
 
@@ -101,7 +101,7 @@ def _figures(scene_id: str, estimator: str, group: Sequence[Outcome]) -> SceneFi
     heights = np.array([outcome.height_error for outcome in group])
     drifts, sds = (np.array([getattr(o, name) for o in group]) for name in ("drift", "sd"))
     headings = [o.heading_error_deg for o in group if o.heading_error_deg is not None]
-    told = [o.heading_covered for o in group if o.heading_covered is not None]
+    held = [o.heading_covered for o in group if o.heading_covered is not None]
     beyond = (np.abs(drifts) > np.maximum(_ALARM_SIGMAS * sds, _ALARM_FLOOR)).any(axis=1)
     return SceneFigures(
         scene_id=scene_id,
@@ -118,7 +118,7 @@ def _figures(scene_id: str, estimator: str, group: Sequence[Outcome]) -> SceneFi
         drifting=float(beyond.mean()),
         seconds=float(np.median([outcome.seconds for outcome in group])),
         heading_error_deg=float(np.median(np.abs(headings))) if headings else None,
-        heading_coverage=float(np.mean(told)) if told else None,
+        heading_coverage=float(np.mean(held)) if held else None,
     )
 
 
@@ -126,11 +126,11 @@ def _slopes(
     outcomes: Sequence[Outcome],
 ) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
     true = np.array([outcome.true_drift for outcome in outcomes]).reshape(-1, 3)
-    told = np.array([outcome.drift for outcome in outcomes]).reshape(-1, 3)
+    found = np.array([outcome.drift for outcome in outcomes]).reshape(-1, 3)
     if len(true) < 3 or not (true.std(axis=0) > 0).all():
         return None, None
     slopes, errors = zip(
-        *(_slope(true[:, number], told[:, number]) for number in range(3)), strict=True
+        *(_slope(true[:, number], found[:, number]) for number in range(3)), strict=True
     )
     return slopes, errors
 
@@ -148,10 +148,10 @@ def _heading_slope(outcomes: Sequence[Outcome]) -> tuple[float | None, float | N
     return _slope(pairs[:, 0], pairs[:, 1])
 
 
-def _slope(true: Array, told: Array) -> tuple[float, float]:
+def _slope(true: Array, found: Array) -> tuple[float, float]:
     """Least squares' slope with an intercept, and its standard error."""
     centred = true - true.mean()
     power = float(centred @ centred)
-    slope = float(centred @ told) / power
-    residual = told - told.mean() - slope * centred
+    slope = float(centred @ found) / power
+    residual = found - found.mean() - slope * centred
     return slope, float(np.sqrt(residual @ residual / max(len(true) - 2, 1) / power))

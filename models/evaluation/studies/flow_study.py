@@ -1,7 +1,7 @@
 """Simulated sites with a long reference: how well registration does there, and what misleads it.
 
-A knock is told from 25, 100 and 400 tracks. And with the camera still, half of the people take a
-new path: that must not look like a move of the camera.
+A knock is estimated from 25, 100 and 400 tracks. And with the camera still, half of the people take
+a new path: that must not look like a move of the camera.
 """
 
 import math
@@ -13,13 +13,13 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import Observations, of_tracks
-from models.evaluation.protocol.cases import angle_deg, pose_of_numbers
+from models.evaluation.protocol.cases import angle_deg, pose_of_plane_parameters
 from models.evaluation.scenes import Knock
-from models.evaluation.studies.study_site import (
-    LearnedPlace,
-    Place,
-    draw_place,
-    learn_place,
+from models.evaluation.studies.simulated_site import (
+    LearnedSite,
+    SimulatedSite,
+    draw_simulated_site,
+    learn_simulated_site,
     observe_feet,
     seen_from,
 )
@@ -101,15 +101,15 @@ def study_site(
     """
     rng = np.random.default_rng([seed, site])
     started = time.perf_counter()
-    place = draw_place(rng)
-    known = seen_from(place, place.prior, reference_tracks, rng)
-    knock, after = _knocked(place, max(knocked_tracks), rng)
-    still = seen_from(place, place.prior, max(changed_tracks), rng)
-    changed = _changed(place, max(changed_tracks), rng)
-    simulated = time.perf_counter()
-    learned = learn_place(place, known)
+    simulated = draw_simulated_site(rng)
+    known = seen_from(simulated, simulated.prior, reference_tracks, rng)
+    knock, after = _knocked(simulated, max(knocked_tracks), rng)
+    still = seen_from(simulated, simulated.prior, max(changed_tracks), rng)
+    changed = _changed(simulated, max(changed_tracks), rng)
+    was_simulated = time.perf_counter()
+    learned = learn_simulated_site(simulated, known)
     was_learned = time.perf_counter()
-    moved = knock.apply(place.prior)
+    moved = knock.apply(simulated.prior)
     return SiteResults(
         site=site,
         knock=knock,
@@ -117,13 +117,15 @@ def study_site(
         changed=tuple(
             _judge_change(learned, _first(changed, n), _first(still, n)) for n in changed_tracks
         ),
-        simulated_s=simulated - started,
-        learned_s=was_learned - simulated,
+        simulated_s=was_simulated - started,
+        learned_s=was_learned - was_simulated,
         estimated_s=time.perf_counter() - was_learned,
     )
 
 
-def _knocked(place: Place, count: int, rng: np.random.Generator) -> tuple[Knock, Observations]:
+def _knocked(
+    simulated: SimulatedSite, count: int, rng: np.random.Generator
+) -> tuple[Knock, Observations]:
     """A knock after which the people are still seen, and what is seen of them."""
     for _ in range(_MOST_DRAWS):
         tilt, roll, pan = rng.uniform(-_KNOCK_RAD, _KNOCK_RAD, 3)
@@ -135,19 +137,19 @@ def _knocked(place: Place, count: int, rng: np.random.Generator) -> tuple[Knock,
             heading_rad=float(pan),
         )
         try:
-            return knock, seen_from(place, knock.apply(place.prior), count, rng)
+            return knock, seen_from(simulated, knock.apply(simulated.prior), count, rng)
         except DegenerateGeometryError:
             continue
     raise DegenerateGeometryError(f"knock: nobody is seen after any of {_MOST_DRAWS}")
 
 
-def _changed(place: Place, count: int, rng: np.random.Generator) -> Observations:
+def _changed(simulated: SimulatedSite, count: int, rng: np.random.Generator) -> Observations:
     """Tracks of a still camera: one lane is closed, every other of the people takes a new one."""
-    lens, prior, config = place.intrinsics, place.prior, place.config
+    lens, prior, config = simulated.intrinsics, simulated.prior, simulated.config
     for _ in range(_MOST_DRAWS):
-        new_lane = draw_new_lane(lens, prior, place.lanes, config, rng)
+        new_lane = draw_new_lane(lens, prior, simulated.lanes, config, rng)
         try:
-            tracks = walk_changed(lens, prior, place.lanes[1:], new_lane, config, count, rng)
+            tracks = walk_changed(lens, prior, simulated.lanes[1:], new_lane, config, count, rng)
         except DegenerateGeometryError:
             continue
         return observe_feet(tracks, lens)
@@ -158,7 +160,7 @@ def _first(observations: Observations, count: int) -> Observations:
     return of_tracks(observations, np.arange(min(count, observations.tracks)))
 
 
-def _judge_knock(learned: LearnedPlace, truth: CameraPose, tracks: Observations) -> KnockedResult:
+def _judge_knock(learned: LearnedSite, truth: CameraPose, tracks: Observations) -> KnockedResult:
     found = learned.fused(tracks)
     errors = _errors(found.values, truth)
     return KnockedResult(
@@ -170,9 +172,9 @@ def _judge_knock(learned: LearnedPlace, truth: CameraPose, tracks: Observations)
 
 
 def _judge_change(
-    learned: LearnedPlace, changed: Observations, still: Observations
+    learned: LearnedSite, changed: Observations, still: Observations
 ) -> ChangedResult:
-    truth = learned.place.prior
+    truth = learned.simulated.prior
     found, unchanged = learned.fused(changed), learned.fused(still)
     pose, old = (_pose(estimate.values, truth) for estimate in (found, unchanged))
     errors = _errors(found.values, truth)
@@ -206,4 +208,4 @@ def _printed(errors: Array) -> tuple[float, ...]:
 
 
 def _pose(values: Array, like: CameraPose) -> CameraPose:
-    return replace(pose_of_numbers(values[:3], like), heading_rad=float(values[3]))
+    return replace(pose_of_plane_parameters(values[:3], like), heading_rad=float(values[3]))

@@ -1,4 +1,8 @@
-"""The flow map: how often people are where, and which way they walk, on a grid of the ground."""
+"""The flow map: how often people are where, and which way they walk, on a grid of the ground.
+
+Source: Silverman 1982, a kernel density by binning and Fourier transforms; von Mises kernels over
+directions are Hall, Watson and Cabrera's, 1987.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

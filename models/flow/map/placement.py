@@ -2,6 +2,8 @@
 
 A candidate is (tilt, roll, log height, heading). Places are relative to the camera's foot point, in
 metres, axes as the world's; directions are angles from +X towards +Y.
+
+Ours: the change of variables from the image to the ground, det J = h^2 / w_z^3.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Log densities as they are stored: small whole numbers, the same offline as in the service."""
+"""Log densities as they are stored: small whole numbers, the same offline as in the service.
+
+Ours: level = round(64 log f).
+"""
 
 import numpy as np
 import numpy.typing as npt

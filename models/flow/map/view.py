@@ -1,4 +1,7 @@
-"""How much of a flow map a camera sees: people who are not in the picture give no track."""
+"""How much of a flow map a camera sees: people who are not in the picture give no track.
+
+Ours: share = sum over blocks of the map's people times the part of the block in the picture.
+"""
 
 from dataclasses import dataclass
 

@@ -13,7 +13,7 @@ from service.views import camera_page
 from service.views.camera_page import CameraPage
 from service.web.drawings.camera import draw_camera
 from service.web.wording import camera_words
-from service.web.wording.activity_words import deed_words
+from service.web.wording.activity_words import entry_words
 from service.web.wording.camera_words import Clock
 from service.web.wording.moments import next_morning
 from service.web.wording.sentences import headline
@@ -40,10 +40,10 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         zone_name=state.settings.timezone,
         headline=headline(page, zone),
         drawings=draw_camera(page),
-        numbers=camera_words.number_rows(page.camera.prior_pose, page.pose.pose, estimate),
+        parameters=camera_words.parameter_rows(page.camera.prior_pose, page.pose.pose, estimate),
         misplaced=camera_words.misplaced_words(page.misplaced),
         flags=camera_words.flags(page, clock),
-        deeds=[(deed, deed_words(deed, clock)) for deed in page.deeds],
+        activity=[(entry, entry_words(entry, clock)) for entry in page.activity],
         words=camera_words,
         states=STATES,
         chart_facts=_chart_facts(page),

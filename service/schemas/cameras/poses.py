@@ -15,7 +15,7 @@ from service.reasons import code_of, values_of
 from service.schemas.base import Body, Who
 from service.schemas.cameras.geometry import PoseOut
 from service.schemas.reasons import ReasonCode, ReasonValues
-from service.store.packing import told_drift, told_sd
+from service.store.packing import identifiable_drift, identifiable_sd
 from service.store.tables.estimates import EstimateRecord
 
 
@@ -50,14 +50,14 @@ class SdOut(BaseModel):
 
     @classmethod
     def from_value(cls, drift: Drift) -> Self | None:
-        """The body of what is told; None where nothing is."""
-        return cls(**in_degrees(told_sd(drift))) if drift.told else None
+        """The body of what is identifiable; None where nothing is."""
+        return cls(**in_degrees(identifiable_sd(drift))) if drift.identifiable else None
 
 
 class DriftOut(BaseModel):
-    """Estimate against prior pose; null where the tracks cannot tell.
+    """Estimate against prior pose; null where the tracks leave it open.
 
-    `angle_deg` is the whole rotation that the told angles make.
+    `angle_deg` is the whole rotation that the identifiable angles make.
     """
 
     height_m: float | None
@@ -68,8 +68,8 @@ class DriftOut(BaseModel):
 
     @classmethod
     def from_value(cls, drift: Drift) -> Self | None:
-        """The body of what is told; None where nothing is."""
-        return cls(**in_degrees(told_drift(drift))) if drift.told else None
+        """The body of what is identifiable; None where nothing is."""
+        return cls(**in_degrees(identifiable_drift(drift))) if drift.identifiable else None
 
 
 class ReferenceOut(BaseModel):
@@ -111,7 +111,7 @@ class ServedPoseOut(BaseModel):
             camera_id=view.camera_id,
             state=view.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[field for name, field in FIELDS.items() if name in view.told],
+            estimated=[field for name, field in FIELDS.items() if name in view.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             estimates={} if estimate is None else in_degrees(estimate.raw),

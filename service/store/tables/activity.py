@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import Act, AlertKind, Outcome
+from service.kinds import Activity, AlertKind, Outcome
 from service.store.tables.record import Record, one_of
 
 
@@ -24,7 +24,7 @@ class ActivityRecord(Record):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
-    what: Mapped[Act]
+    what: Mapped[Activity]
     by: Mapped[str | None]
     via: Mapped[str | None]
     camera_id: Mapped[str | None] = mapped_column(String(64))
@@ -36,7 +36,7 @@ class ActivityRecord(Record):
     details: Mapped[dict[str, Any]]
 
     __table_args__ = (
-        one_of("what", Act),
+        one_of("what", Activity),
         one_of("kind", AlertKind),
         one_of("outcome", Outcome),
         Index(None, "camera_id", "id"),

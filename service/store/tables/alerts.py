@@ -26,7 +26,7 @@ class AlertRecord(Record):
 
     `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
     rhythm, the upkeep, or a group. A group's alert has no camera but `camera_ids`, and its members
-    have its id as `group_id`; at most one of a `track_source` and kind is firing. `told` says
+    have its id as `group_id`; at most one of a `track_source` and kind is firing. `notified` says
     whether an event told of the alert by itself.
     """
 
@@ -40,7 +40,7 @@ class AlertRecord(Record):
     kind: Mapped[AlertKind]
     state: Mapped[AlertState]
     source: Mapped[AlertSource]
-    told: Mapped[bool] = mapped_column(default=False)
+    notified: Mapped[bool] = mapped_column("told", default=False)
     severity: Mapped[Severity]
     reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]

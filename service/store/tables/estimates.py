@@ -17,7 +17,7 @@ from service.store.tables.record import Record, one_of
 
 
 def _parameters(*columns: str) -> Any:
-    """Four columns as one value; a heading that was never known is 0 and not told."""
+    """Four columns as one value; a heading that was never known is 0 and not identifiable."""
     return composite(_as_parameters, *columns)
 
 
@@ -32,8 +32,8 @@ def _as_parameters(
 class EstimateRecord(Record):
     """The served pose at one time, and what is behind it.
 
-    `pose` is the served one: the prior's where the tracks cannot tell. `drift_by` and `pose_sd` are
-    the estimator's for all four parameters; `told` names those that count.
+    `pose` is the served one: the prior's where the tracks leave it open. `drift_by` and `pose_sd`
+    are the estimator's for all four parameters; `identifiable` names those that count.
     `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
     one. Estimates of before there were flow maps have no `heading_sd_rad`.
     """
@@ -47,7 +47,7 @@ class EstimateRecord(Record):
     reference_id: Mapped[int | None] = foreign_key("site_references.id", index=True)
     state: Mapped[PoseState]
     reasons: Mapped[Reasons]
-    told: Mapped[list[str]]  # of tilt, roll, height, heading
+    identifiable: Mapped[list[str]] = mapped_column("told")  # of tilt, roll, height, heading
     height_m: Mapped[float]
     tilt_rad: Mapped[float]
     roll_rad: Mapped[float]
@@ -87,10 +87,10 @@ class EstimateRecord(Record):
 
     @property
     def drift(self) -> Drift:
-        """The drift against the prior pose, and which of it is told."""
+        """The drift against the prior pose, and which of it is identifiable."""
         return Drift(
             by=self.drift_by,
             sd=self.pose_sd,
             angle_rad=self.drift_angle_rad,
-            told=tuple(self.told),
+            identifiable=tuple(self.identifiable),
         )

@@ -19,7 +19,7 @@ NAMING = {
     "pk": "pk_%(table_name)s",
 }
 _STORED: tuple[type[StrEnum], ...] = (
-    kinds.Act,
+    kinds.Activity,
     kinds.AlertKind,
     kinds.AlertSource,
     kinds.AlertState,

@@ -92,8 +92,8 @@ const ACTS = {
     if (body) await put("The silence has ended.", "POST", `/alerts/${alert}/silence`, body);
   },
 
-  async resolve({ alert, told }) {
-    const said = await ask("resolve-dialog", { needsPose: told === "yes" });
+  async resolve({ alert, identifiable }) {
+    const said = await ask("resolve-dialog", { needsPose: identifiable === "yes" });
     if (!said) return;
     if (said.outcome === "accepted") return ACTS.accept({ note: said.note });
     const body = await asMe({ outcome: said.outcome, ...(said.note && { note: said.note }) });

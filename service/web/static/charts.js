@@ -2,7 +2,7 @@
 
 const root = document.getElementById("camera");
 const place = document.getElementById("charts");
-const NUMBERS = [
+const PARAMETERS = [
   { name: "Tilt", field: "tilt_deg", prior: "tilt_rad", unit: "°", digits: 2 },
   { name: "Roll", field: "roll_deg", prior: "roll_rad", unit: "°", digits: 2 },
   { name: "Pan", field: "heading_deg", prior: "heading_rad", unit: "°", digits: 2 },
@@ -31,16 +31,16 @@ async function history() {
   return (await answer.json()).items;
 }
 
-const priorOf = (prior, number) =>
-  number.prior.endsWith("_rad") ? (prior[number.prior] * 180) / Math.PI : prior[number.prior];
+const priorOf = (prior, parameter) =>
+  parameter.prior.endsWith("_rad") ? (prior[parameter.prior] * 180) / Math.PI : prior[parameter.prior];
 
-/** The traces of one number: its band, its line, and the prior pose under them. */
-function traces(items, number, at, priors) {
+/** The traces of one parameter: its band, its line, and the prior pose under them. */
+function traces(items, parameter, at, priors) {
   const axes = { xaxis: "x", yaxis: at ? `y${at + 1}` : "y" };
   const x = items.map((item) => local(item.to));
-  const sd = items.map((item) => item.sd?.[number.field] ?? null);
+  const sd = items.map((item) => item.sd?.[parameter.field] ?? null);
   // What the tracks cannot tell is a gap, not the prior.
-  const y = items.map((item, n) => (sd[n] === null ? null : item[number.field]));
+  const y = items.map((item, n) => (sd[n] === null ? null : item[parameter.field]));
   const edge = (sign) => y.map((value, n) => (value === null ? null : value + sign * Z90 * sd[n]));
   const quiet = { mode: "lines", line: { width: 0 }, hoverinfo: "skip", showlegend: false };
   const served = colour("--served");
@@ -49,17 +49,17 @@ function traces(items, number, at, priors) {
       ...axes, ...quiet, x: bandX, y: bandY, fill: "toself", fillcolor: served + "2e",
     })),
     {
-      ...axes, ...priorSteps(priors, number, x), mode: "lines", name: "prior",
+      ...axes, ...priorSteps(priors, parameter, x), mode: "lines", name: "prior",
       line: { color: colour("--prior"), dash: "dash", width: 1.5, shape: "hv" },
       hoverinfo: "skip",
     },
     {
-      ...axes, x, y, mode: "lines+markers", name: number.name,
+      ...axes, x, y, mode: "lines+markers", name: parameter.name,
       line: { color: served, width: 2 }, marker: { size: 5, color: served },
       customdata: items.map((item, n) => [sd[n] === null ? null : Z90 * sd[n], item.state, item.tracks]),
       hovertemplate:
-        `%{x|%d %b %H:%M}<br><b>%{y:.${number.digits}f}${number.unit}</b>` +
-        ` ±%{customdata[0]:.${number.digits}f}${number.unit}<br>%{customdata[1]}, %{customdata[2]} people` +
+        `%{x|%d %b %H:%M}<br><b>%{y:.${parameter.digits}f}${parameter.unit}</b>` +
+        ` ±%{customdata[0]:.${parameter.digits}f}${parameter.unit}<br>%{customdata[1]}, %{customdata[2]} people` +
         "<extra></extra>",
     },
   ];
@@ -83,9 +83,9 @@ function band(x, low, high) {
 }
 
 /** The prior pose as steps over the time that is drawn; the first was there before. */
-function priorSteps(priors, number, x) {
+function priorSteps(priors, parameter, x) {
   const [first, last] = [x[0], x.at(-1)];
-  const steps = priors.map((prior, n) => [n ? local(prior.at) : first, priorOf(prior, number)]);
+  const steps = priors.map((prior, n) => [n ? local(prior.at) : first, priorOf(prior, parameter)]);
   const inside = steps.filter(([at], n) => n === 0 || at <= last);
   const past = inside.filter(([at]) => at <= first);
   const shown = [[first, past.at(-1)[1]], ...inside.filter(([at]) => at > first)];
@@ -114,10 +114,10 @@ function layout(shapes) {
   const ink = colour("--ink");
   const line = colour("--line");
   const rows = {};
-  NUMBERS.forEach((number, at) => {
+  PARAMETERS.forEach((parameter, at) => {
     const top = 0.97 - at * 0.245;
     rows[at ? `yaxis${at + 1}` : "yaxis"] = {
-      domain: [top - 0.205, top], title: { text: `${number.name}${number.unit === "°" ? " °" : " m"}`, font: { size: 12 } },
+      domain: [top - 0.205, top], title: { text: `${parameter.name}${parameter.unit === "°" ? " °" : " m"}`, font: { size: 12 } },
       gridcolor: line, zeroline: false, automargin: true, nticks: 5, ticklen: 0, anchor: "x",
     };
   });
@@ -149,7 +149,7 @@ async function draw({ anew = false } = {}) {
   if (!items.length) return window.Plotly.purge(place);
   const x = items.map((item) => local(item.to));
   const { shapes, trace } = marks(alerts, x);
-  const all = NUMBERS.flatMap((number, at) => traces(items, number, at, priors));
+  const all = PARAMETERS.flatMap((parameter, at) => traces(items, parameter, at, priors));
   await window.Plotly.react(place, [...all, trace], layout(shapes), {
     responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: false,
   });
@@ -160,7 +160,7 @@ async function draw({ anew = false } = {}) {
 function tabulate(items) {
   const table = document.createElement("table");
   const head = table.createTHead().insertRow();
-  for (const words of ["Time", ...NUMBERS.map(({ name }) => name), "People", "State"]) {
+  for (const words of ["Time", ...PARAMETERS.map(({ name }) => name), "People", "State"]) {
     const cell = document.createElement("th");
     cell.scope = "col";
     cell.textContent = words;
@@ -169,7 +169,7 @@ function tabulate(items) {
   const body = table.createTBody();
   for (const item of items.slice(-20).reverse()) {
     const row = body.insertRow();
-    const values = NUMBERS.map(({ field, unit, digits }) => {
+    const values = PARAMETERS.map(({ field, unit, digits }) => {
       const sd = item.sd?.[field] ?? null;
       if (sd === null) return "not told";
       return `${item[field].toFixed(digits)}${unit} ±${(Z90 * sd).toFixed(digits)}`;

@@ -1,4 +1,4 @@
-"""The rest of a camera's page in words: numbers of the pose, deeds, what a move means, flags."""
+"""The rest of a camera's page in words: pose parameters, activity, what a move means, flags."""
 
 import math
 from collections.abc import Sequence
@@ -56,8 +56,8 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NumberRow:
-    """One number of the pose as text; `served`, `drift` and `sure` are empty where not told."""
+class ParameterRow:
+    """One pose parameter as text; `served`, `drift`, `sure` are empty if not identifiable."""
 
     name: str
     prior: str
@@ -66,25 +66,25 @@ class NumberRow:
     sure: str
 
 
-def number_rows(
+def parameter_rows(
     prior: CameraPose, served: CameraPose, estimate: EstimateRecord | None
-) -> tuple[NumberRow, ...]:
+) -> tuple[ParameterRow, ...]:
     """Pan, tilt, roll and height: prior, served, the drift, and half its 90 % interval."""
-    told = () if estimate is None else tuple(estimate.told)
+    identifiable = () if estimate is None else tuple(estimate.identifiable)
     rows = []
     for name, words in NAMES.items():
         poses = PoseParameters.of_pose(prior), PoseParameters.of_pose(served)
         before, after = (_shown(pose.of(name), name) for pose in poses)
         unit, digits = (" m", 2) if name == "height" else ("°", 1)
         row = {"name": words.capitalize(), "prior": _text(before, digits) + unit}
-        if estimate is not None and name in told:
+        if estimate is not None and name in identifiable:
             drift, sd = (_shown(value, name) for value in estimate.drift.of(name))
             row |= {
                 "served": _text(after, digits) + unit,
                 "drift": f"{signed(drift, digits)}{unit}",
                 "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
             }
-        rows.append(NumberRow(**{"served": "", "drift": "", "sure": "", **row}))
+        rows.append(ParameterRow(**{"served": "", "drift": "", "sure": "", **row}))
     return tuple(rows)
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from models.quantiles import Z90
 from service.cameras.standing import MOVED
 from service.kinds import AlertKind, PoseState
@@ -31,14 +31,14 @@ def headline(page: CameraPage, zone: tzinfo) -> str:
 
 def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzinfo) -> str:
     standing = page.pose.standing
-    state, told = standing.state, estimate is not None and bool(estimate.told)
+    state, known = standing.state, estimate is not None and bool(estimate.identifiable)
     doubts = [alert for alert in standing.alerts if alert.kind in POSE_KINDS]
     if state in MOVED and not standing.judged:
-        words = _moved(page, estimate, zone) if estimate is not None and told else _alarmed(doubts)
+        words = _moved(page, estimate, zone) if estimate is not None and known else _alarmed(doubts)
         return f"{words} That is what is known last: the next people will tell how it stands now."
     if estimate is not None and standing.judged and estimate.drifted:
         return _moved(page, estimate, zone)
-    if doubts:  # of a reference, or about a move whose size is not told
+    if doubts:  # of a reference, or about a move whose size is not identifiable
         return _alarmed(doubts)
     if state == PoseState.LEARNING or estimate is None or not standing.judged:
         return _waiting(page)
@@ -62,11 +62,11 @@ def _alarmed(doubts: Sequence[AlertRecord]) -> str:
 
 
 def turn_words(estimate: EstimateRecord) -> str:
-    """How far a camera has turned: "turned 5.1° (pan +4.9°, tilt −1.2°)"; empty where untold.
+    """How far a camera has turned: "turned 5.1° (pan +4.9°, tilt −1.2°)"; empty if none is known.
 
     What is within its own 90 % interval is not named.
     """
-    angles = [name for name in ("heading", "tilt", "roll") if name in estimate.told]
+    angles = [name for name in ("heading", "tilt", "roll") if name in estimate.identifiable]
     named = [
         f"{NAMES[name]} {signed(_degrees(estimate, name), 1)}°"
         for name in angles
@@ -79,8 +79,10 @@ def turn_words(estimate: EstimateRecord) -> str:
 
 
 def height_words(estimate: EstimateRecord) -> str:
-    """How far a camera was raised or lowered: "0.24 m higher"; empty where that is not told."""
-    if "height" not in estimate.told or abs(estimate.drift_by.height_m) < _height_says_m(estimate):
+    """How far a camera was raised or lowered: "0.24 m higher"; empty where unidentifiable."""
+    if "height" not in estimate.identifiable or abs(estimate.drift_by.height_m) < _height_says_m(
+        estimate
+    ):
         return ""
     way = "higher" if estimate.drift_by.height_m > 0 else "lower"
     return f"{abs(estimate.drift_by.height_m):.2f} m {way}"
@@ -102,12 +104,12 @@ def signed(value: float, digits: int) -> str:
 
 
 def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
-    """Half the 90 % interval of the angle that a camera has turned by; None where none is told."""
-    told = [name for name in ANGLES if name in estimate.told]
-    if not told:
+    """Half the 90 % interval of the angle that a camera has turned by; None where none is known."""
+    known = [name for name in ANGLES if name in estimate.identifiable]
+    if not known:
         return None
-    drifts = [_degrees(estimate, name) for name in told]
-    sds = [math.degrees(estimate.pose_sd.of(name)) for name in told]
+    drifts = [_degrees(estimate, name) for name in known]
+    sds = [math.degrees(estimate.pose_sd.of(name)) for name in known]
     length = math.hypot(*drifts)
     if length < max(sds):  # without a direction, the widest
         return Z90 * max(sds)
@@ -126,7 +128,7 @@ def _moved(page: CameraPage, estimate: EstimateRecord, zone: tzinfo) -> str:
             f"frame rate looks like that{how and ', or the camera ' + how}{_sure(estimate)}."
         )
     words = moved_words(estimate, since)
-    if not words or not set(estimate.drifted) & set(estimate.told):
+    if not words or not set(estimate.drifted) & set(estimate.identifiable):
         return f"The camera moved{since}; the newest people cannot tell how far."
     return f"The camera {words}{_sure(estimate)}."
 
@@ -136,7 +138,7 @@ def _sure(estimate: EstimateRecord) -> str:
     half = angle_half_width_deg(estimate)
     if half is not None:
         parts.append(f"±{max(half, 0.1):.1f}°")
-    if "height" in estimate.told and (
+    if "height" in estimate.identifiable and (
         half is None or abs(estimate.drift_by.height_m) >= _height_says_m(estimate)
     ):
         parts.append(f"±{max(Z90 * estimate.pose_sd.height_m, 0.01):.2f} m")

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from babel.dates import format_timedelta
 
 from models.drift.verdict import Drift
-from models.estimation.numbers import ANGLES
+from models.estimation.parameters import ANGLES
 from service.kinds import AlertKind, PoseState
 from service.views.fleet import FleetCamera
 
@@ -56,11 +56,11 @@ def drift_words(drift: Drift | None) -> str:
     named = ", ".join(
         f"{NAMES[name]} {degrees(drift.by.of(name), signed=True)}"
         for name in ANGLES
-        if name in drift.told and drift.by.of(name)
+        if name in drift.identifiable and drift.by.of(name)
     )
     if named:
         parts.append(f"turned {degrees(drift.angle_rad)} ({named})")
-    if "height" in drift.told and abs(drift.by.height_m) >= 0.005:
+    if "height" in drift.identifiable and abs(drift.by.height_m) >= 0.005:
         parts.append(height_change(drift.by.height_m))
     return ", ".join(parts)
 

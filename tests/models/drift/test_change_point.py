@@ -7,7 +7,7 @@ import pytest
 
 from models.drift.change_point import FEWEST_BESIDE, find_change
 from models.estimation.joint.observations import of_tracks
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.evaluation.scenes import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import KNOCKED, PRIOR, in_time, seen, tracks_of
@@ -18,7 +18,7 @@ SLIGHT = Knock(tilt_rad=math.radians(1.5), roll_rad=0.0, log_height=0.0).apply(P
 @pytest.fixture(scope="module")
 def known():
     (tracks,) = tracks_of(6, (PRIOR, 120))
-    return learn_reference(seen(tracks), PRIOR, WalkConfig(), 0)
+    return learn_speed_reference(seen(tracks), PRIOR, WalkConfig(), 0)
 
 
 def window(*views):

@@ -5,9 +5,10 @@ import pytest
 
 from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import JointEstimate
+from models.estimation.parameters import PLANE_PARAMETERS
 
 
-def estimate(values=(0.3, 0.0, 1.8), covariance=None, weak=()):
+def estimate(values=(0.3, 0.0, 1.8), covariance=None, unidentifiable=()):
     covariance = np.diag([1e-4, 1e-4, 1e-4]) if covariance is None else np.array(covariance)
     return JointEstimate(
         values=np.array(values),
@@ -15,8 +16,8 @@ def estimate(values=(0.3, 0.0, 1.8), covariance=None, weak=()):
         raw=np.array(values) + 5.0,  # before the reference's offset: nothing to go by
         bound=np.eye(3),
         walkers=40,
-        parties=40,
-        weak=weak,
+        walking_groups=40,
+        identifiable=tuple(name for name in PLANE_PARAMETERS if name not in unidentifiable),
         reason="",
     )
 
@@ -47,8 +48,8 @@ def test_numbers_that_make_up_for_each_other_are_apart_across_that_alone():
 def test_a_cut_must_leave_a_pose_behind_it():
     before, far = estimate(), (0.9, 0.0, 1.8)
     assert moved_beyond_doubt(before, estimate(far))
-    assert not moved_beyond_doubt(before, estimate(far, weak=("roll",)))
-    assert moved_beyond_doubt(estimate(weak=("roll",)), estimate(far))
+    assert not moved_beyond_doubt(before, estimate(far, unidentifiable=("roll",)))
+    assert moved_beyond_doubt(estimate(unidentifiable=("roll",)), estimate(far))
 
 
 def test_the_same_estimate_has_not_moved():

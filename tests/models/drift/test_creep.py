@@ -11,7 +11,7 @@ from models.drift.believed_turn import believed_turns
 from models.drift.creep import read_creep
 from models.drift.creep_log import DAY_S, NUMBERS, CreepLog, add_day, begin_log, noise_of, weeks_of
 from models.drift.creep_packing import creep_log_from_bytes, creep_log_to_bytes
-from models.drift.party_scores import score_parties
+from models.drift.group_scores import score_groups
 from models.errors import CheckpointError
 from models.evaluation.scenes import Knock
 from models.packing import flattened
@@ -24,20 +24,20 @@ MONTH_DAYS = 365.25 / 12
 A_YEAR = 0.1
 
 
-def blank(days, parties=18.0, reference=200.0):
+def blank(days, groups=18.0, reference=200.0):
     return CreepLog(
         day_idx=np.arange(20_000, 20_000 + days),
-        parties=np.full(days, parties),
+        groups=np.full(days, groups),
         pulls=np.zeros((days, NUMBERS)),
         information=np.diag(PERSON_SD**-2),
-        reference_parties=reference,
+        reference_groups=reference,
         since_day=20_000.0,
     )
 
 
 def with_moves(log, moves):
     """The log of days whose people say each of some moves (D, 5) alone."""
-    return replace(log, pulls=log.parties[:, None] * moves @ log.information)
+    return replace(log, pulls=log.groups[:, None] * moves @ log.information)
 
 
 def drawn(log, rng):
@@ -62,7 +62,7 @@ def test_a_ramp_is_told_with_its_number_way_and_size(number, deg_a_month):
     log = blank(int(2.5 / abs(deg_a_month) * MONTH_DAYS))
     creep = read_creep(with_moves(log, ramp(log, number, deg_a_month)), A_YEAR)
     assert creep.moved
-    assert creep.number == number
+    assert creep.parameter == number
     assert math.degrees(creep.by) == pytest.approx(math.copysign(2.5, deg_a_month), rel=0.1)
     assert creep.since_day == pytest.approx(log.since_day, abs=40)
 
@@ -100,7 +100,7 @@ def test_few_people_say_nothing_and_only_whole_days_since_a_time_count():
     assert read_creep(with_moves(log, turned), A_YEAR).moved
     from_s = (20_000 + 57) * DAY_S
     assert read_creep(with_moves(log, turned), A_YEAR, from_s) is None
-    assert weeks_of(log, from_s - 30 * DAY_S + 1).parties.sum() == 18 * 32
+    assert weeks_of(log, from_s - 30 * DAY_S + 1).groups.sum() == 18 * 32
 
 
 def test_a_turn_is_believed_once_it_is_clear_and_a_still_camera_is_left_alone():
@@ -179,7 +179,7 @@ def test_bytes_keep_a_log_and_its_names():
     back = creep_log_from_bytes(creep_log_to_bytes(log))
     # The names that stores have: another one needs a version of its own.
     assert set(flattened(log)) == {
-        "day_idx", "parties", "pulls", "information", "reference_parties", "since_day"
+        "day_idx", "groups", "pulls", "information", "reference_groups", "since_day"
     }  # fmt: skip
     for name, value in flattened(log).items():
         assert_array_equal(flattened(back)[name], value)
@@ -192,7 +192,7 @@ def test_days_of_a_chart_begin_with_none(first):
     site, _, _ = first
     log = begin_log(site.chart, 3 * DAY_S)
     assert (log.day_idx.size, log.since_day) == (0, 3.0)
-    assert log.reference_parties == site.chart.parties
+    assert log.reference_groups == site.chart.walking_groups
     assert np.linalg.eigvalsh(log.information).min() > 0
-    empty = score_parties(observe([], LENS), site.usual(site.flow, site.chart))
+    empty = score_groups(observe([], LENS), site.usual(site.flow, site.chart))
     assert not add_day(log, site.chart, 5, empty).pulls.any()

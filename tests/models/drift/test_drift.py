@@ -27,10 +27,10 @@ def drift(
     *,
     sd_deg=0.05,
     sd_log=0.002,
-    weak=(),
+    unidentifiable=(),
     able=THREE,
 ):
-    """An estimate that is so far from the prior pose; `weak` are left out of what it is able of."""
+    """An estimate that is so far from the prior pose; without what is `unidentifiable`."""
     found = PoseParameters(
         height_m=height_m,
         tilt_rad=PRIOR.tilt_rad + math.radians(tilt_deg),
@@ -41,8 +41,8 @@ def drift(
     sd = PoseParameters(
         height_m=height_m * sd_log, tilt_rad=sd_rad, roll_rad=sd_rad, heading_rad=sd_rad
     )
-    told = tuple(name for name in able if name not in weak)
-    return drift_between(found, sd, told, PRIOR)
+    identifiable = tuple(name for name in able if name not in unidentifiable)
+    return drift_between(found, sd, identifiable, PRIOR)
 
 
 def drifting(now, earlier, drifted=()):
@@ -62,8 +62,8 @@ def test_drift_is_signed_and_roll_goes_round():
 
 
 def test_what_is_not_told_stays_the_priors():
-    found = drift(5.0, 3.0, 7.0, weak=("tilt", "height"))
-    assert found.told == ("roll",)
+    found = drift(5.0, 3.0, 7.0, unidentifiable=("tilt", "height"))
+    assert found.identifiable == ("roll",)
     served = pose_after(found, PRIOR)
     assert (served.tilt_rad, served.height_m) == (PRIOR.tilt_rad, PRIOR.height_m)
     assert found.angle_rad == pytest.approx(math.radians(3))
@@ -78,9 +78,9 @@ def test_a_told_heading_is_a_drift_clockwise_positive():
     verdict = judge(found, LIMITS, (), earlier=found)
     assert verdict.drifted == ("heading",)
     assert verdict.excess == pytest.approx(2.5)
-    untold = drift(heading_deg=5)
-    assert (untold.angle_rad, judge(untold, LIMITS, (), earlier=untold).drifted) == (0.0, ())
-    assert pose_after(untold, PRIOR).heading_rad == PRIOR.heading_rad
+    panned = drift(heading_deg=5)
+    assert (panned.angle_rad, judge(panned, LIMITS, (), earlier=panned).drifted) == (0.0, ())
+    assert pose_after(panned, PRIOR).heading_rad == PRIOR.heading_rad
 
 
 @pytest.mark.parametrize(("prior_deg", "served_deg"), [(40, 45), (359, 4), (-358, -353), (360, 5)])
@@ -120,7 +120,7 @@ def test_it_clears_below_a_share_of_the_limits_only():
 
 
 def test_a_window_that_tells_nothing_changes_nothing():
-    nothing = drift(5, weak=("tilt", "roll", "height"))
+    nothing = drift(5, unidentifiable=("tilt", "roll", "height"))
     assert not drifting(nothing, nothing)
     assert drifting(nothing, nothing, ("tilt",))
 
@@ -132,13 +132,13 @@ def test_the_second_look_is_asked_for_where_a_verdict_may_change():
     assert not asks_again(drift(1.5), LIMITS, drifting=True)
 
 
-def reading(statistic, number=3):
+def reading(statistic, parameter=3):
     return Reading(
         statistic=statistic,
         level=10.0,
-        number=number,
+        parameter=parameter,
         sign=1,
-        parties=20,
+        walking_groups=20,
         track_idx=0,
         suspicious=statistic > 5,
     )
@@ -147,21 +147,21 @@ def reading(statistic, number=3):
 def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
     alarmed = judge(drift(), LIMITS, (), reading(10.5))
     assert (alarmed.drifted, alarmed.streak) == (("heading",), 1)
-    told = judge(drift(5), LIMITS, (), reading(10.5))
-    assert told.drifted == ("tilt",)  # the pose says better which
+    verdict = judge(drift(5), LIMITS, (), reading(10.5))
+    assert verdict.drifted == ("tilt",)  # the pose says better which
     assert not judge(drift(), LIMITS, (), reading(9.5)).drifting
     for statistic, holds in ((7.5, True), (6.5, False)):
         still = judge(drift(), LIMITS, alarmed.drifted, reading(statistic), drift())
         assert still.drifting == holds
     assert judge(drift(), LIMITS, alarmed.drifted, reading(6.5), drift(1.5)).drifting
-    untold = drift(weak=THREE)
-    assert judge(untold, LIMITS, (), reading(10.5)).drifting
+    unknown = drift(unidentifiable=THREE)
+    assert judge(unknown, LIMITS, (), reading(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():
-    assert drifting(drift(weak=("tilt",)), drift(weak=("tilt",)), ("tilt",))
-    assert drifting(drift(), drift(weak=("tilt",)), ("tilt",))
-    assert not drifting(drift(weak=("roll",)), drift(weak=("roll",)), ("tilt",))
+    assert drifting(drift(unidentifiable=("tilt",)), drift(unidentifiable=("tilt",)), ("tilt",))
+    assert drifting(drift(), drift(unidentifiable=("tilt",)), ("tilt",))
+    assert not drifting(drift(unidentifiable=("roll",)), drift(unidentifiable=("roll",)), ("tilt",))
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():
@@ -178,7 +178,7 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
         drift(height_m=7.2, sd_log=0.05),  # within its deviation
         drift(0.2, height_m=7.2),  # turned, by four deviations
         drift(1.1, height_m=7.2, sd_deg=2),  # turned, by more than a degree
-        drift(height_m=7.2, weak=("roll",)),  # may have turned
+        drift(height_m=7.2, unidentifiable=("roll",)),  # may have turned
         drift(height_m=7.2, heading_deg=1.1, able=FOUR),  # has panned
     ):
         assert clock_fault(found, PRIOR, 25.0) is None

@@ -38,7 +38,7 @@ def learned(counts, cells, known=None, times_s=()):
     return learn_rhythm(counts, cells, known, 0, np.array(times_s, dtype=float))
 
 
-def test_parties_of_a_year():
+def test_groups_of_a_year():
     assert rhythm(burst=4.0).arrivals_per_year == pytest.approx(2 * 8766 / 4)
     weekdays_only = rhythm([7.0] * 24 + [0.0] * 24)
     assert weekdays_only.arrivals_per_year == pytest.approx(5 * 8766)
@@ -59,7 +59,7 @@ def test_the_chance_of_a_silence_is_gamma_poisson():
     expected = 0.95 * (10 / 15) ** 10 + 0.05 * (80 / 85) ** 20
     assert chance_of_silence(rhythm(), 5.0, 0.0, 0.0, 0.0) == pytest.approx(expected)
     assert expected == pytest.approx(0.031347, rel=1e-4)
-    # In parties of four, twenty tracks are five parties.
+    # In walking groups of four, twenty tracks are five walking groups.
     assert chance_of_silence(rhythm(burst=4), 20.0, 0.0, 0.0, 0.0) == pytest.approx(expected)
     # After long, the day is another, and may have turned quiet.
     other = 0.9 * (10 / 15) ** 10 + 0.1 * (80 / 85) ** 20

@@ -8,7 +8,7 @@ from models.estimation.calibrated import (
     Calibration,
     calibrated_estimate,
     fit_calibration,
-    mean_numbers,
+    mean_plane_parameters,
     sampling_covariance,
 )
 from models.geometry.rotation import quaternion_from_rotation, rotation_from_angles
@@ -89,7 +89,9 @@ def test_the_bootstrap_of_the_numbers_is_the_sd_of_their_mean():
     predictions = TrackPredictions(height_m=6 * np.exp(rng.normal(0, 0.05, 200)), quaternion_wxyz=q)
     sd = np.sqrt(np.diag(sampling_covariance(predictions, 0)))
     assert_allclose(sd, np.array([0.05, 0.1, 0.05]) / np.sqrt(200), rtol=0.25)
-    assert mean_numbers(predictions)[2] == pytest.approx(np.log(predictions.height_m.mean()))
+    assert mean_plane_parameters(predictions)[2] == pytest.approx(
+        np.log(predictions.height_m.mean())
+    )
 
 
 def test_few_tracks_and_few_sets_are_refused():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.drift.chart import KNOCKS, DriftChart, Knocked, ratios_of
-from models.drift.party_scores import SCORES
+from models.drift.group_scores import SCORES
 from models.drift.verdict import DriftLimits
 from models.evaluation.alarms.camera_years import live_year
 from models.evaluation.alarms.results import (
@@ -39,15 +39,15 @@ EVEN = HabitConfig(
 def watch():
     """One knock, of the heading, moves the last of independent scores by 2; the level is 10."""
     responses = np.zeros((SCORES, len(KNOCKS)))
-    responses[-1, KNOCKS.index(Knocked(number=3, size=math.radians(6)))] = 2.0
+    responses[-1, KNOCKS.index(Knocked(parameter=3, size=math.radians(6)))] = 2.0
     chart = DriftChart(
-        paces=None,
+        speed_reference=None,
         middle=np.zeros(SCORES),
         width=np.ones(SCORES),
         mean=np.zeros(SCORES),
         covariance=np.eye(SCORES),
         responses=responses,
-        parties=1e9,
+        walking_groups=1e9,
         typical=0.0,
         tail=1.0,
     )
@@ -56,7 +56,7 @@ def watch():
 
 def test_alarms_are_renewed_after_each(watch):
     apart = np.zeros((60, SCORES))
-    apart[:, -1] = 2.0  # sixteen parties come to 16 * 2 = 32, and fewer are not asked
+    apart[:, -1] = 2.0  # sixteen walking groups come to 16 * 2 = 32, and fewer are not asked
     assert watch.alarms(apart) == [16, 32, 48]
     assert first_alarm(watch, apart, 2.5) == 40.0
     assert watch.alarms(np.zeros((300, SCORES))) == []
@@ -67,11 +67,11 @@ def results(alarms, years=1.0, delays=()):
     return AlarmResults(
         name="x",
         seed=0,
-        parties=60,
+        walking_groups=60,
         years=years,
         false_alarms=alarms,
         highest=0.5,
-        told=0.0,
+        pose_excess=0.0,
         delays=delays,
     )
 
@@ -188,7 +188,7 @@ def test_a_recorded_camera_is_judged_still_and_knocked():
     )
     assert found.false_alarms == 0
     assert 0 < found.highest < 1
-    assert 0 < found.told < 1
-    assert found.parties == pytest.approx(60, abs=15)
+    assert 0 < found.pose_excess < 1
+    assert found.walking_groups == pytest.approx(60, abs=15)
     assert [len(own) for own in by_knock([found]).values()] == [10, 10]
     assert share_within(by_knock([found])[(5.0, False)], 130) == 1.0

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.evaluation.protocol.cases import ProtocolCase, judge_answer
 from models.evaluation.protocol.flow_runs import fused, registration
 from models.evaluation.protocol.joint_runs import joint, joint_feet
@@ -45,12 +45,12 @@ def test_what_is_shared_is_what_each_would_learn(learned):
             [track if boxed else replace(track, top_v=None) for track in tracks]
             for tracks in (learned.case.reference, learned.case.seen)
         )
-        reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+        reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
         alone = joint_estimate(seen(after), PRIOR, reference)
         assert_array_equal(answer.values, alone.values)
         assert_array_equal(answer.covariance, alone.covariance)
-    assert learned.site.speeds.statures is not None
-    assert learned.feet_speeds.statures is None
+    assert learned.site.speed_reference.statures is not None
+    assert learned.feet_speed_reference.statures is None
 
 
 def test_the_map_alone_finds_the_camera_again_without_any_speed(learned):
@@ -77,7 +77,7 @@ def test_speeds_make_the_map_surer(learned):
 def test_without_a_map_registration_says_nothing_and_fused_is_the_joint_estimate(learned):
     blind = replace(learned, site=replace(learned.site, flow=None))
     nothing = registration(blind)
-    assert (nothing.tracks, len(nothing.weak), nothing.heading_rad) == (0, 3, None)
+    assert (nothing.tracks, nothing.identifiable, nothing.heading_rad) == (0, (), None)
     assert_array_equal(fused(blind).values, joint(blind).values)
     assert fused(blind).heading_rad is None
     few = replace(learned, seen=seen(list(learned.case.seen[:3])))

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.evaluation.studies.flow_study import study_site
-from models.evaluation.studies.study_site import draw_place
+from models.evaluation.studies.simulated_site import draw_simulated_site
 from models.geometry.ground import ground_from_pixel
 from models.simulation.site import Lane, SiteConfig, draw_lanes, draw_new_lane, walk_changed
 from tests.models.sites import LENS, PRIOR
@@ -61,8 +61,8 @@ def test_the_same_site_gives_the_same_results_and_a_knock_is_told():
     )
 
 
-def test_places_differ_and_people_are_seen():
-    places = [draw_place(np.random.default_rng(seed)) for seed in range(4)]
-    assert len({place.intrinsics.fx for place in places}) == 4
-    assert all(4 <= place.prior.height_m <= 9 for place in places)
-    assert {len(place.lanes) for place in places} <= {2, 3, 4}
+def test_simulated_sites_differ_and_people_are_seen():
+    drawn = [draw_simulated_site(np.random.default_rng(seed)) for seed in range(4)]
+    assert len({site.intrinsics.fx for site in drawn}) == 4
+    assert all(4 <= site.prior.height_m <= 9 for site in drawn)
+    assert {len(site.lanes) for site in drawn} <= {2, 3, 4}

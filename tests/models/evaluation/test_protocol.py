@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.evaluation.protocol.cases import (
     HARD,
     KNOCKED,
@@ -84,20 +84,22 @@ def test_a_knock_keeps_feet_on_their_place_and_people_as_tall(scene):
 
 def test_the_same_seed_knocks_the_same_way_and_hard_knocks_go_farther(scene):
     still, knock, hard = (draw_case(scene, 5, reach) for reach in (STILL, KNOCKED, HARD))
-    drift = numbers_of(knock.true_pose) - numbers_of(POSE)
-    assert_allclose(numbers_of(still.true_pose), numbers_of(POSE), atol=1e-12)
+    drift = plane_parameters_of(knock.true_pose) - plane_parameters_of(POSE)
+    assert_allclose(plane_parameters_of(still.true_pose), plane_parameters_of(POSE), atol=1e-12)
     assert np.abs(drift[:2]).max() <= math.radians(8)
     assert abs(drift[2]) <= 0.15
-    hard_drift = numbers_of(hard.true_pose) - numbers_of(POSE)
+    hard_drift = plane_parameters_of(hard.true_pose) - plane_parameters_of(POSE)
     assert_allclose(hard_drift / drift, [15 / 8, 15 / 8, 0.35 / 0.15], rtol=1e-9)
 
 
 def test_an_answer_is_judged_by_hand_derived_numbers(scene):
     case = draw_case(scene, 5, KNOCKED)
-    truth = numbers_of(case.true_pose)
+    truth = plane_parameters_of(case.true_pose)
     off = np.array([math.radians(1), 0.0, math.log(1.1)])
     sd = np.array([math.radians(0.7), math.radians(1), 0.05])
-    answer = Answer(values=truth + off, covariance=np.diag(sd**2), tracks=40, weak=("tilt",))
+    answer = Answer(
+        values=truth + off, covariance=np.diag(sd**2), tracks=40, identifiable=("roll", "height")
+    )
     outcome = judge_answer(case, "joint", answer, 0.1)
     assert outcome.angle_error_deg == pytest.approx(1.0, abs=1e-6)
     assert outcome.height_error == pytest.approx(0.1)
@@ -111,10 +113,12 @@ def test_an_answer_is_judged_by_hand_derived_numbers(scene):
 
 def test_a_pan_changes_nothing_else_and_its_error_is_the_whole_rotations(scene):
     plain, turned = draw_case(scene, 4, KNOCKED), draw_case(scene, 4, PANNED)
-    assert_allclose(numbers_of(turned.true_pose), numbers_of(plain.true_pose))
+    assert_allclose(plane_parameters_of(turned.true_pose), plane_parameters_of(plain.true_pose))
     pan_deg = math.degrees(turned.true_pose.heading_rad - POSE.heading_rad)
     assert 0 < abs(pan_deg) <= 8
-    right = Answer(values=numbers_of(turned.true_pose), covariance=np.eye(3) * 1e-6, tracks=9)
+    right = Answer(
+        values=plane_parameters_of(turned.true_pose), covariance=np.eye(3) * 1e-6, tracks=9
+    )
     blind = judge_answer(turned, "blind", right, 0.0)
     # A turn about the vertical is a turn by as much, however the camera is tilted.
     assert blind.angle_error_deg == pytest.approx(abs(pan_deg), rel=1e-6)

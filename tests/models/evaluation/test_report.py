@@ -9,7 +9,7 @@ from models.evaluation.protocol.cases import Outcome
 from models.evaluation.protocol.report import by_scene, overall
 
 
-def outcome(seed: int, true: float, told: float, **changed: object) -> Outcome:
+def outcome(seed: int, true: float, found: float, **changed: object) -> Outcome:
     """A case with a drift in tilt, roll (deg) and log height (hundredths) of the same number."""
     values: dict[str, object] = {
         "scene_id": "street",
@@ -18,12 +18,12 @@ def outcome(seed: int, true: float, told: float, **changed: object) -> Outcome:
         "tracks": 100,
         "used": 90,
         "true_drift": (true, true, true / 100),
-        "drift": (told, told, told / 100),
+        "drift": (found, found, found / 100),
         "sd": (0.5, 0.5, 0.01),
-        "angle_error_deg": abs(told - true),
-        "tilt_roll_error_deg": abs(told - true) / 2,
+        "angle_error_deg": abs(found - true),
+        "tilt_roll_error_deg": abs(found - true) / 2,
         "true_heading_drift_deg": 0.0,
-        "height_error": abs(told - true) / 100,
+        "height_error": abs(found - true) / 100,
         "covered": (True, True, False),
         "degenerate": False,
         "seconds": 0.5,
@@ -45,30 +45,30 @@ def test_medians_and_shares_of_a_scene():
     assert figures.drifting == 0.25
     assert figures.cases == 4
     assert figures.heading_error_deg is None
-    told = [
+    panned = [
         replace(o, heading_error_deg=h, heading_covered=h < 2)
         for o, h in zip(CASES, (1.0, 3.0, 1.5, 1.2), strict=True)
     ]
-    assert by_scene(told)[0].heading_error_deg == pytest.approx(1.35)
-    assert by_scene(told)[0].heading_coverage == 0.75
+    assert by_scene(panned)[0].heading_error_deg == pytest.approx(1.35)
+    assert by_scene(panned)[0].heading_coverage == 0.75
 
 
 def test_slopes_are_least_squares():
     (figures,) = overall(CASES)
-    # true -2, 0, 2, 0 and told -1, 0, 3, 2: covariance 8, variance 8; residuals 0, -1, 0, 1.
+    # true -2, 0, 2, 0 and found -1, 0, 3, 2: covariance 8, variance 8; residuals 0, -1, 0, 1.
     assert figures.slope == pytest.approx((1.0, 1.0, 1.0))
     assert figures.slope_se is not None
     assert figures.slope_se[0] == pytest.approx(math.sqrt(2 / 2 / 8))
     assert figures.coverage == (1.0, 1.0, 0.0)
 
 
-def test_the_slope_of_the_heading_is_that_of_those_who_tell_it():
+def test_the_slope_of_the_heading_is_that_of_those_who_say_it():
     panned = [
         replace(o, true_heading_drift_deg=true, heading_error_deg=error, heading_covered=error < 2)
         for o, true, error in zip(CASES, (-2.0, 0.0, 2.0, 0.0), (1.0, 0.0, 1.0, 2.0), strict=True)
     ]
     (figures,) = overall(panned)
-    # As above: true -2, 0, 2, 0 and told -1, 0, 3, 2.
+    # As above: true -2, 0, 2, 0 and found -1, 0, 3, 2.
     assert figures.heading_slope == pytest.approx(1.0)
     assert figures.heading_slope_se == pytest.approx(math.sqrt(2 / 2 / 8))
     assert figures.heading_coverage == 0.75

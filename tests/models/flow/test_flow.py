@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Steps
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import likelihood, walkers_of
 from models.flow.map.flow_map import DIRECTIONS
@@ -27,7 +27,7 @@ SITE = SiteConfig(aside_m=0.8, standing_share=0.0)
 def site():
     known, after, still = tracks_of(3, (PRIOR, 200), (TURNED, 100), (PRIOR, 100), config=SITE)
     reference = learn_flow(seen(known), LENS, PRIOR, 0)
-    speeds = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     assert reference is not None
     return reference, speeds, seen(after), seen(still), seen(known)
 
@@ -37,7 +37,7 @@ def step_between(start: np.ndarray, end: np.ndarray) -> Steps:
     rays = [np.array([[*ray, 1.0]]) for ray in (start, end)]
     some = seen(tracks_of(3, (PRIOR, 1))[0]).steps
     return replace(
-        some, start_rays=rays[0], end_rays=rays[1], swayed_rays=rays[1], seconds=np.ones(1)
+        some, start_rays=rays[0], end_rays=rays[1], noisy_end_rays=rays[1], seconds=np.ones(1)
     )
 
 
@@ -151,7 +151,7 @@ def test_a_turned_camera_is_told_with_its_heading(site):
         joint = joint_estimate(tracks, PRIOR, speeds)
         fused = fused_estimate(tracks, LENS, PRIOR, joint, reference)
         assert fused.registered
-        assert fused.told == ("tilt", "roll", "height", "heading")
+        assert fused.identifiable == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
         assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 1.0
         assert np.abs(off / np.sqrt(np.diag(fused.covariance))).max() < 3.5
@@ -165,6 +165,6 @@ def test_few_people_make_no_map_and_no_registration(site):
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
     fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, reference)
     assert not fused.registered
-    assert "heading" not in fused.told
+    assert "heading" not in fused.identifiable
     assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])
     assert_allclose(fused.covariance[:3, :3], joint.covariance)

@@ -8,7 +8,7 @@ import pytest
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import observe
-from models.estimation.joint.reference import learn_reference
+from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import walkers_of
 from models.flow.path_test import UsualFit
@@ -69,7 +69,7 @@ def test_the_level_is_passed_about_as_often_as_it_says():
 
 def test_rarer_alarms_need_more():
     still = StillScores(
-        mean=np.zeros(4), covariance=np.eye(4), bent=np.eye(4), looks=10.0, parties=50.0
+        mean=np.zeros(4), covariance=np.eye(4), bent=np.eye(4), looks=10.0, walking_groups=50.0
     )
     # Student's t of 49 degrees of freedom, two-sided: 3.27 at 0.001 * 2, tables.
     assert still.level(0.02) == pytest.approx(3.265**2, rel=2e-3)
@@ -92,7 +92,7 @@ def test_a_move_is_found_where_it_happened_and_not_twice(lanes, flow):
 
 def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     rng = np.random.default_rng(11)
-    speeds = learn_reference(known, PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
@@ -104,7 +104,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
 
 
 def test_a_fit_is_judged_by_its_drop():
-    fit = UsualFit(mean=-1.0, sd=1.0, parties=100.0)
+    fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
     # t of 99 degrees at 1e-4: 3.86; times sqrt(1/25 + 1/100) = 0.2236: a drop of 0.863
     assert not fit.has_changed(np.full(25, -1.85))
     assert fit.has_changed(np.full(25, -1.88))
@@ -113,7 +113,7 @@ def test_a_fit_is_judged_by_its_drop():
 
 
 def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
-    """Mornings on one lane, evenings on another: four maps foretell better than one."""
+    """Mornings on one lane, evenings on another: four maps predict better than one."""
     day_s = 86_400.0
     tracks = []
     for lane, hour in ((lanes[0], 7.0), (lanes[1], 16.0)):
@@ -154,11 +154,11 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     known = feet(walk_site(LENS, PRIOR, visible, walked, 200, rng))
     flow = learn_flow(known, LENS, PRIOR, 0)
     assert flow is not None
-    speeds = learn_reference(known, PRIOR, WalkConfig(), 0)
+    speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
     fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
-    assert "heading" not in fused.told
+    assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
     turns_deg = [math.degrees(heading - PRIOR.heading_rad) for heading in fused.rivals]

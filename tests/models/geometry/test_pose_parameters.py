@@ -6,7 +6,7 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import NAMES, PoseParameters, array_of
+from models.geometry.pose_parameters import PARAMETERS, PoseParameters, array_of
 from tests.strategies import poses
 
 SOME = PoseParameters(height_m=5.0, tilt_rad=0.3, roll_rad=-0.02, heading_rad=1.1)
@@ -14,13 +14,13 @@ SOME = PoseParameters(height_m=5.0, tilt_rad=0.3, roll_rad=-0.02, heading_rad=1.
 
 def test_the_order_of_arrays_and_the_log_of_the_height():
     assert_allclose(array_of(SOME), [0.3, -0.02, 1.6094379, 1.1], atol=1e-7)
-    assert [SOME.of(name) for name in NAMES] == [0.3, -0.02, 5.0, 1.1]
+    assert [SOME.of(name) for name in PARAMETERS] == [0.3, -0.02, 5.0, 1.1]
 
 
 @given(poses())
 def test_there_and_back(pose: CameraPose):
     back = PoseParameters.of_array(array_of(pose))
-    for name in NAMES:
+    for name in PARAMETERS:
         assert back.of(name) == pytest.approx(PoseParameters.of_pose(pose).of(name), rel=1e-12)
 
 

@@ -7,7 +7,7 @@ import torch
 from numpy.testing import assert_allclose
 
 from models.errors import ShapeError, TooFewTrajectoriesError
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -208,7 +208,7 @@ def test_without_noise_the_moved_pose_is_found(plan: SetPlan, lens: Intrinsics, 
                                     np.random.default_rng([seed, 9]))
         )  # fmt: skip
         estimate = set_estimate(network, learned, seen, reference)
-        errors.append(estimate.values - numbers_of(moved))
+        errors.append(estimate.values - plane_parameters_of(moved))
     median = np.median(np.abs(errors), axis=0)
     # Hardly trained, it still finds the most of a move of 4 deg, 5 deg and 10 %.
     assert median[0] < radians(1.0)

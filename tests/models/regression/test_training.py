@@ -7,6 +7,7 @@ import torch
 from models.errors import CalibrationError, DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.regression import training
 from models.regression.recipe import DEFAULT, PAPER, TrainingPlan
 from models.regression.training import (
     HeldOutCheckError,
@@ -34,6 +35,12 @@ class StopError(Exception):
 
 
 @pytest.fixture
+def hardly_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Most of a tiny training is its check, which few tests are about."""
+    monkeypatch.setattr(training, "_HELD_OUT_WALKS", 100)
+
+
+@pytest.fixture
 def plan(lens: Intrinsics, pose: CameraPose) -> TrainingPlan:
     tiny = replace(DEFAULT, random_poses=40, walks_per_pose=2, epochs=3, batch=40)
     return TrainingPlan(intrinsics=lens, prior_pose=pose, recipe=tiny, walk=WalkConfig(), seed=5)
@@ -44,6 +51,7 @@ def weights(plan: TrainingPlan) -> torch.Tensor:
     return torch.cat([p.flatten() for p in network.parameters()]).detach()
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_the_seed_alone_makes_the_weights(plan: TrainingPlan) -> None:
     torch.manual_seed(123)
     first = weights(plan)
@@ -53,12 +61,14 @@ def test_the_seed_alone_makes_the_weights(plan: TrainingPlan) -> None:
     assert not torch.equal(weights(replace(plan, seed=6)), first)
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_metrics_are_those_of_the_seed(plan: TrainingPlan) -> None:
     first, again = (train(plan)[1] for _ in range(2))
     clockless = {"simulation_s": 0.0, "training_s": 0.0}
     assert replace(first, **clockless) == replace(again, **clockless)
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_progress_goes_step_by_step_to_its_end(plan: TrainingPlan) -> None:
     seen: list[TrainingProgress] = []
     _, metrics = train(plan, seen.append)
@@ -70,6 +80,7 @@ def test_progress_goes_step_by_step_to_its_end(plan: TrainingPlan) -> None:
     assert metrics.final_loss == seen[-1].loss
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_more_epochs_are_more_steps(plan: TrainingPlan) -> None:
     counts = []
     for epochs in (1, 2):
@@ -92,11 +103,13 @@ def test_an_exception_from_progress_ends_the_training_there(plan: TrainingPlan) 
     assert steps == [1, 2]
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_steps_change_the_weights(plan: TrainingPlan) -> None:
     idle = replace(plan, recipe=replace(plan.recipe, learning_rate=0.0))
     assert not torch.equal(weights(plan), weights(idle))
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_the_loss_falls_on_the_walks_it_learns_from(plan: TrainingPlan) -> None:
     # Walks of one length are one batch: an epoch is a step.
     recipe = replace(plan.recipe, epochs=100, batch=80, noise_px=0.0)
@@ -107,6 +120,7 @@ def test_the_loss_falls_on_the_walks_it_learns_from(plan: TrainingPlan) -> None:
     assert seen[-1].loss < 0.7 * seen[0].loss
 
 
+@pytest.mark.usefixtures("hardly_checked")
 def test_the_papers_target_trains_too(plan: TrainingPlan) -> None:
     wide = replace(PAPER.spread, height_step_m=2.0, angle_step_rad=radians(15))
     tiny = replace(PAPER, spread=wide, walks_per_pose=1, epochs=30)

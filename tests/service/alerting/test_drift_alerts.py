@@ -123,10 +123,10 @@ def test_an_alert_ends_only_where_what_drifted_is_told_again(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
     for _ in range(5):
-        bench.see(PRIOR, weak=("tilt",))
+        bench.see(PRIOR, unidentifiable=("tilt",))
     assert len(bench.alerts(state="firing")) == 1
     for _ in range(3):
-        bench.see(PRIOR, weak=("roll",))
+        bench.see(PRIOR, unidentifiable=("roll",))
     assert bench.alerts(state="firing") == []
 
 
@@ -180,7 +180,7 @@ def test_an_alert_of_before_a_reference_ends_by_what_is_seen_after_it_alone(benc
         bench.see(PRIOR)  # while the reference is learned again
     bench.learn()
     for _ in range(3):
-        bench.see(PRIOR, weak=("tilt",))  # what had drifted has to be told to end
+        bench.see(PRIOR, unidentifiable=("tilt",))  # what had drifted has to be told to end
     bench.see(PRIOR, earlier=moved(tilt_deg=0.8))
     assert len(bench.alerts(state="firing")) == 1
     bench.see(PRIOR)

@@ -62,7 +62,7 @@ class Town:
         (group,) = [alert for alert in self.alerts(state="firing") if alert["camera_id"] is None]
         return group
 
-    def told(self):
+    def notified(self):
         with self.store.read() as session:
             found = [e.payload for e in events.after(session, 0, 1000) if e.type == "alert"]
         return [(payload["camera_id"], payload["state"]) for payload in found]
@@ -93,7 +93,7 @@ def test_the_third_of_five_makes_a_group_that_blames_the_tracker(town):
     assert {alert["camera_id"] for alert in members} == {"c0", "c1", "c2"}
     assert {alert["track_source"] for alert in members} == {"bytetrack"}
     # The third is told of as the group alone.
-    assert town.told() == [("c0", "firing"), ("c1", "firing"), (None, "firing")]
+    assert town.notified() == [("c0", "firing"), ("c1", "firing"), (None, "firing")]
 
 
 def test_whoever_comes_later_joins_without_a_word(town):
@@ -106,7 +106,7 @@ def test_whoever_comes_later_joins_without_a_word(town):
     assert "4 cameras" in group["reason"]
     assert group["reason_code"] == "moved_together"
     assert group["reason_values"] == {"cameras": 4, "track_source": "bytetrack"}
-    assert town.told() == [("c0", "firing"), ("c1", "firing"), (None, "firing")]
+    assert town.notified() == [("c0", "firing"), ("c1", "firing"), (None, "firing")]
 
 
 def test_two_or_a_minority_or_moves_at_other_times_are_no_group(town):
@@ -120,7 +120,7 @@ def test_two_or_a_minority_or_moves_at_other_times_are_no_group(town):
     for n, ago_min in ((20, 0), (21, 40), (22, 90)):
         town.moves(n, ago_min=ago_min)
     assert all(alert["group_id"] is None for alert in town.alerts())
-    assert len(town.alerts()) == len(town.told()) == 8
+    assert len(town.alerts()) == len(town.notified()) == 8
     town.moves(3)  # the fourth of seven
     assert town.group()["camera_ids"] == ["c0", "c1", "c2", "c3"]
 
@@ -149,8 +149,8 @@ def test_webhooks_hear_of_the_group_instead_of_its_members(town):
     for n in range(5):
         town.moves(n)
     log = town.http.get(f"/webhooks/{hook['id']}/deliveries").json()["items"]
-    told = [town.http.get(f"/deliveries/{item['id']}").json() for item in log[::-1]]
-    bodies = [delivery["payload"]["data"] for delivery in told]
+    notified = [town.http.get(f"/deliveries/{item['id']}").json() for item in log[::-1]]
+    bodies = [delivery["payload"]["data"] for delivery in notified]
     assert [body["camera_id"] for body in bodies] == ["c0", "c1", None]
     assert bodies[2]["camera_ids"] == ["c0", "c1", "c2"]
     with town.store.read() as session:
@@ -171,7 +171,7 @@ def test_it_ends_when_its_last_member_has(town):
     group = next(alert for alert in town.alerts() if alert["camera_id"] is None)
     assert (group["state"], group["outcome"]) == ("resolved", "cleared")
     # The ends of those that were told of by themselves are told, that of the silent one is not.
-    assert town.told()[3:] == [("c0", "resolved"), ("c1", "resolved"), (None, "resolved")]
+    assert town.notified()[3:] == [("c0", "resolved"), ("c1", "resolved"), (None, "resolved")]
 
 
 def test_resolving_it_resolves_its_members_the_same_way(town):
@@ -264,7 +264,7 @@ def test_one_is_open_for_a_source_whatever_happens(town):
         town.moves(n)
     with town.store.write() as session:
         group = alerts.firing_group(session, "bytetrack", "clock")
-        values = {c.key: getattr(group, c.key) for c in AlertRecord.__table__.columns}
+        values = {c.key: getattr(group, c.key) for c in AlertRecord.__mapper__.column_attrs}
         session.add(AlertRecord(**values | {"id": "b" * 32}))
         with pytest.raises(IntegrityError, match="alerts.track_source, alerts.kind"):
             session.flush()
@@ -280,7 +280,7 @@ def test_cameras_that_alarm_at_the_same_moment_make_one_group(town):
         thread.join()
     assert len(town.alerts(state="firing")) == 9
     assert town.group()["camera_ids"] == [f"c{n}" for n in range(8)]
-    assert sum(camera is None for camera, _ in town.told()) == 1
+    assert sum(camera is None for camera, _ in town.notified()) == 1
 
 
 def test_cameras_that_fall_silent_together_are_one_alert_of_their_own_kind(town):

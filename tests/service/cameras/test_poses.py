@@ -1,6 +1,7 @@
 """The served pose out of the store: findings in, pose, reason, history and reference out."""
 
 import math
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from fastapi.testclient import TestClient
@@ -93,6 +94,21 @@ def test_the_etag_changes_with_the_answer_only(bench):
     assert after.headers["ETag"] != first.headers["ETag"]
 
 
+def test_maintenance_that_ends_half_a_second_later_has_an_etag_of_its_own(bench):
+    begins = datetime.now(UTC).replace(second=0, microsecond=0)
+    answers = []
+    for moment in (100_000, 600_000):
+        until = (begins + timedelta(hours=1)).replace(microsecond=moment)
+        plan = {"from": begins.isoformat(), "to": until.isoformat(), "reason": "cleaning"}
+        planned = bench.http.post("/cameras/corner/maintenance", json=plan)
+        planned.raise_for_status()
+        answers.append(bench.http.get("/cameras/corner/pose"))
+        url = f"/cameras/corner/maintenance/{planned.json()['id']}"
+        bench.http.delete(url).raise_for_status()
+    assert answers[0].json()["reason_values"] != answers[1].json()["reason_values"]
+    assert answers[0].headers["ETag"] != answers[1].headers["ETag"]
+
+
 def test_a_refresh_without_news_writes_nothing(bench):
     assert bench.see(PRIOR) is not None
     assert bench.refresh() is None
@@ -101,7 +117,7 @@ def test_a_refresh_without_news_writes_nothing(bench):
 
 def test_a_number_that_is_not_told_is_nowhere_taken_for_known(bench):
     for _ in range(4):
-        bench.see(moved(tilt_deg=5.0, roll_deg=0.3), weak=("tilt", "height"))
+        bench.see(moved(tilt_deg=5.0, roll_deg=0.3), unidentifiable=("tilt", "height"))
     body = bench.pose()
     assert body["state"] == "ok"
     assert body["estimated"] == ["roll_deg"]
@@ -124,7 +140,7 @@ def test_where_nothing_is_told_the_state_is_never_ok(bench):
     everything = ("tilt", "roll", "height")
     bench.see(PRIOR)
     assert bench.pose()["state"] == "ok"
-    bench.see(moved(tilt_deg=5.0), weak=everything)
+    bench.see(moved(tilt_deg=5.0), unidentifiable=everything)
     body = bench.pose()
     assert (body["state"], body["estimated"]) == ("learning", [])
     assert (body["sd"], body["drift"]) == (None, None)
@@ -132,7 +148,7 @@ def test_where_nothing_is_told_the_state_is_never_ok(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
     for _ in range(4):
-        bench.see(PRIOR, weak=everything)
+        bench.see(PRIOR, unidentifiable=everything)
     assert bench.pose()["state"] == "drifting"  # what is not told ends no alert
     (alert,) = bench.alerts(state="firing")
     assert alert["drift"]["tilt_deg"] == pytest.approx(5.0)

@@ -15,7 +15,7 @@ from models.evaluation.protocol.cases import (
     Answer,
     draw_case,
     judge_answer,
-    pose_of_numbers,
+    pose_of_plane_parameters,
 )
 from models.evaluation.scenes import load_scene
 from models.flow.packing import flow_from_bytes, flow_to_bytes
@@ -50,24 +50,24 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     stored = flow_from_bytes(flow_to_bytes(site.flow))
     found = estimate_pose(seen, replace(site, flow=stored))
     offline = found.fused
-    pose = pose_of_numbers(offline.values[:3], case.prior_pose)
+    pose = pose_of_plane_parameters(offline.values[:3], case.prior_pose)
     body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()
     sd = np.sqrt(np.diag(offline.covariance))
-    told = {
+    expected = {
         "tilt_deg": (math.degrees(pose.tilt_rad), math.degrees(sd[0])),
         "roll_deg": (math.degrees(pose.roll_rad), math.degrees(sd[1])),
         "height_m": (pose.height_m, pose.height_m * sd[2]),
     }
-    assert {"tilt", "roll", "height"} <= set(offline.told)
-    assert ("heading" in offline.told) == (body["sd"]["heading_deg"] is not None)
+    assert {"tilt", "roll", "height"} <= set(offline.identifiable)
+    assert ("heading" in offline.identifiable) == (body["sd"]["heading_deg"] is not None)
     heading_rad = None
     if knock == "pan":
         heading_rad = float(offline.values[3])
-        told["heading_deg"] = (math.degrees(heading_rad), math.degrees(sd[3]))
+        expected["heading_deg"] = (math.degrees(heading_rad), math.degrees(sd[3]))
         assert body["drift"]["heading_deg"] == pytest.approx(
             math.degrees(case.true_pose.heading_rad - case.prior_pose.heading_rad), abs=1.5
         )
-    for field, (value, deviation) in told.items():
+    for field, (value, deviation) in expected.items():
         assert f"{body['pose'][field]:.3f}" == f"{value:.3f}" in done.stdout
         assert f"{body['sd'][field]:.3f}" == f"{deviation:.3f}" in done.stdout
     answer = Answer(
@@ -82,7 +82,9 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     assert off in done.stdout
     assert body["tracks"] == len(case.seen)
     assert body["reference"]["tracks"] == len(case.reference)
-    assert body["reference"]["walking_speed_mps"] == pytest.approx(site.speeds.walking_speed_mps)
+    assert body["reference"]["walking_speed_mps"] == pytest.approx(
+        site.speed_reference.walking_speed_mps
+    )
     assert body["state"] == "drifting"
 
 
@@ -97,8 +99,8 @@ def test_boxes_carry_feet_to_the_bit_and_upper_edges(lens):
     assert (boxes[:, 0] < boxes[:, 2]).all()
     carried = tops_of_boxes(lens, boxes)
     np.testing.assert_array_equal(tops_carried(walk, lens).top_v, carried)
-    told = np.isfinite(carried)
-    np.testing.assert_array_equal(carried[told], top_v[told])
+    known = np.isfinite(carried)
+    np.testing.assert_array_equal(carried[known], top_v[known])
     inside = lens.contains(uv, margin_px=-3) & (top_v > 3)
-    assert (told == np.isfinite(top_v))[inside].all()
+    assert (known == np.isfinite(top_v))[inside].all()
     assert boxes_of(Trajectory(time_s=walk.time_s, uv=uv), lens) is None

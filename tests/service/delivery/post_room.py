@@ -1,5 +1,6 @@
 """A camera with alerts, a webhook and the delivery job run by hand."""
 
+import math
 from datetime import datetime
 from typing import Any
 
@@ -39,7 +40,7 @@ class PostRoom:
         changed_at: datetime | None = None,
         **more: Any,
     ) -> str:
-        drift = {"tilt_deg": 5.0, "told": True}
+        drift = {"tilt_rad": math.radians(5.0), "angle_rad": math.radians(5.0)}
         with self.store.write() as session:
             record = alerts.open_alert(
                 session,

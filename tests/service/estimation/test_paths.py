@@ -131,4 +131,6 @@ def test_a_chart_of_another_release_is_done_without(street):
     assert street.look()["state"] == "ok"
     with street.context.store.read() as session:
         kept = flow_maps.find(session, references.newest(session, "corner").id)
-    assert chart_from_bytes(kept.chart).parties > 100  # the map has grown, and its chart with it
+    assert (
+        chart_from_bytes(kept.chart).walking_groups > 100
+    )  # the map has grown, and its chart with it

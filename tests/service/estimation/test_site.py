@@ -16,7 +16,7 @@ from service.estimation.evidence import compute_finding, load_evidence
 from service.jobs.estimate import learn_if_due
 from service.store import references
 from service.windows.unpacked import Unpacked
-from tests.conftest import track
+from tests.conftest import CAMERA, track
 from tests.service.estimation.conftest import WANTED
 from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall
 
@@ -83,12 +83,24 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     assert raw["tilt_deg"] == pytest.approx(math.degrees(joint.raw[0]), abs=1e-6)
 
 
+@pytest.fixture
+def laned(learned):
+    """A street of lanes that has been still for 30 people after its reference."""
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": 150}).raise_for_status()
+        street = Street(http, settings)
+        street.keep_to_lanes(PRIOR, 180)
+        street.look()
+        return street
+
+    return learned("site-lanes", make)
+
+
 @pytest.mark.parametrize("pan_deg", [5, -5])
-def test_a_pure_pan_is_served_and_opens_an_alert(street, pan_deg):
-    change = {"reference_tracks": 150}
-    street.http.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
-    street.keep_to_lanes(PRIOR, 180)
-    body = street.look()
+def test_a_pure_pan_is_served_and_opens_an_alert(laned, pan_deg):
+    street = laned
+    body = street.pose()
     assert body["state"] == "ok"
     assert body["pose"]["heading_deg"] == pytest.approx(40, abs=1.5)
     panned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(pan_deg))

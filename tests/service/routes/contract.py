@@ -96,7 +96,7 @@ class Watched:
 
 
 class Ground:
-    """Cameras of all states with alerts, acts, maintenance, trainings, webhooks and a still."""
+    """Cameras of all states with alerts, activity, maintenance, trainings, webhooks and a still."""
 
     def __init__(self, app: FastAPI, settings: Settings) -> None:
         self.fleet = Fleet(settings)

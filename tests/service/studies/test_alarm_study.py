@@ -15,11 +15,11 @@ def results(name, alarms, tracks):
     return AlarmResults(
         name=name,
         seed=0,
-        parties=60,
+        walking_groups=60,
         years=2.0,
         false_alarms=alarms,
         highest=0.4,
-        told=0.2,
+        pose_excess=0.2,
         delays=delays,
     )
 

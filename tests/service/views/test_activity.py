@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from service.access.activity import note
 from service.commands.migrate import alembic_config, migrate
 from service.jobs.upkeep.limits import limits_of_all
-from service.kinds import Act
+from service.kinds import Activity
 from service.settings import Settings
 from service.store.sqlite.database import Store
 from service.store.tables.activity import ActivityRecord
@@ -70,7 +70,7 @@ def test_pages_by_cursor_come_to_all_of_it(http):
 def test_as_lines_it_can_be_taken_elsewhere(http, settings):
     with Store(settings).write() as session:
         for n in range(1203):
-            note(session, Act.TOKEN_ADDED, by=f"n{n}")
+            note(session, Activity.TOKEN_ADDED, by=f"n{n}")
     answer = http.get("/activity", headers={"Accept": "application/x-ndjson"})
     assert answer.headers["content-type"].startswith("application/x-ndjson")
     lines = [json.loads(line) for line in answer.text.splitlines()]
@@ -95,7 +95,7 @@ def test_only_age_ends_an_entry(settings):
     with store.write() as session:
         for days in (2000, 1826, 1824, 0):
             at = now - timedelta(days=days)
-            what = Act.CAMERA_CHANGED
+            what = Activity.CAMERA_CHANGED
             session.add(ActivityRecord(what=what, at=at, note=f"{days}", details={}))
     with store.write() as session:
         limits = {limit.name: limit for limit in limits_of_all(settings)}

@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import event
 
 from service.views.fleet import list_fleet
-from service.views.metrics import load_figures
+from service.views.metrics import load_metrics
 from service.web.rows import rows_of
 from tests.service.fleet_bench import Fleet, every_state
 
@@ -48,7 +48,7 @@ def test_a_fleet_in_all_states_is_told_of_as_before(http, fleet):
     assert found["rows"] == golden["rows"]
 
 
-@pytest.mark.parametrize("read", [load_figures, list_fleet])
+@pytest.mark.parametrize("read", [load_metrics, list_fleet])
 def test_as_many_statements_are_asked_for_many_cameras_as_for_few(fleet, settings, read):
     def statements():
         seen = []

@@ -1,4 +1,4 @@
-"""The page of a camera out of the store: the one sentence, drawings, flags, deeds, the script."""
+"""A camera's page out of the store: the sentence, drawings, flags, activity, the script."""
 
 import gzip
 import html
@@ -73,7 +73,7 @@ def test_it_may_have_moved_before_an_alert_says_so(bench):
 def test_what_the_newest_people_cannot_tell_is_not_told(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
-    bench.see(moved(tilt_deg=5.0), weak=("tilt", "roll", "height"))
+    bench.see(moved(tilt_deg=5.0), unidentifiable=("tilt", "roll", "height"))
     assert headline(bench.http).endswith("the newest people cannot tell how far.")
     assert "not told by the tracks" in page(bench.http)
 

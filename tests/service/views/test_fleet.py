@@ -162,7 +162,7 @@ def test_the_page_and_the_api_say_the_same_state(bench):
 
 
 def test_the_history_is_in_units_of_the_limits(bench):
-    bench.see(moved(), weak=("roll",))
+    bench.see(moved(), unidentifiable=("roll",))
     for _ in range(3):
         bench.see(moved(tilt_deg=5, height_m=0.1))
     limits: DriftLimits = drift_limits(bench.settings)
@@ -173,7 +173,7 @@ def test_the_history_is_in_units_of_the_limits(bench):
         for e in records:
             drift = {"tilt": e.drift_tilt_rad, "roll": e.drift_roll_rad, "height": e.drift_height_m}
             sd = {"tilt": e.tilt_sd_rad, "roll": e.roll_sd_rad, "height": e.height_sd_m}
-            expected.append(max(abs(drift[n]) / limits.of(n, sd[n]) for n in e.told))
+            expected.append(max(abs(drift[n]) / limits.of(n, sd[n]) for n in e.identifiable))
     assert history == pytest.approx(expected)
     assert history[-1] > 3
 

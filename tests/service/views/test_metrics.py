@@ -51,7 +51,7 @@ def test_a_knocked_camera_in_figures(bench):
     for _ in range(4):
         bench.see(PRIOR)
     for _ in range(3):
-        bench.see(moved(tilt_deg=5.0, height_m=0.5), weak=("roll",))
+        bench.see(moved(tilt_deg=5.0, height_m=0.5), unidentifiable=("roll",))
     found = scrape(bench.http)
     assert bench.pose()["state"] == "drifting"
     assert value(found, "surefoot_cameras", state="drifting") == 1

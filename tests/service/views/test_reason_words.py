@@ -39,7 +39,8 @@ SAID = [
     (T.BEYOND_LIMITS_BEFORE, {**LIMITS, **TILT},
      "tilt +3.10 deg (sd 0.30) against the prior pose: was beyond 5 sd and 0.5 deg or 0.2 m; it "
      "ends once all is below 70 % of that, and so without the newest 12 people"),
-    (T.BEYOND_LIMITS_LAST_TOLD, LIMITS, "beyond 5 sd and 0.5 deg or 0.2 m when it was last told"),
+    (T.BEYOND_LIMITS_LAST_IDENTIFIABLE, LIMITS,
+     "beyond 5 sd and 0.5 deg or 0.2 m when it was last told"),
     (T.WITHIN_LIMITS, {**LIMITS, **TILT},
      "tilt +3.10 deg (sd 0.30) against the prior pose: not beyond 5 sd and 0.5 deg or 0.2 m"),
     (T.CHART, {"number": "heading", "sign": -1, "parties": 20, "statistic": 30.4, "level": 8.6},
@@ -61,17 +62,17 @@ SAID = [
     (T.PATHS_CHANGED, {}, "the paths have changed: the flow map is left out"),
     (T.HEADING_AMBIGUOUS, {"turns_rad": [math.radians(-12), math.radians(0.04)]},
      "turns of -12.0 deg and +0.0 deg explain where people walk about as well"),
-    (T.HEADING_UNTOLD, {"heading_sd_rad": math.radians(4.26)},
+    (T.HEADING_UNIDENTIFIABLE, {"heading_sd_rad": math.radians(4.26)},
      "where people walk does not tell the heading (sd 4.3 deg)"),
-    (T.NUMBERS_UNTOLD, {"roll_sd_rad": math.radians(3.0), "log_height_sd": 0.154},
+    (T.UNIDENTIFIABLE, {"roll_sd_rad": math.radians(3.0), "log_height_sd": 0.154},
      "the tracks cannot tell roll (sd 3.0 deg) and height (sd 15 %)"),
-    (T.NUMBERS_UNTOLD, {"tilt_sd_rad": math.radians(3.0), "alike": ["tilt", "height"]},
+    (T.UNIDENTIFIABLE, {"tilt_sd_rad": math.radians(3.0), "alike": ["tilt", "height"]},
      "the tracks cannot tell tilt (sd 3.0 deg): people walk too much alike, one way or along one "
      "path, and tilt makes up for height"),
-    (T.TOO_FEW_PARTIES, {"tracks": 12, "parties": 1, "least_parties": 5},
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 1, "least_parties": 5},
      "the 12 tracks are of 1 party walking together, at least 5 are needed to tell the camera's "
      "drift from theirs"),
-    (T.TOO_FEW_PARTIES, {"tracks": 12, "parties": 3, "least_parties": 5},
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 3, "least_parties": 5},
      "the 12 tracks are of 3 parties walking together, at least 5 are needed to tell the camera's "
      "drift from theirs"),
     (T.SPEED_UNUSUAL, {"speed_mps": 2.994, "slow_mps": 0.7, "fast_mps": 2.0},
@@ -89,7 +90,7 @@ SAID = [
     (S.TRACKS_SINCE, {"tracks": 3, "cause": "put_back", "least_walkers": 5},
      "3 tracks since the camera was put back; at least 5 of people who walk for a few seconds "
      "inside the image are needed"),
-    (S.LAST_TOLD, {}, "when it was last told:"),
+    (S.LAST_IDENTIFIABLE, {}, "when it was last told:"),
     (S.MAINTENANCE, {"until": "2026-11-22T09:30:00Z"},
      "maintenance is under way until 2026-11-22 09:30Z"),
     (S.MAINTENANCE, {"until": "2026-11-22T09:30:00Z", "note": "new lens"},
@@ -139,9 +140,9 @@ def test_every_code_has_words():
 
 def test_reasons_are_said_one_after_the_other():
     assert in_words(()) == ""
-    told = Reason(code=T.PATHS_CHANGED)
+    changed = Reason(code=T.PATHS_CHANGED)
     missing = Reason(code=S.REFERENCE_TRACKS, values={"tracks": 1, "wanted": 2})
-    assert in_words((Reason(code=S.LAST_TOLD), told, missing)) == (
+    assert in_words((Reason(code=S.LAST_IDENTIFIABLE), changed, missing)) == (
         "when it was last told: the paths have changed: the flow map is left out; "
         "1 of 2 reference tracks"
     )
@@ -171,26 +172,28 @@ def test_clients_get_the_first_code_and_its_angles_in_degrees():
 DRIFT = Drift(
     by=PoseParameters(height_m=0.3, tilt_rad=0.1, roll_rad=0.0, heading_rad=0.2),
     sd=PoseParameters(height_m=0.1, tilt_rad=0.01, roll_rad=0.01, heading_rad=0.01),
-    angle_rad=0.1, told=("tilt", "heading"),
+    angle_rad=0.1, identifiable=("tilt", "heading"),
 )  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("excess", "drifted", "told", "code"),
+    ("excess", "drifted", "identifiable", "code"),
     [
-        (1.5, ("tilt",), DRIFT.told, T.BEYOND_LIMITS),
-        (0.8, ("tilt",), DRIFT.told, T.BEYOND_LIMITS_BEFORE),
-        (1.5, (), DRIFT.told, T.BEYOND_LIMITS_UNCONFIRMED),
-        (0.8, (), DRIFT.told, T.WITHIN_LIMITS),
-        (0.0, ("tilt",), (), T.BEYOND_LIMITS_LAST_TOLD),
+        (1.5, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS),
+        (0.8, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS_BEFORE),
+        (1.5, (), DRIFT.identifiable, T.BEYOND_LIMITS_UNCONFIRMED),
+        (0.8, (), DRIFT.identifiable, T.WITHIN_LIMITS),
+        (0.0, ("tilt",), (), T.BEYOND_LIMITS_LAST_IDENTIFIABLE),
     ],
 )
-def test_a_verdict_gives_what_was_told_as_its_reason(excess, drifted, told, code):
+def test_a_verdict_gives_what_is_identifiable_as_its_reason(excess, drifted, identifiable, code):
     verdict = DriftVerdict(streak=0, excess=excess, drifted=drifted)
-    reason = reason_of_drift(replace(DRIFT, told=told), verdict, DriftLimits(**LIMITS))
+    reason = reason_of_drift(
+        replace(DRIFT, identifiable=identifiable), verdict, DriftLimits(**LIMITS)
+    )
     assert reason is not None
     assert reason.code is code
-    numbers = {} if not told else {
+    numbers = {} if not identifiable else {
         "tilt_rad": 0.1, "tilt_sd_rad": 0.01, "heading_rad": 0.2, "heading_sd_rad": 0.01,
     }  # fmt: skip
     assert reason.values == {**LIMITS, **numbers}
@@ -198,13 +201,19 @@ def test_a_verdict_gives_what_was_told_as_its_reason(excess, drifted, told, code
 
 def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():
     verdict = DriftVerdict(streak=0, excess=0.0, drifted=())
-    assert reason_of_drift(replace(DRIFT, told=()), verdict, DriftLimits(**LIMITS)) is None
+    assert reason_of_drift(replace(DRIFT, identifiable=()), verdict, DriftLimits(**LIMITS)) is None
 
 
 @pytest.mark.parametrize(("number", "name"), [(0, "tilt"), (2, "height"), (CLOCK, "times")])
 def test_a_suspicious_reading_is_a_reason(number, name):
     reading = Reading(
-        statistic=9.0, level=8.0, number=number, sign=1, parties=20, track_idx=3, suspicious=True
+        statistic=9.0,
+        level=8.0,
+        parameter=number,
+        sign=1,
+        walking_groups=20,
+        track_idx=3,
+        suspicious=True,
     )
     reason = reason_of_reading(reading)
     assert reason is not None

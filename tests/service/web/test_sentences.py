@@ -13,10 +13,12 @@ from service.web.wording.sentences import angle_half_width_deg, moved_words, sig
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 
 
-def estimate(told=EVERYTHING, drifted=("tilt",), sd_deg=0.2, height_m=0.0, sd_m=0.06, **angles_deg):
+def estimate(
+    identifiable=EVERYTHING, drifted=("tilt",), sd_deg=0.2, height_m=0.0, sd_m=0.06, **angles_deg
+):
     drifts = {f"drift_{name}_rad": math.radians(value) for name, value in angles_deg.items()}
     return EstimateRecord(
-        told=list(told),
+        identifiable=list(identifiable),
         drifted=list(drifted),
         tilt_sd_rad=math.radians(sd_deg),
         roll_sd_rad=math.radians(sd_deg),
@@ -39,7 +41,7 @@ def test_what_is_within_its_own_interval_is_not_named():
 
 
 def test_a_number_that_is_not_told_is_not_named():
-    found = estimate(told=["roll"], tilt=5.0, roll=2.0)
+    found = estimate(identifiable=["roll"], tilt=5.0, roll=2.0)
     assert "tilt" not in moved_words(found)
 
 
@@ -61,7 +63,7 @@ def test_how_sure_is_along_the_turn():
     # Of 3 and 4 deg each known to 0.2: the length of 5 is, too; 90 of 100 is 1.644854 sd.
     assert angle_half_width_deg(estimate(tilt=3.0, roll=4.0)) == pytest.approx(0.3289707)
     assert angle_half_width_deg(estimate(tilt=0.01)) == pytest.approx(0.3289707)
-    assert angle_half_width_deg(estimate(told=["height"])) is None
+    assert angle_half_width_deg(estimate(identifiable=["height"])) is None
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_reference
-from models.estimation.numbers import numbers_of
+from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.parameters import plane_parameters_of
 from models.evaluation.scenes import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import PRIOR, seen, tracks_of
@@ -27,10 +27,10 @@ def test_intervals_cover_and_errors_fall_as_their_bound_does():
             log_height=0.15 * log_height,
         ).apply(PRIOR)
         known, few, many = tracks_of(site, (PRIOR, 300), (knocked, FEW), (knocked, MANY))
-        reference = learn_reference(seen(known), PRIOR, WalkConfig(), 0)
+        reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
         for place, tracks in enumerate((few, many)):
             estimate = joint_estimate(seen(tracks), PRIOR, reference)
-            errors[site, place] = estimate.values - numbers_of(knocked)
+            errors[site, place] = estimate.values - plane_parameters_of(knocked)
             sds[site, place] = np.sqrt(np.diag(estimate.covariance))
             bounds[site, place] = np.sqrt(np.diag(estimate.bound))
     # 90 % is stated; 180 intervals of three times 30 sites that share much.

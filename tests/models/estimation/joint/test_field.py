@@ -26,7 +26,7 @@ def measured_at(place: np.ndarray, *, seed: int = 0) -> Measured:
         d_value=np.zeros((count, 3)),
         d_place=rng.normal(size=(count, 2, 3)),
         d_direction=aside * turn,
-        d_sway=np.zeros((count, 3)),
+        d_direction_noise=np.zeros((count, 3)),
         rows=Rows(
             owner_idx=np.arange(count),
             linked=np.zeros(count, dtype=bool),
@@ -67,7 +67,7 @@ def test_slopes_are_those_of_differences(number):
             d_value=here.d_value,
             d_place=here.d_place,
             d_direction=here.d_direction,
-            d_sway=here.d_sway,
+            d_direction_noise=here.d_direction_noise,
             rows=here.rows,
         )
         return field.features(moved) @ coefficients
@@ -77,7 +77,7 @@ def test_slopes_are_those_of_differences(number):
 
 
 def test_a_wide_site_has_wider_bumps_not_more():
-    place = np.random.default_rng(4).uniform(-200, 200, (4000, 2))
+    place = np.random.default_rng(4).uniform(-200, 200, (1500, 2))
     field = field_over(measured_at(place), SHAPE)
     assert len(field.centres) <= 150
     assert field.length_m > 6.0

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from models.estimation.joint.hierarchy import (
     Spread,
     Weights,
+    composite_log_likelihoods,
     curvature,
-    goodness,
     relearn,
     reweigh,
     track_curvatures,
@@ -21,9 +21,9 @@ SPREAD = Spread(
     trend_sd=0.1,
     within_sd=0.1,
     correlation=0.5,
-    other_share=0.1,
-    other_mean=-2.0,
-    other_sd=0.8,
+    outlier_share=0.1,
+    outlier_mean=-2.0,
+    outlier_sd=0.8,
 )
 
 
@@ -41,7 +41,7 @@ def even_weights(rows: Rows) -> Weights:
     return Weights(
         row=np.ones(len(rows)),
         track=np.ones(rows.owners),
-        usual=np.ones(len(rows)),
+        inlier=np.ones(len(rows)),
         own=np.zeros((rows.owners, 2)),
         own_covariance=np.zeros((rows.owners, 2, 2)),
     )
@@ -84,11 +84,11 @@ def test_someone_who_stands_counts_for_nothing_whatever_noise_makes_of_it():
     value[14] = 0.0  # one step of the standing one looks like a walk
     residual = value - 0.3
     weights = reweigh(residual, value, np.ones(20, dtype=bool), rows, SPREAD)
-    assert weights.usual[:10].min() > 0.99
-    assert weights.usual[[*range(10, 14), *range(15, 20)]].max() < 0.001
+    assert weights.inlier[:10].min() > 0.99
+    assert weights.inlier[[*range(10, 14), *range(15, 20)]].max() < 0.001
     one = slice(14, 15)
     alone = reweigh(residual[one], value[one], np.ones(1, dtype=bool), rows_of([1]), SPREAD)
-    assert 1 - weights.usual[14] > 4 * (1 - alone.usual[0])
+    assert 1 - weights.inlier[14] > 4 * (1 - alone.inlier[0])
 
 
 def test_a_runner_weighs_less_than_a_walker():
@@ -120,14 +120,18 @@ def test_the_spread_of_a_simulated_crowd_is_learned():
     # Student-t of 4 degrees of freedom stands for a normal with about 0.84 of its deviation.
     assert spread.between_sd == pytest.approx(0.84 * 0.2, rel=0.15)
     assert spread.within_sd == pytest.approx(0.84 * 0.08, rel=0.15)
-    assert spread.other_share == pytest.approx(0.15, abs=0.03)
-    assert spread.other_mean == pytest.approx(-2.5, abs=0.15)
+    assert spread.outlier_share == pytest.approx(0.15, abs=0.03)
+    assert spread.outlier_mean == pytest.approx(-2.5, abs=0.15)
 
 
 def test_a_long_track_does_not_outvote_short_ones():
     rows = rows_of([40, 4])
     residual = np.full(44, 0.1)
-    long, short = goodness(residual, residual, np.ones(44, dtype=bool), rows, SPREAD)
+    long, short = composite_log_likelihoods(
+        residual, residual, np.ones(44, dtype=bool), rows, SPREAD
+    )
     assert long == pytest.approx(short)
     above = np.concatenate([np.zeros(40, dtype=bool), np.ones(4, dtype=bool)])
-    assert goodness(residual, residual, above, rows, SPREAD)[0] == pytest.approx(-32.0)
+    assert composite_log_likelihoods(residual, residual, above, rows, SPREAD)[0] == pytest.approx(
+        -32.0
+    )

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import observe, of_tracks
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -41,7 +41,7 @@ def speeds(tracks: list[Trajectory], candidate: Array) -> Measured:
 
 
 def test_a_walk_at_even_speed_is_measured_as_such_at_the_true_pose():
-    measured = speeds([walk(1.2), walk(0.8, direction=AHEAD)], numbers_of(POSE))
+    measured = speeds([walk(1.2), walk(0.8, direction=AHEAD)], plane_parameters_of(POSE))
     # 6 s are four steps of 1.5 s.
     assert_allclose(measured.rows.owner_idx, [0] * 4 + [1] * 4)
     assert_allclose(np.exp(measured.value), [1.2] * 4 + [0.8] * 4, rtol=5e-3)
@@ -51,7 +51,7 @@ def test_a_walk_at_even_speed_is_measured_as_such_at_the_true_pose():
 
 
 def test_twice_the_height_is_twice_the_speed():
-    at = numbers_of(POSE)
+    at = plane_parameters_of(POSE)
     tracks = [walk(1.2)]
     low, high = speeds(tracks, at), speeds(tracks, at + [0, 0, math.log(2)])
     assert_allclose(high.value - low.value, math.log(2), atol=1e-6)
@@ -61,7 +61,7 @@ def test_twice_the_height_is_twice_the_speed():
 def test_statures_are_those_of_the_people():
     tracks = [walk(1.2, tall_m=1.6), walk(0.8, tall_m=1.9)]
     tops = observe(tracks, LENS).tops
-    measured = measure_statures(tops, numbers_of(POSE), POSE.heading_rad)
+    measured = measure_statures(tops, plane_parameters_of(POSE), POSE.heading_rad)
     assert_allclose(np.exp(measured.value), [1.6] * 5 + [1.9] * 5, rtol=5e-3)
 
 
@@ -69,7 +69,7 @@ def test_statures_are_those_of_the_people():
 def test_derivatives_are_those_of_differences(number):
     tracks = [walk(1.2), walk(0.9, direction=AHEAD), walk(1.4, direction=(AHEAD + ASIDE) / 1.414)]
     observations = observe(tracks, LENS)
-    at = numbers_of(POSE) + [0.03, -0.05, 0.1]
+    at = plane_parameters_of(POSE) + [0.03, -0.05, 0.1]
     step = np.zeros(3)
     step[number] = 1e-6
     for measure, read in (
@@ -98,7 +98,7 @@ def test_noise_in_a_speed_is_not_in_its_derivative():
         Trajectory(time_s=clean.time_s, uv=clean.uv + rng.normal(0, 4, clean.uv.shape))
         for _ in range(400)
     ]
-    measured = speeds(tracks, numbers_of(POSE))
+    measured = speeds(tracks, plane_parameters_of(POSE))
     for step in range(8):
         here = np.arange(len(measured.value)) % 8 == step
         shared = np.corrcoef(measured.value[here], measured.d_value[here, 0])[0, 1]
@@ -106,7 +106,7 @@ def test_noise_in_a_speed_is_not_in_its_derivative():
 
 
 def test_what_is_above_the_horizon_counts_for_nothing():
-    measured = speeds([walk(1.2)], numbers_of(POSE) - [math.radians(40), 0, 0])
+    measured = speeds([walk(1.2)], plane_parameters_of(POSE) - [math.radians(40), 0, 0])
     assert not measured.valid.any()
     assert_allclose(measured.value, 0)
     assert_allclose(measured.d_value, 0)
@@ -115,8 +115,8 @@ def test_what_is_above_the_horizon_counts_for_nothing():
 def test_a_choice_of_tracks_is_measured_as_if_alone():
     tracks = [walk(1.2), walk(0.8), walk(1.5)]
     some = of_tracks(observe(tracks, LENS), np.array([0, 2]))
-    chosen = measure_speeds(some.steps, numbers_of(POSE), 0.4)
-    alone = speeds([tracks[0], tracks[2]], numbers_of(POSE))
+    chosen = measure_speeds(some.steps, plane_parameters_of(POSE), 0.4)
+    alone = speeds([tracks[0], tracks[2]], plane_parameters_of(POSE))
     assert_allclose(chosen.value, alone.value)
     assert_allclose(chosen.rows.owner_idx, alone.rows.owner_idx)
 

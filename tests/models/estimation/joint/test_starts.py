@@ -22,9 +22,9 @@ SPREAD = Spread(
     trend_sd=0.05,
     within_sd=0.1,
     correlation=0.3,
-    other_share=0.1,
-    other_mean=-2.0,
-    other_sd=0.8,
+    outlier_share=0.1,
+    outlier_mean=-2.0,
+    outlier_sd=0.8,
 )
 
 
@@ -52,7 +52,7 @@ def site(truth, valid=lambda candidate: True, tracks=TRACKS):
             d_value=np.zeros((count, 3)),
             d_place=np.zeros((count, 2, 3)),
             d_direction=None,
-            d_sway=np.zeros((count, 3)),
+            d_direction_noise=np.zeros((count, 3)),
             rows=rows,
         )
 

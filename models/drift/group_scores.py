@@ -1,8 +1,8 @@
-"""What a party of people says of small moves of a camera: by how they walk, and where.
+"""What a walking group says of small moves of a camera: by how they walk, and where.
 
-Each party has fourteen scores. Three are slopes of the joint estimator's likelihood along tilt,
-roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that it
-says little after a large move. Three more are the same without that: how far off a pace is, held
+Each walking group has fourteen scores. Three are slopes of the joint estimator's likelihood along
+tilt, roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that
+it says little after a large move. Three more are the same without that: how far off a pace is, held
 within bounds. Eight are how much likelier their places and ways were a little further on than a
 little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
 these tells a move, and how well, is learned of the site (`chart_learning`). The method: "The alarm"
@@ -17,12 +17,12 @@ import numpy.typing as npt
 from models.estimation.joint.fit import Learned, per_track
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, Steps, check_in_time
-from models.estimation.joint.site import SiteReference, channels_of
-from models.estimation.numbers import numbers_of
+from models.estimation.joint.speed_reference import SpeedReference, channels_of
+from models.estimation.parameters import plane_parameters_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
 from models.flow.registration import Site
-from models.flow.turn_detection import REACH, parties_in_time
+from models.flow.turn_detection import REACH, groups_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
@@ -37,22 +37,22 @@ class Usual:
     """What is usual before a camera: how people walk, and where, seen from the prior pose."""
 
     prior: CameraPose
-    paces: SiteReference
+    speed_reference: SpeedReference
     paths: Site
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PartyScores:
-    """Scores (P, 14) of parties in the order of their last tracks (P,)."""
+class GroupScores:
+    """Scores (P, 14) of walking groups in the order of their last tracks (P,)."""
 
     values: Array
     last: npt.NDArray[np.int64]
 
 
-def score_parties(
+def score_groups(
     observations: Observations, usual: Usual, walkers: Walkers | None = None
-) -> PartyScores:
-    """The scores of all parties among tracks, at the prior pose.
+) -> GroupScores:
+    """The scores of all walking groups among tracks, at the prior pose.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -60,8 +60,8 @@ def score_parties(
     check_in_time(observations)
     if walkers is None:
         walkers = walkers_of(observations, candidate_of(usual.prior))
-    _, _, last = parties_in_time(walkers)
-    return PartyScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
+    _, _, last = groups_in_time(walkers)
+    return GroupScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
 
 
 def scores_at(
@@ -76,38 +76,42 @@ def scores_at(
     By a clock whose times are longer by a factor, everybody is as much slower.
     """
     at = candidate_of(usual.prior) + beside
-    people, party_of, last = parties_in_time(walkers)
+    people, group_of, last = groups_in_time(walkers)
     if not last.size:
         return np.zeros((0, SCORES))
-    numbers = numbers_of(usual.prior) + beside[:3]
+    parameters = plane_parameters_of(usual.prior) + beside[:3]
     observations = replace(observations, steps=_slowed(observations.steps, stretch))
     walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
-    slopes = per_track(channels_of(observations, usual.paces, usual.prior), numbers).gradient
+    slopes = per_track(
+        channels_of(observations, usual.speed_reference, usual.prior), parameters
+    ).gradient
     scores = np.concatenate(
         [
             -slopes,
-            _bounded(observations, walkers, usual, numbers),
+            _bounded(observations, walkers, usual, parameters),
             *(_along_paths(walkers, usual.paths, at, step) for step in _STEPS),
         ],
         axis=1,
     )
     sums = np.zeros((last.size, SCORES))
-    np.add.at(sums, party_of, scores[people])
-    return np.asarray(sums / np.bincount(party_of)[:, None])
+    np.add.at(sums, group_of, scores[people])
+    return np.asarray(sums / np.bincount(group_of)[:, None])
 
 
 def _slowed(steps: Steps, stretch: float) -> Steps:
     return replace(steps, seconds=steps.seconds * stretch)
 
 
-def _bounded(observations: Observations, walkers: Walkers, usual: Usual, numbers: Array) -> Array:
+def _bounded(
+    observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
+) -> Array:
     """How far off paces are, and statures where boxes tell them, times what would mend it."""
-    heading, paces = usual.prior.heading_rad, usual.paces
-    speeds = measure_speeds(walkers.steps, numbers, heading)
-    scores = _off(speeds, paces.speeds, walkers.tracks) / _PACE_SD**2
-    if paces.statures is not None:
-        tops = measure_statures(observations.tops, numbers, heading)
-        scores = scores + _off(tops, paces.statures, walkers.tracks) / _STATURE_SD**2
+    heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
+    speeds = measure_speeds(walkers.steps, parameters, heading)
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2
+    if speed_reference.statures is not None:
+        tops = measure_statures(observations.tops, parameters, heading)
+        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / _STATURE_SD**2
     return scores
 
 
@@ -124,10 +128,11 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
 
 
 def _along_paths(walkers: Walkers, paths: Site, at: Array, share: float) -> Array:
-    """How much likelier tracks (N, 4) are a step on than a step back, along each number."""
+    """How much likelier tracks (N, 4) are a step on than a step back, along each parameter."""
     return np.stack(
         [
-            paths.log_chances(walkers, at + step) - paths.log_chances(walkers, at - step)
+            paths.track_log_likelihoods(walkers, at + step)
+            - paths.track_log_likelihoods(walkers, at - step)
             for step in share * np.diag(REACH)
         ],
         axis=1,

@@ -60,18 +60,23 @@ def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRec
     return {record.camera_id: record for record in session.scalars(query)}
 
 
-def newest_told_estimates(session: Session, ids: Collection[str]) -> dict[str, EstimateRecord]:
-    """The newest estimate of each of some cameras that told anything, without what is behind it."""
-    told = (
+def newest_identifiable_estimates(
+    session: Session, ids: Collection[str]
+) -> dict[str, EstimateRecord]:
+    """The newest estimate of each of some cameras of which something is identifiable.
+
+    Without what is behind it.
+    """
+    newest = (
         select(EstimateRecord.id)
         .where(EstimateRecord.camera_id == CameraRecord.id)
-        .where(type_coerce(EstimateRecord.told, String) != "[]")
+        .where(type_coerce(EstimateRecord.identifiable, String) != "[]")
         .order_by(EstimateRecord.id.desc())
         .limit(1)
         .correlate(CameraRecord)
         .scalar_subquery()
     )
-    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == told)
+    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
     query = query.where(CameraRecord.id.in_(ids)).options(defer(EstimateRecord.raw))
     return {record.camera_id: record for record in session.scalars(query)}
 

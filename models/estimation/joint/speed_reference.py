@@ -1,4 +1,7 @@
-"""The reference as a value: what is usual at a site, and how the joint estimator errs there."""
+"""The reference as a value: what is usual at a site, and how the joint estimator errs there.
+
+Ours: pose = estimate - offset, which is learned while the pose is known.
+"""
 
 from dataclasses import dataclass
 
@@ -7,9 +10,10 @@ import numpy as np
 from models.estimation.joint.fit import Channel, Learned, PosePrior
 from models.estimation.joint.measures import measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations
-from models.estimation.numbers import numbers_of
+from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.packing import stored_as
 from models.reasons import Reason
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
@@ -18,20 +22,20 @@ _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log h
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SiteReference:
+class SpeedReference:
     """What is usual at a site, and how the joint estimator errs there.
 
-    `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth,
-    with `offset_covariance` (3, 3); its variances are to be multiplied by `inflation`. `tracks`
-    is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit the
-    prior pose, `boxes` says why boxes are used or not.
+    `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth, with
+    `offset_covariance` (3, 3); its variances are to be multiplied by `pose_variance_inflation`.
+    `tracks` is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit
+    the prior pose, `boxes` says why boxes are used or not.
     """
 
     speeds: Learned
     statures: Learned | None
     offset: Array
     offset_covariance: Array
-    inflation: float
+    pose_variance_inflation: float = stored_as("inflation")
     tracks: int
     doubt: Reason | None = None
     boxes: str = ""
@@ -48,7 +52,7 @@ class SiteReference:
 
 
 def channels_of(
-    observations: Observations, reference: SiteReference, prior: CameraPose
+    observations: Observations, reference: SpeedReference, prior: CameraPose
 ) -> list[Channel]:
     """The evidence in a set of tracks: speeds, and statures where boxes tell them."""
     heading = prior.heading_rad
@@ -71,4 +75,4 @@ def channels_of(
 
 def pose_prior(prior: CameraPose) -> PosePrior:
     """The weak prior around a prior pose: it holds what the tracks leave free, no more."""
-    return PosePrior(mean=numbers_of(prior), sd=_PRIOR_SD)
+    return PosePrior(mean=plane_parameters_of(prior), sd=_PRIOR_SD)

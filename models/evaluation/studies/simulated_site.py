@@ -22,7 +22,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class SimulatedSite:
     """A camera at its prior pose, and how the people before it walk."""
 
     intrinsics: Intrinsics
@@ -32,10 +32,10 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LearnedPlace:
-    """A place with what its reference tracks told: learned once, whatever happens after."""
+class LearnedSite:
+    """A simulated site with what its reference tracks showed: learned once."""
 
-    place: Place
+    simulated: SimulatedSite
     site: CameraSite
 
     def fused(self, tracks: Observations) -> FusedEstimate:
@@ -43,7 +43,7 @@ class LearnedPlace:
         return served_pose(tracks, self.site).fused
 
 
-def draw_place(rng: np.random.Generator) -> Place:
+def draw_simulated_site(rng: np.random.Generator) -> SimulatedSite:
     """A street camera 4 to 9 m high with two to four lanes before it.
 
     Raises:
@@ -69,11 +69,11 @@ def draw_place(rng: np.random.Generator) -> Place:
                 walk_site(lens, prior, [lane], config, 1, rng)
         except DegenerateGeometryError:
             continue
-        return Place(intrinsics=lens, prior=prior, lanes=tuple(lanes), config=config)
+        return SimulatedSite(intrinsics=lens, prior=prior, lanes=tuple(lanes), config=config)
     raise DegenerateGeometryError(f"lanes: none are seen in {_MOST_DRAWS} draws")
 
 
-def learn_place(place: Place, reference: Observations) -> LearnedPlace:
+def learn_simulated_site(simulated: SimulatedSite, reference: Observations) -> LearnedSite:
     """What reference tracks of a place tell.
 
     Raises:
@@ -81,25 +81,27 @@ def learn_place(place: Place, reference: Observations) -> LearnedPlace:
     """
     site = learn_site(
         reference,
-        place.intrinsics,
-        place.prior,
+        simulated.intrinsics,
+        simulated.prior,
         seed=_SEED,
         speed_tracks=SPEED_TRACKS,
         chart=False,
     )
     if site.flow is None:
         raise TooFewTrajectoriesError("tracks: 12 that walk are needed for a flow map")
-    return LearnedPlace(place=place, site=site)
+    return LearnedSite(simulated=simulated, site=site)
 
 
-def seen_from(place: Place, pose: CameraPose, count: int, rng: np.random.Generator) -> Observations:
-    """What is read of `count` tracks of a place's people, the camera at a pose.
+def seen_from(
+    simulated: SimulatedSite, pose: CameraPose, count: int, rng: np.random.Generator
+) -> Observations:
+    """What is read of `count` tracks of a simulated site's people, the camera at a pose.
 
     Raises:
         DegenerateGeometryError: hardly any walk is seen from the pose.
     """
-    tracks = walk_site(place.intrinsics, pose, place.lanes, place.config, count, rng)
-    return observe_feet(tracks, place.intrinsics)
+    tracks = walk_site(simulated.intrinsics, pose, simulated.lanes, simulated.config, count, rng)
+    return observe_feet(tracks, simulated.intrinsics)
 
 
 def observe_feet(tracks: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:

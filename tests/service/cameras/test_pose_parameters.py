@@ -1,7 +1,7 @@
 """The numbers of a pose as API, events, messages and pages tell them, digit by digit.
 
-`tests/golden/pose_numbers.json` is what was told when degrees were kept in the store; `told` made
-it, of what `lived` went through.
+`tests/golden/pose_parameters.json` is what was told when degrees were kept in the store; `told`
+made it, of what `lived` went through.
 """
 
 import html
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.service.bench import moved
 
-GOLDEN = Path(__file__).parent.parent.parent / "golden" / "pose_numbers.json"
+GOLDEN = Path(__file__).parent.parent.parent / "golden" / "pose_parameters.json"
 POSE = ("state", "pose", "estimated", "sd", "drift", "estimates")
 POINT = ("height_m", "tilt_deg", "roll_deg", "heading_deg", "sd", "drift")
 
@@ -24,14 +24,14 @@ def lived(bench):
     for _ in range(2):
         bench.see(moved(tilt_deg=5.3, roll_deg=-1.7, height_m=0.42, heading_deg=2.2), paths=True)
     yield "knocked"
-    bench.see(moved(tilt_deg=4.9, height_m=-0.3), weak=("roll", "height"))
+    bench.see(moved(tilt_deg=4.9, height_m=-0.3), unidentifiable=("roll", "height"))
     yield "weak"
     bench.see(moved(height_m=0.9))
     yield "raised"
     for _ in range(2):
         bench.see(moved(), paths=True)
     yield "still"
-    bench.see(moved(), weak=("tilt", "roll", "height"))
+    bench.see(moved(), unidentifiable=("tilt", "roll", "height"))
     yield "untold"
 
 

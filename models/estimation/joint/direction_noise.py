@@ -1,9 +1,13 @@
-"""What noise in the directions of walks fakes of information.
+"""What noise in the directions of walks looks like: information that is none.
 
 A direction's noise is in the derivative of a step's log speed by the pose, and there its square
 looks like information. Where people walk many ways it is a few per cent of what there is; on a
-single path, where there is hardly any, it would make sure of a pose that nobody can tell. Measured
-that way, 240 tracks of one path were 13 deg off in tilt and gave 1 deg as its deviation.
+single path, where there is hardly any, it would make sure of a pose that is not identifiable.
+Measured that way, 240 tracks of one path were 13 deg off in tilt and gave 1 deg as its deviation.
+
+Source: Fuller 1987, Measurement Error Models: of regressors with noise of a known covariance the
+moments less that noise, (M - N)^-1 M (M - N)^-1. What N is, and that at most 95 % of M are called
+noise, is ours.
 """
 
 import numpy as np
@@ -12,10 +16,10 @@ from models.estimation.joint.hierarchy import Spread, Weights
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
-_MOST = 0.95  # of the information along any axis that may be called fake
+_MOST = 0.95  # of the information along any axis that may be called noise
 
 
-def faked(measured: Measured, weights: Weights, spread: Spread) -> Array:
+def noise_information(measured: Measured, weights: Weights, spread: Spread) -> Array:
     """The information (3, 3) on tilt, roll and log height that is noise's on average.
 
     Of a track's noise, its own level and trend take a part.
@@ -24,10 +28,10 @@ def faked(measured: Measured, weights: Weights, spread: Spread) -> Array:
     number = np.bincount(rows.owner_idx, measured.valid, rows.owners)
     left = np.maximum(number - 2, 0) / np.maximum(number, 1)
     weight = weights.row * left[rows.owner_idx] / spread.within_sd**2
-    return np.asarray((measured.d_sway * weight[:, None]).T @ measured.d_sway)
+    return np.asarray((measured.d_direction_noise * weight[:, None]).T @ measured.d_direction_noise)
 
 
-def honest_covariance(matrix: Array, noise: Array) -> Array:
+def corrected_covariance(matrix: Array, noise: Array) -> Array:
     """The covariance (3, 3) of a fit with information (3, 3) of which a part is noise.
 
     Errors scatter by all of the information and are brought back by the true part alone.
