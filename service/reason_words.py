@@ -84,7 +84,7 @@ def _chart(v: _Values) -> str:
     else:
         what = f"the {v['number']} had gone {'up' if v['sign'] > 0 else 'down'}"
     return (
-        f"the last {v['parties']} parties walk as they would if {what} "
+        f"the last {v['parties']} walking groups walk as they would if {what} "
         f"(drift chart: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
     )
 
@@ -138,7 +138,7 @@ def _unidentifiable(v: _Values) -> str:
 def _few_groups(v: _Values) -> str:
     return (
         f"the {v['tracks']} tracks are of {v['parties']} "
-        f"{'party' if v['parties'] == 1 else 'parties'} walking together, at least "
+        f"{'walking group' if v['parties'] == 1 else 'walking groups'}, at least "
         f"{v['least_parties']} are needed to tell the camera's drift from theirs"
     )
 

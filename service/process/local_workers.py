@@ -25,8 +25,6 @@ _START_S = 120.0  # until its first sign of life: on a busy machine its imports 
 _SETTLED_S = 60.0  # who lives for so long did not die of how it starts
 _LONGEST_PAUSE_S = 60.0
 _REPORTED_FROM = 3  # deaths in a row
-# Matrices of estimates are small: on more threads OpenBLAS spins rather than works.
-_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 @contextlib.contextmanager
@@ -108,7 +106,7 @@ class LocalWorkers:
             [sys.executable, "-m", "service.cli", "worker", "--name", name, "--follow-stdin"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**_ONE_THREAD, **self._settings.as_environment()},
+            env=self._settings.as_environment(),
         ) as process:
             pulse = _Pulse(process.stdout)
             begun_s = time.monotonic()

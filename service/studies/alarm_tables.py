@@ -22,7 +22,7 @@ def still_table(title: str, results: Sequence[AlarmResults]) -> Table:
     table = Table(title=title, title_justify="left")
     for name in (
         "scene",
-        "reference,\nparties",
+        "reference,\nwalking groups",
         "camera-\nyears",
         "false\nalarms",
         "a camera-\nyear (95 %)",

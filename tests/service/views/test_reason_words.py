@@ -44,10 +44,10 @@ SAID = [
     (T.WITHIN_LIMITS, {**LIMITS, **TILT},
      "tilt +3.10 deg (sd 0.30) against the prior pose: not beyond 5 sd and 0.5 deg or 0.2 m"),
     (T.CHART, {"number": "heading", "sign": -1, "parties": 20, "statistic": 30.4, "level": 8.6},
-     "the last 20 parties walk as they would if the heading had gone down "
+     "the last 20 walking groups walk as they would if the heading had gone down "
      "(drift chart: 30, alarm at 9)"),
     (T.CHART, {"number": "times", "sign": 1, "parties": 20, "statistic": 30.4, "level": 8.6},
-     "the last 20 parties walk as they would if all times were too long "
+     "the last 20 walking groups walk as they would if all times were too long "
      "(drift chart: 30, alarm at 9)"),
     (T.CREPT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
                "since": "2026-08-20T07:12:00+00:00", "statistic": 17.2, "level": 14.4},
@@ -70,10 +70,10 @@ SAID = [
      "the tracks cannot tell tilt (sd 3.0 deg): people walk too much alike, one way or along one "
      "path, and tilt makes up for height"),
     (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 1, "least_parties": 5},
-     "the 12 tracks are of 1 party walking together, at least 5 are needed to tell the camera's "
+     "the 12 tracks are of 1 walking group, at least 5 are needed to tell the camera's "
      "drift from theirs"),
     (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 3, "least_parties": 5},
-     "the 12 tracks are of 3 parties walking together, at least 5 are needed to tell the camera's "
+     "the 12 tracks are of 3 walking groups, at least 5 are needed to tell the camera's "
      "drift from theirs"),
     (T.SPEED_UNUSUAL, {"speed_mps": 2.994, "slow_mps": 0.7, "fast_mps": 2.0},
      "people walk at 2.99 m/s at the prior pose, 0.7 to 2 m/s is usual: the prior height or the "
