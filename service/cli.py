@@ -83,7 +83,7 @@ def replay(
         str | None,
         typer.Option(
             help="Move the camera: tilt and roll in degrees, log height ratio. With --protocol how "
-            "far it may be moved: still, knock (the default), hard, pan or hard-pan."
+            "far it may be moved: still, knock (the default), hard, pan, hard-pan, pan-alone ..."
         ),
     ] = None,
     speed: Annotated[
@@ -95,6 +95,12 @@ def replay(
     ] = None,
     hard: Annotated[bool, typer.Option("--hard", help="With --protocol: a far knock.")] = False,
     still: Annotated[bool, typer.Option("--still", help="With --protocol: no knock.")] = False,
+    by_time: Annotated[
+        bool, typer.Option("--by-time", help="With --protocol: the earlier half is the reference.")
+    ] = False,
+    batch: Annotated[
+        int | None, typer.Option(min=1, help="With --protocol: so many tracks at once.")
+    ] = None,
     token: Annotated[
         str | None,
         typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes admin and ingest, if needed."),
@@ -109,7 +115,7 @@ def replay(
 
     if protocol is not None:
         name = "hard" if hard else "still" if still else knock or "knock"
-        _replay_protocol(scene_dir, url, protocol, name, token)
+        _replay_protocol(scene_dir, url, protocol, name, by_time, batch, token)
         return
     console = Console()
     try:
@@ -149,7 +155,15 @@ def demo(
     raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
-def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str, token: str | None) -> None:
+def _replay_protocol(
+    scene_dir: Path,
+    url: str,
+    seed: int,
+    knock: str,
+    by_time: bool,
+    batch: int | None,
+    token: str | None,
+) -> None:
     """Put a case of the protocol to a service and print the served pose beside the truth."""
     import httpx
     from rich.progress import Progress
@@ -169,6 +183,8 @@ def _replay_protocol(scene_dir: Path, url: str, seed: int, knock: str, token: st
                 url,
                 seed=seed,
                 knock=knock,
+                by_time=by_time,
+                batch=batch,
                 on_progress=lambda what, done, total: bar.update(
                     task, description=what, total=total, completed=done
                 ),

@@ -52,6 +52,11 @@ class Settings(BaseSettings):
         True, description="copy the database before its schema changes; without room: no start"
     )
 
+    trainings: Literal["on", "off"] = Field(
+        "on",
+        description="whether trainings begin by themselves; the served pose needs none, "
+        "and a training that a person asks for is done in any case",
+    )
     recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
     epochs: int | None = Field(
         None, ge=1, description="epochs of a training; the recipe's if unset"

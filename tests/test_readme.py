@@ -24,8 +24,8 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
-    "serve", "worker", "migrate", "replay", "demo", "evaluate", "centred", "alarm-study",
-    "flow-study", "backup", "restore", "check", "rotate-key", "token",
+    "serve", "worker", "migrate", "replay", "demo", "evaluate", "protocol", "centred",
+    "alarm-study", "flow-study", "backup", "restore", "check", "rotate-key", "token",
 )  # fmt: skip
 
 

@@ -33,13 +33,17 @@ class SceneTrack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """A recorded camera: its lens, its true pose and the tracks seen by it."""
+    """A recorded camera: its lens, its true pose and the tracks seen by it.
+
+    `beyond_picture` says that people were followed on the ground, where the picture ends too.
+    """
 
     scene_id: str
     intrinsics: Intrinsics
     true_pose: CameraPose
     frame_rate_hz: float
     tracks: tuple[SceneTrack, ...]
+    beyond_picture: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,8 @@ from service.store.operation.actor import name_in
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tracks import tracks
-from service.training.trainings import queue_training, stop_trainings
+from service.training.trainings import stop_trainings
+from service.training.unasked import train_by_itself
 from service.windows.references import begin_reference
 from service.windows.requests import request_estimate
 
@@ -111,7 +112,7 @@ def register_camera(
     session.flush()
     add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
     begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
-    queue_training(session, queue, settings, camera_id)
+    train_by_itself(session, queue, settings, camera_id)
     note(session, Activity.CAMERA_REGISTERED, by=None, camera_id=camera_id)
     return view_camera(session, camera_id)
 
@@ -230,7 +231,7 @@ def renew_prior_pose(
     begin_reference(session, camera_id, origin, from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)
     stop_trainings(session, camera_id)
-    queue_training(session, queue, settings, camera_id)
+    train_by_itself(session, queue, settings, camera_id)
 
 
 def add_prior_pose(

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +15,21 @@ from rich.console import Console
 from rich.table import Table
 
 from models.errors import TooFewTrajectoriesError
+from models.estimation.joint.reference import FEWEST_WALKERS
 from models.evaluation.protocol.cases import RANGES, ProtocolCase, draw_case
+from models.evaluation.protocol.partings import HALVES_IN_TIME, HALVES_OF_PEOPLE
 from models.evaluation.scenes import load_scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, angle_between
 from models.geometry.upright import tops_of_boxes
+from models.recalibration import observe
 from models.trajectory import Trajectory
 from service.commands.replay import camera_body, client_of
 from service.formats.degrees import degrees
 from service.kinds import ReferenceState
 
 _SOURCE = "surefoot-protocol"
-_BATCH_TRACKS = 500  # a whole half of most scenes: one estimate of all, as offline
+_BATCH_TRACKS = 500  # a whole half of most scenes: one estimate of all
 _FEWEST = 5
 _HALF_WIDTH_PX = 2.0**-10
 _GAP_S = 60.0
@@ -54,16 +58,22 @@ def replay_protocol(
     *,
     seed: int,
     knock: str,
+    by_time: bool = False,
+    batch: int | None = None,
     on_progress: Callable[[str, int, int], None],
     token: str | None = None,
 ) -> ProtocolReplay:
     """Register a camera for one case, let it learn its reference, and show it the knocked tracks.
+
+    After each batch the estimate is waited for, so that a service sees what `looks` sees offline.
 
     Args:
         folder: the scene.
         url: the running service.
         seed: of the case: who walks before the knock, and the knock.
         knock: how far it may go, a name in `models.evaluation.protocol.cases.RANGES`.
+        by_time: whether the earlier people are the reference; else one half of them by lot.
+        batch: how many of the knocked tracks are posted at once; 500 unless it is said.
         on_progress: is told what is waited for, how much there is, and how much is wanted.
         token: for a service that wants one: of the scopes admin and ingest.
 
@@ -72,14 +82,18 @@ def replay_protocol(
         TooFewTrajectoriesError: the case has too few tracks for a reference.
         TimeoutError: the service took longer than five minutes over one of its parts.
     """
-    case = draw_case(load_scene(folder), seed, RANGES[knock])
+    parting = HALVES_IN_TIME if by_time else HALVES_OF_PEOPLE
+    case = draw_case(load_scene(folder), seed, RANGES[knock], parting)
     wanted = len(case.reference)
-    if wanted < _FEWEST or len(case.seen) < _FEWEST:
+    if wanted < _FEWEST or observe(case.seen, case.intrinsics).walkers < FEWEST_WALKERS:
         raise TooFewTrajectoriesError(
             f"tracks: {_FEWEST} before and after the knock are needed, got {wanted} and "
             f"{len(case.seen)}"
         )
-    camera_id = f"{case.scene_id}-{knock}-{seed}"
+    camera_id = f"{case.scene_id}-{knock}-{seed}" + ("-by-time" if by_time else "")
+    if batch is not None:
+        camera_id += f"-{batch}"
+    batch = batch or _BATCH_TRACKS
     shifts = _shifts(case)
     with client_of(url, token) as http:
         body = camera_body(camera_id, case.intrinsics, case.prior_pose)
@@ -89,12 +103,17 @@ def replay_protocol(
             http, camera_id, lambda pose: pose["reference"]["state"] == ReferenceState.READY,
             lambda pose: on_progress("reference", pose["reference"]["tracks"], wanted),
         )  # fmt: skip
-        lost += _post(http, camera_id, case.seen, "s", shifts[1], case.intrinsics)
-        newest_s = max(float(track.time_s[-1]) for track in case.seen) + shifts[1]
-        served = _wait(
-            http, camera_id, lambda pose: _covers(pose, newest_s),
-            lambda pose: on_progress("estimate", pose["tracks"], len(case.seen)),
-        )  # fmt: skip
+        walking = np.unique(observe(case.seen, case.intrinsics).steps.rows.owner_idx)
+        for at in range(0, len(case.seen), batch):
+            some = case.seen[at : at + batch]
+            lost += _post(http, camera_id, some, f"s{at}-", shifts[1], case.intrinsics)
+            if (walking < at + len(some)).sum() < FEWEST_WALKERS:
+                continue  # no estimate is made of so few
+            covers = partial(_covers, newest_s=float(some[-1].time_s[-1]) + shifts[1])
+            served = _wait(
+                http, camera_id, covers,
+                lambda pose: on_progress("estimate", pose["tracks"], len(case.seen)),
+            )  # fmt: skip
     return ProtocolReplay(
         case=case,
         camera_id=camera_id,

@@ -1,4 +1,4 @@
-"""Commands of the studies: evaluate, flow-study, alarm-study, creep-study, centred."""
+"""Commands of the studies: evaluate, protocol, flow-study, alarm-study, creep-study, centred."""
 
 from pathlib import Path
 from typing import Annotated
@@ -55,6 +55,48 @@ def evaluate(
         )
     except CalibrationError as error:
         Console(stderr=True).print(f"[red]evaluate failed:[/] {error}")
+        raise typer.Exit(1) from error
+
+
+def protocol(
+    recordings: Annotated[
+        list[Path], typer.Argument(help="Folders of scenes and of long recordings.")
+    ],
+    tables: Annotated[
+        str, typer.Option(help="Of time, people, faults, replays; with commas.")
+    ] = "time,people,faults,replays",
+    seeds: Annotated[int, typer.Option(min=1, help="How many of each.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 0,
+    faults: Annotated[str, typer.Option(help="Which faults, with commas; all unless said.")] = "",
+    batch: Annotated[
+        int, typer.Option(min=0, help="Tracks that come at once; 0: all of them.")
+    ] = 50,
+    processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
+    output: Annotated[
+        Path, typer.Option(help="Where outcomes are kept; what is there is not done again.")
+    ] = Path("protocol.jsonl"),
+    write: Annotated[
+        Path | None, typer.Option(help="A page with markers to write the tables into.")
+    ] = None,
+) -> None:
+    """What is served, measured in the order of time, with faults, and over long recordings."""
+    from models.evaluation.injectors.catalogue import FAULTS
+    from service.studies.served import run_served
+    from service.studies.served_tasks import Table
+
+    try:
+        run_served(
+            recordings,
+            tables=[Table(name) for name in tables.split(",")],
+            seeds=range(seed, seed + seeds),
+            faults=faults.split(",") if faults else list(FAULTS),
+            batch=batch,
+            processes=processes,
+            output=output,
+            page=write,
+        )
+    except ValueError as error:
+        Console(stderr=True).print(f"[red]protocol failed:[/] {error}")
         raise typer.Exit(1) from error
 
 
@@ -145,4 +187,4 @@ def centred(
     )
 
 
-STUDIES = (evaluate, flow_study, alarm_study, creep_study, centred)
+STUDIES = (evaluate, protocol, flow_study, alarm_study, creep_study, centred)

@@ -13,7 +13,8 @@ from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import trainings
 from service.store.tables.trainings import TrainingRecord
-from service.training.trainings import centre_of, queue_training
+from service.training.trainings import centre_of
+from service.training.unasked import train_by_itself
 
 _EDGE = 0.9  # of the training range: beyond, a regressor only knows "at least so much"
 _SAME_RAD = math.radians(5.0)
@@ -44,8 +45,8 @@ def beyond_range(
 
 def train_around(
     session: Session, queue: JobQueue, settings: Settings, camera_id: str, pose: CameraPose
-) -> Reason:
-    """Have a model trained around a pose, if none was; says what became of it."""
+) -> Reason | None:
+    """Have a model trained around a pose, if none was; says what became of it, if one is."""
     unfinished = trainings.unfinished(session, camera_id)
     if unfinished:
         return _around(unfinished[-1])
@@ -57,7 +58,8 @@ def train_around(
         apart = angle_between(centre.quaternion_wxyz, level.quaternion_wxyz)
         if apart <= _SAME_RAD and abs(centre.height_m - pose.height_m) <= _SAME_M:
             return _around(newest[0])
-    return _around(queue_training(session, queue, settings, camera_id, around=pose))
+    queued = train_by_itself(session, queue, settings, camera_id, around=pose)
+    return None if queued is None else _around(queued)
 
 
 def _around(training: TrainingRecord) -> Reason:

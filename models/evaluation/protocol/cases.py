@@ -1,18 +1,25 @@
-"""The virtual knock: real tracks of a still camera, split, moved and given to an estimator."""
+"""The virtual knock: real tracks of a still camera, parted, moved and given to an estimator."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.estimation.parameters import PLANE_PARAMETERS, plane_parameters_of
-from models.evaluation.scenes import Knock, Scene
+from models.evaluation.injectors.catalogue import Fault
+from models.evaluation.injectors.view import view_of
+from models.evaluation.protocol.partings import (
+    HALVES_OF_PEOPLE,
+    Parting,
+    first_seen,
+    part_people,
+)
+from models.evaluation.scenes import Knock, Scene, SceneTrack
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
-from models.simulation.knocked import knock_trajectory
 from models.trajectory import Trajectory
 
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
@@ -20,24 +27,30 @@ _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnockRange:
-    """How far a knock may go: uniform in tilt and roll, heading, and in the log of the height."""
+    """How far a knock may go either way: uniform in angles and in the log of the height."""
 
-    angle_rad: float
-    log_height: float
+    tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    log_height: float = 0.0
     heading_rad: float = 0.0
 
 
-STILL = KnockRange(angle_rad=0.0, log_height=0.0)
-KNOCKED = KnockRange(angle_rad=math.radians(8), log_height=0.15)
-HARD = KnockRange(angle_rad=math.radians(15), log_height=0.35)
-PANNED = KnockRange(angle_rad=math.radians(8), log_height=0.15, heading_rad=math.radians(8))
-HARD_PANNED = KnockRange(angle_rad=math.radians(15), log_height=0.35, heading_rad=math.radians(20))
+_FAR, _HARD = math.radians(8), math.radians(15)
+STILL = KnockRange()
+KNOCKED = KnockRange(tilt_rad=_FAR, roll_rad=_FAR, log_height=0.15)
+HARD = KnockRange(tilt_rad=_HARD, roll_rad=_HARD, log_height=0.35)
+PANNED = replace(KNOCKED, heading_rad=_FAR)
+HARD_PANNED = replace(HARD, heading_rad=math.radians(20))
 RANGES = {
     "still": STILL,
     "knock": KNOCKED,
     "hard": HARD,
     "pan": PANNED,
     "hard-pan": HARD_PANNED,
+    "tilt-alone": KnockRange(tilt_rad=_FAR),
+    "roll-alone": KnockRange(roll_rad=_FAR),
+    "height-alone": KnockRange(log_height=0.15),
+    "pan-alone": KnockRange(heading_rad=_FAR),
 }
 
 
@@ -106,36 +119,55 @@ class Outcome:
     heading_covered: bool | None = None
 
 
-def draw_case(scene: Scene, seed: int, knock_range: KnockRange) -> ProtocolCase:
-    """Split a scene's people in halves and knock the camera before the second.
+def draw_case(
+    scene: Scene,
+    seed: int,
+    knock_range: KnockRange,
+    parting: Parting = HALVES_OF_PEOPLE,
+    fault: Fault | None = None,
+) -> ProtocolCase:
+    """Part a scene's people in two and knock the camera before the second.
 
-    The protocol of "Results" in `models/README.md`. The same scene and seed give the same halves
-    and, up to the range, the same direction of the knock.
+    The protocol of "Results" in `models/README.md`. The same scene and seed give the same parts
+    and, up to the range, the same direction of the knock, however they are parted.
+
+    Args:
+        scene: whose people.
+        seed: of the parts, the knock and the fault.
+        knock_range: how far the knock may go.
+        parting: who is the reference, and who comes after the knock.
+        fault: what is wrong with the tracks, before the knock too unless it sets in later.
     """
     rng = np.random.default_rng(seed)
-    people = sorted({track.person_id for track in scene.tracks})
-    first = {people[index] for index in rng.permutation(len(people))[: len(people) // 2]}
-    tilt, roll = rng.uniform(-1, 1, 2) * knock_range.angle_rad
+    parts = part_people(scene, parting, rng)
+    tilt, roll = rng.uniform(-1, 1, 2) * (knock_range.tilt_rad, knock_range.roll_rad)
     knock = Knock(
         tilt_rad=tilt,
         roll_rad=roll,
         log_height=rng.uniform(-1, 1) * knock_range.log_height,
         heading_rad=rng.uniform(-1, 1) * knock_range.heading_rad,
     )
-    knocked = knock.apply(scene.true_pose)
-    seen = [
-        knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
-        for track in scene.tracks
-        if track.person_id not in first
-    ]
+    still, knocked = scene.true_pose, knock.apply(scene.true_pose)
+    begin = rng.uniform() if parting.seen_tracks is not None else 0.0
+    reference: Sequence[SceneTrack] = first_seen(
+        scene, parts.reference, still if scene.beyond_picture else None, parting.reference_tracks
+    )
+    later = parts.later
+    if parting.seen_tracks is not None:
+        later = later[int(begin * max(len(later) - parting.seen_tracks, 0)) :]
+    seen: Sequence[SceneTrack] = first_seen(scene, later, knocked, parting.seen_tracks)
+    if fault is not None:
+        if not fault.later:
+            reference = fault.inject(reference, view_of(scene), seed)
+        seen = fault.inject(seen, view_of(scene, knocked), seed)
     return ProtocolCase(
         scene_id=scene.scene_id,
         seed=seed,
         intrinsics=scene.intrinsics,
-        prior_pose=scene.true_pose,
+        prior_pose=still,
         true_pose=knocked,
-        reference=_taken([track.trajectory for track in scene.tracks if track.person_id in first]),
-        seen=_taken([trajectory for trajectory in seen if trajectory is not None]),
+        reference=_taken(reference),
+        seen=_taken(seen),
     )
 
 
@@ -200,9 +232,9 @@ def pose_of_plane_parameters(numbers: Array, prior: CameraPose) -> CameraPose:
     )
 
 
-def _taken(trajectories: list[Trajectory]) -> tuple[Trajectory, ...]:
+def _taken(tracks: Sequence[SceneTrack]) -> tuple[Trajectory, ...]:
     """What the service takes, in the order that trackers post: as the tracks end."""
-    taken = [trajectory for trajectory in trajectories if trajectory.long_enough]
+    taken = [track.trajectory for track in tracks if track.trajectory.long_enough]
     return tuple(sorted(taken, key=lambda trajectory: float(trajectory.time_s[-1])))
 
 

@@ -17,7 +17,8 @@ from service.store import cameras, references, trainings
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import predictions, tracks
 from service.training.lost_trainings import requeue_lost
-from service.training.trainings import camera_step_s, queue_training
+from service.training.trainings import camera_step_s
+from service.training.unasked import train_by_itself
 from service.windows.looking import may_look
 from service.windows.references import window_of
 from service.windows.requests import request_estimate
@@ -35,8 +36,7 @@ def reconcile_camera(
         return []
     found = []
     reason = _why_train(session, camera)
-    if reason is not None:
-        queue_training(session, queue, settings, camera_id)
+    if reason is not None and train_by_itself(session, queue, settings, camera_id) is not None:
         found.append(reason)
     if requeue_lost(session, queue, camera_id):
         found.append("training without a job")

@@ -7,6 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.geometry.pose import CameraPose
+from service.app import create_app
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 
@@ -18,6 +19,18 @@ def test_registration_answers_with_location_and_queues_a_training(http):
     trainings = http.get("/cameras/corner/trainings").json()["items"]
     assert [t["state"] for t in trainings] == ["queued"]
     assert trainings[0]["recipe"] == "default"
+
+
+def test_where_trainings_are_off_only_a_person_begins_one(settings):
+    with TestClient(create_app(settings.model_copy(update={"trainings": "off"}))) as http:
+        etag = http.post("/cameras", json=CAMERA).headers["ETag"]
+        change = {"prior_pose": {"height_m": 6.0, "tilt_deg": 30.0}}
+        changed = http.patch("/cameras/corner", json=change, headers={"If-Match": etag})
+        assert changed.status_code == 200
+        assert http.get("/cameras/corner/trainings").json()["items"] == []
+        assert http.post("/cameras/corner/trainings", json={}).status_code == 202
+        (asked,) = http.get("/cameras/corner/trainings").json()["items"]
+        assert asked["state"] == "queued"
 
 
 def test_unset_fields_take_their_defaults(http):

@@ -17,7 +17,9 @@ from models.evaluation.protocol.cases import (
     judge_answer,
     pose_of_plane_parameters,
 )
+from models.evaluation.protocol.partings import HALVES_IN_TIME
 from models.evaluation.scenes import load_scene
+from models.evaluation.served.windows import Window, looks
 from models.flow.packing import flow_from_bytes, flow_to_bytes
 from models.geometry.upright import tops_of_boxes
 from models.recalibration import estimate_pose, learn_site, observe
@@ -86,6 +88,34 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
         site.speed_reference.walking_speed_mps
     )
     assert body["state"] == "drifting"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}")
+@pytest.mark.parametrize("batch", [1, 12])
+def test_what_is_served_by_time_and_in_batches_is_what_windows_say_offline(service, batch):
+    folder = SCENES / "pets2009_s2l1_v001_sort"
+    done = subprocess.run(
+        [sys.executable, "-m", "service.cli", "replay", str(folder), "--url", service.url]
+        + ["--protocol", "2", "--knock", "knock", "--by-time", "--batch", str(batch)],
+        capture_output=True,
+        text=True,
+        timeout=400,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    case = draw_case(load_scene(folder), 2, RANGES["knock"], HALVES_IN_TIME)
+    known = observe(case.reference, case.intrinsics)
+    drawn_by = service.settings.seed
+    site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
+    seen = [tops_carried(track, case.intrinsics) for track in case.seen]
+    last = list(looks(seen, site, Window(batch=batch)))[-1]
+    drift = last.finding.drift
+    body = service.http.get(f"/cameras/{case.scene_id}-knock-2-by-time-{batch}/pose").json()
+    for name, field in (("tilt", "tilt_deg"), ("roll", "roll_deg")):
+        told = math.degrees(drift.of(name)[0])
+        assert body["drift"][field] == pytest.approx(told, abs=1e-3), field
+    assert body["tracks"] == last.seen.tracks - (last.finding.first or 0)
 
 
 def test_boxes_carry_feet_to_the_bit_and_upper_edges(lens):

@@ -89,6 +89,14 @@ def test_a_camera_without_a_model_is_trained(session, queue, settings):
     assert len(queue.trainings) == 1
 
 
+def test_where_trainings_are_off_none_is_missing(session, queue, settings):
+    session.delete(trainings.unfinished(session, "corner")[0])
+    session.flush()
+    off = settings.model_copy(update={"trainings": "off"})
+    assert reconciliation.reconcile_camera(session, queue, off, "corner") == []
+    assert queue.trainings == []
+
+
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
 def test_what_failed_or_was_cancelled_is_not_tried_again_by_itself(session, queue, settings, state):
     end_training(session, begin(session, settings), state)

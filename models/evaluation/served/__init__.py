@@ -1,0 +1,1 @@
+"""What the service would serve, offline: windows, batches, their outcomes, long replays."""
