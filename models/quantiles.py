@@ -15,3 +15,11 @@ def chi_squared_above(chance: float, freedom: int) -> float:
     from scipy.special import chdtri  # late: the HTTP process has no use for it
 
     return float(chdtri(freedom, chance))
+
+
+@cache
+def f_above(chance: float, freedom: int, other_freedom: int) -> float:
+    """What an F of two degrees of freedom is above with a chance."""
+    from scipy.special import fdtri
+
+    return float(fdtri(freedom, other_freedom, 1 - chance))

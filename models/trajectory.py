@@ -1,7 +1,7 @@
 """Trajectories of pedestrians and the windows that a regressor reads of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +82,11 @@ class Windows:
 
     def __len__(self) -> int:
         return int(self.lengths.size)
+
+
+def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:
+    """Trajectories in the order of their ends: as trackers post them, and estimators take them."""
+    return sorted(trajectories, key=lambda trajectory: float(trajectory.time_s[-1]))
 
 
 def choose_step_s(trajectories: Sequence[Trajectory]) -> float:

@@ -281,4 +281,12 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ServiceCode.OTHER_SOURCES: _other_sources,
     ServiceCode.LOOKS_FAIL: _looks_fail,
     ServiceCode.TRACKS_WAIT: _tracks_wait,
+    ServiceCode.DISABLED_BY_PERSON: lambda v: "disabled by a person",
+    ServiceCode.ENDPOINT_GONE: lambda v: "it answered 410: it is gone for good",
+    ServiceCode.ENDPOINT_FAILS: lambda v: (
+        f"it failed for more than {v['patience_s'] / _HOUR_S:g} h: {v['error']}"
+    ),
+    ServiceCode.SECRET_LOST: lambda v: (
+        "its secret was lost with the key: fetch a new one, tell the receiver, enable it"
+    ),
 }

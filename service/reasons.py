@@ -31,6 +31,10 @@ class ServiceCode(StrEnum):
     OTHER_SOURCES = "other_sources"
     LOOKS_FAIL = "looks_fail"
     TRACKS_WAIT = "tracks_wait"
+    DISABLED_BY_PERSON = "disabled_by_person"
+    ENDPOINT_GONE = "endpoint_gone"
+    ENDPOINT_FAILS = "endpoint_fails"
+    SECRET_LOST = "secret_lost"
 
 
 _CODES: dict[str, StrEnum] = {

@@ -192,8 +192,18 @@ class RunningService:
 
 @pytest.fixture
 def service(settings: Settings) -> Iterator[RunningService]:
+    """A running service with one worker, which trains nothing that is not asked for."""
+    yield from _running(settings, trainings="off")
+
+
+@pytest.fixture
+def training_service(settings: Settings) -> Iterator[RunningService]:
     """A running service with one worker and trainings of one epoch."""
-    running = RunningService(settings.model_copy(update={"port": free_port()}))
+    yield from _running(settings)
+
+
+def _running(settings: Settings, **changes: Any) -> Iterator[RunningService]:
+    running = RunningService(settings.model_copy(update={"port": free_port(), **changes}))
     running.start()
     yield running
     running.stop()

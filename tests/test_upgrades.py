@@ -28,7 +28,7 @@ INTRINSICS = {"width": 1280, "height": 720, "fx": 1100.0, "fy": 1100.0, "cx": 63
 CALLED = {
     "cameras": {"id": "corner", "name": "The corner", "distortion": "[0, 0, 0, 0, 0]",
                 "reference_tracks": 50, "walking_speed_mean_mps": 1.4, "walking_speed_sd_mps": 0.1,
-                **INTRINSICS},
+                "estimate_lacks": "no map", "lacks": "[]", **INTRINSICS},
     "prior_poses": {"id": 1, "origin": "registered", **NUMBERS},
     "site_references": {"id": 1, "origin": "registered", "wanted": 50, "tracks": 1,
                         "from_s": NOW_S - 50, "doubt": "", "data": None, "ready_at": None},
@@ -52,7 +52,8 @@ CALLED = {
     "events": {"id": 1, "type": "alert", "payload": "{}"},
     "workers": {"name": "local-0"},
     "webhooks": {"id": "w" * 32, "name": "duty", "url": "https://example.org/h", "kinds": None,
-                 "format": "webhook", "enabled": 1,
+                 "format": "webhook", "enabled": 0, "disabled_reason": "it went away",
+                 "disabled_reasons": "[]",
                  "secret": "whsec_cGxhaW4gdGV4dCBvZiBlYXJsaWVyIHJlbGVhc2Vz"},
     "deliveries": {"number": 1, "id": "d" * 32, "webhook_id": "w" * 32, "alert_id": "a" * 32,
                    "type": "alert.opened", "payload": "{}", "state": "delivered"},
@@ -140,6 +141,10 @@ def test_a_database_of_a_revision_keeps_its_rows_and_is_served(released, tmp_pat
         assert (alert["kind"], alert["severity"]) == ("drift", "critical")
         if "reason" in columns_of(released(revision), "alerts"):
             assert (alert["reason"], alert["reason_code"]) == ("it has turned", "as_said")
+        if "disabled_reason" in columns_of(released(revision), "webhooks"):
+            (hook,) = http.get("/webhooks").raise_for_status().json()["items"]
+            assert hook["disabled_reason"] == "it went away"
+            assert hook["disabled_reason_code"] == "as_said"
         for page in ("/", "/ui/cameras/corner", "/metrics", "/webhooks"):
             http.get(page, headers={"accept": "text/html"}).raise_for_status()
         receipt = http.post("/cameras/corner/tracks", json={"tracks": [

@@ -13,9 +13,9 @@ from models.geometry.rotation import Array
 from models.quantiles import chi_squared_above
 
 FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own
-# The share of windows in which two poses from one differ by as much as is called a move; a window
-# has a few hundred places to cut, which are far from independent.
-_BY_CHANCE = 1e-6
+# The share of windows in which two poses from one differ by as much as is suspected of a move; a
+# window has a few hundred places to cut, which are far from independent.
+_BY_CHANCE = 1e-3
 _ROUNDS = 2
 
 

@@ -2,25 +2,31 @@
 
 import numpy as np
 
-from models.estimation.joint.estimate import JointEstimate
 from models.estimation.parameters import PLANE_PARAMETERS
-from models.quantiles import chi_squared_above
+from models.flow.fusion import FusedEstimate
+from models.geometry.pose_parameters import PARAMETERS
+from models.quantiles import f_above
 
-# Twice what a chi-squared passes once in a million: the same people are in many of a crowd's last
-# tracks, and crowds change. On recorded scenes of still cameras, cuts that were none reached 41.
-_BY_CHANCE = 1e-6
-_DOUBT = 2.0
+_BY_CHANCE = 1e-4  # of windows that are suspected already
+_FEWEST_GROUPS = 7  # more than there are parameters, for a covariance to be known at all
 
 
-def moved_beyond_doubt(before: JointEstimate, after: JointEstimate) -> bool:
+def moved_beyond_doubt(
+    before: FusedEstimate, groups_before: int, after: FusedEstimate, groups_after: int
+) -> bool:
     """Whether a camera has moved from one estimate to the other.
 
-    A cut must leave a pose behind it: where a parameter of the tracks after it is not identifiable,
-    more of them are to be waited for. The covariances know of walking groups and of other poses
-    that explain the tracks about as well, where a change point's own do not.
+    A cut must leave a pose behind it: where the tracks after it leave tilt, roll or height open,
+    more of them are to be waited for. A heading that is not identifiable counts for as little as is
+    known of it. Of few groups a covariance is not well known, and chance goes farther.
+
+    Source: Hotelling 1931, T squared, by the freedom of the smaller part.
     """
-    if len(after.identifiable) < len(PLANE_PARAMETERS):
+    groups = min(groups_before, groups_after)
+    if groups < _FEWEST_GROUPS or not set(PLANE_PARAMETERS) <= set(after.identifiable):
         return False
     apart = after.values - before.values
     squared = float(apart @ np.linalg.solve(before.covariance + after.covariance, apart))
-    return squared > _DOUBT * chi_squared_above(_BY_CHANCE, 3)
+    parameters, freedom = len(PARAMETERS), groups - len(PARAMETERS)
+    limit = parameters * (groups - 1) / freedom * f_above(_BY_CHANCE, parameters, freedom)
+    return squared > limit

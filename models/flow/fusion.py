@@ -5,28 +5,36 @@ Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the map / va
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
+from models.estimation.joint.speed_reference import SpeedReference
 from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
-from models.flow.likelihood import Walkers, walkers_of
-from models.flow.path_test import group_fits, loss
+from models.flow.ends import (
+    HEADING_SD,
+    REACH_RAD,
+    apart,
+    elsewhere,
+    ends_of,
+    flatter,
+    odds_of,
+)
+from models.flow.heading import on_known_ground, variance_of_halves
+from models.flow.likelihood import walkers_of
+from models.flow.path_test import group_fits
 from models.flow.reference import FlowReference, candidate_of
-from models.flow.registration import Belief, Peak, Site, register, settled
+from models.flow.registration import Posterior, settled, shape_at
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode
 
-_HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
-_HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
 _FEWEST_GROUPS = 5
-_CONFLICT = 3.0  # squared standard deviations of the joint estimate, in three parameters
-_TRUST = 25.0
+_EDGE_RAD = math.radians(2.0)
+_FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 
 
@@ -74,55 +82,66 @@ def fused_estimate(
     intrinsics: Intrinsics,
     prior: CameraPose,
     joint: JointEstimate,
+    speed_reference: SpeedReference,
     reference: FlowReference,
 ) -> FusedEstimate:
     """The pose by speeds and places together.
 
     A track's speeds, given where and which way it goes, and where it goes are two factors of one
-    likelihood. So what the joint estimate says is a belief that the map's likelihood multiplies.
+    likelihood. Of the speeds all is taken that their fit says around its end; what people's places
+    are is asked anew there, and with the heading that comes of it the speeds are.
+
+    Args:
+        observations: of the tracks.
+        intrinsics: of the camera.
+        prior: where it was.
+        joint: what the speeds say, the heading taken for the prior pose's.
+        speed_reference: how people walk at the site.
+        reference: where they do.
     """
-    mean = np.append(joint.values, prior.heading_rad)
-    precision = np.zeros((4, 4))
-    precision[:3, :3] = np.linalg.inv(joint.covariance)
-    precision[3, 3] = _HEADING_SD**-2.0
-    walkers = walkers_of(observations, mean)
+    walkers = walkers_of(observations, np.append(joint.values, prior.heading_rad))
     if walkers.walking_groups < _FEWEST_GROUPS:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
     variance_inflation = reference.variance_inflation_for(walkers.people)
-    search = partial(
-        register, walkers, site, variance_inflation=variance_inflation, headings=_HEADINGS
-    )
-    belief = Belief(mean=mean, precision=precision)
-    peaks = search(belief)
-    apart = (peaks[0].candidate - mean)[:3]
-    if float(apart @ precision[:3, :3] @ apart) > _CONFLICT:
-        # Speeds and places contradict one another; speeds are the better proven of the two.
-        firm = precision.copy()
-        firm[:3, :3] *= _TRUST
-        belief = Belief(mean=mean, precision=firm)
-        peaks = search(belief)
-    best = peaks[0]
+    ends = ends_of(walkers, site, variance_inflation, joint, observations, prior, speed_reference)
+    best = ends[0]
+    shape = shape_at(walkers, site, best.candidate)
     move = best.candidate - candidate_of(prior)
-    known = reference.precision(best, walkers.people, move)
-    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    if belief.precision is not precision:
-        covariance = np.asarray(np.linalg.inv(known + precision))
-    odds = _odds(walkers, site, belief, peaks)
-    covariance = covariance + elsewhere(peaks, odds)
-    covariance = covariance + _spread(walkers, site, belief, best, covariance, variance_inflation)
-    if reference.fit.has_changed(group_fits(walkers, site, values)):
+    fits = group_fits(walkers, site, best.candidate)
+    if reference.fit.has_changed(fits):
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
+    known = reference.precision(shape, walkers.people, move)
+    known = known / reference.fit.variance_inflation(fits)
+    values, covariance = settled(
+        walkers, site, best.belief, best.peak, shape, known, reference.bias
+    )
+    if _out_of_reach(values, prior) or not on_known_ground(walkers, site, values):
+        untold = {"heading_sd_rad": HEADING_SD}
+        return by_speeds_alone(
+            joint, prior, Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values=untold)
+        )
+    covariance = covariance * apart(best.belief, known, values)
+    odds = odds_of(walkers, site, ends)
+    covariance = covariance + elsewhere([end.peak for end in ends], odds)
+    covariance = covariance + flatter(best, covariance)
+    covariance = covariance + _unrepeated(best.posterior, values, covariance)
     rivals = tuple(
-        float(peak.candidate[3])
-        for peak, against_best in zip(peaks, odds, strict=True)
-        if peak is not best and against_best > _RIVAL
+        float(end.candidate[3])
+        for end, against_best in zip(ends, odds, strict=True)
+        if end is not best and against_best > _RIVAL
     )
     sd = np.sqrt(np.diag(covariance))
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        identifiable=identifiable_of(PARAMETERS, sd),
+        # What speeds leave open, places alone do not tell: crowds that all cross the picture fit a
+        # map at a tilt that is ten degrees off, and it seems sharp there.
+        identifiable=tuple(
+            name
+            for name in identifiable_of(PARAMETERS, sd)
+            if name == "heading" or name in joint.identifiable
+        ),
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
@@ -135,7 +154,7 @@ def by_speeds_alone(
     """The joint estimate with the prior's heading, which speeds leave open."""
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
-    covariance[3, 3] = _HEADING_SD**2
+    covariance[3, 3] = HEADING_SD**2
     return FusedEstimate(
         values=np.append(joint.values, prior.heading_rad),
         covariance=covariance,
@@ -155,44 +174,16 @@ def _reason(
     return None
 
 
-def _odds(walkers: Walkers, site: Site, belief: Belief, peaks: list[Peak]) -> Array:
-    """How likely each peak is against the first, by all it says or by known ground alone."""
-    best = peaks[0]
-    odds = [1.0]
-    for peak in peaks[1:]:
-        worse = max(loss(walkers, site, best.candidate, peak.candidate), 0.0)
-        believed = belief.log_density(peak.candidate) - belief.log_density(best.candidate)
-        by_known = math.exp(-0.5 * worse**2 + min(believed, 0.0))
-        odds.append(max(math.exp(peak.value - best.value), by_known))
-    return np.array(odds)
+def _out_of_reach(values: Array, prior: CameraPose) -> bool:
+    """Whether a heading is at the edge of those that were tried: beyond may be a better one."""
+    return abs(float(values[3]) - prior.heading_rad) > REACH_RAD - _EDGE_RAD
 
 
-def elsewhere(peaks: list[Peak], odds: Array) -> Array:
-    """What other peaks add to the covariance (4, 4), each by its odds (P,); the first is best."""
-    apart = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
-    return np.asarray((apart * (odds / odds.sum())[:, None]).T @ apart)
-
-
-def _spread(
-    walkers: Walkers,
-    site: Site,
-    belief: Belief,
-    best: Peak,
-    covariance: Array,
-    variance_inflation: float,
-) -> Array:
-    """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
-
-    Looked at along the heading, the other parameters following as they do around the peak.
-    """
-    line = covariance[:, 3] / covariance[3, 3]
-    sd = math.sqrt(covariance[3, 3])
-    turns = sd * np.linspace(-4, 4, 17)
-    values = []
-    for turn in turns:
-        candidate = best.candidate + turn * line
-        log_likelihood = site.track_log_likelihoods(walkers, candidate).sum()
-        values.append(log_likelihood / variance_inflation + belief.log_density(candidate))
-    density = np.exp(np.array(values) - max(values))
-    variance = float(density @ turns**2 / density.sum())
-    return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))
+def _unrepeated(posterior: Posterior, values: Array, covariance: Array) -> Array:
+    """What is added to the covariance (4, 4) where halves of the people tell other headings."""
+    variance = float(covariance[3, 3])
+    line = covariance[:, 3] / variance
+    by_halves = variance_of_halves(posterior, values, line)
+    if by_halves < _FAR_APART * variance:
+        return np.zeros((4, 4))
+    return (by_halves - variance) * np.outer(line, line)

@@ -22,6 +22,7 @@ _TRACK_STEPS = 2.0  # a track tells as much as two independent steps at the most
 _NO_GROUND = -30.0
 _LEAST_SEEN = 1e-3
 _DIFFERENCE = 0.01  # radians, and log height
+_AROUND = _DIFFERENCE * np.concatenate([np.eye(4), -np.eye(4)])
 # How busy ground is that the reference did not see, against the known: tried, and a prior on it.
 _BUSY_LOG = np.linspace(np.log(0.02), np.log(4.0), 9)
 _BUSY_MEAN, _BUSY_SD = np.log(0.5), 1.0
@@ -62,7 +63,7 @@ class Likelihood:
 
 def walkers_of(observations: Observations, candidate: Array) -> Walkers:
     """The steps that are walked, seen from a candidate (4,) that is about right."""
-    placed = place_steps(observations.steps, candidate)
+    placed = place_steps(observations.steps, candidate, sloped=False)
     moving = placed.valid & (placed.length_m > _STANDING_MPS * observations.steps.seconds)
     steps = steps_where(observations.steps, moving)
     rows = steps.rows
@@ -94,12 +95,13 @@ def likelihood(
     Unless it is `scored`, the scores are nothing, and it takes a quarter of the time.
     """
     steps = walkers.steps
-    placed = place_steps(steps, candidate)
+    placed = place_steps(steps, candidate, sloped=scored)
     slot_idx = flow.slot_of(steps.rows.time_s)
     known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     unseen, unseen_by_place = flow.look_unseen(placed.place)
-    shares, beyond = coverage.seen_from(intrinsics, candidate)
-    seen = np.maximum(shares, _LEAST_SEEN)
+    around = [candidate, *candidate + _AROUND] if scored else [candidate]
+    shares, beyonds = coverage.seen_from(intrinsics, np.array(around))
+    seen, beyond = np.maximum(shares[0], _LEAST_SEEN), float(beyonds[0])
     busy = _busiest(walkers, known, unseen * np.exp(flow.log_typical), seen, beyond, slot_idx)
     extra = busy * np.exp(flow.log_typical)
     density = np.exp(known) + extra * unseen
@@ -118,8 +120,8 @@ def likelihood(
             + placed.d_log_ratio
         )
         score[~placed.valid] = 0.0
-        d_seen, d_beyond = _slopes(coverage, intrinsics, candidate)
-        score = score - ((d_seen + busy * d_beyond) / in_all[:, None])[slot_idx]
+        d_in_all = _slopes(shares[1:]) + busy * _slopes(beyonds[1:, None])
+        score = score - (d_in_all / in_all[:, None])[slot_idx]
         np.add.at(scores, owner, weight[:, None] * score)
     return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
@@ -140,7 +142,7 @@ def anchored_scores(
     """
     steps = walkers.steps
     slot_idx = flow.slot_of(steps.rows.time_s)
-    unseen, _ = flow.look_unseen(place_steps(steps, anchor).place)
+    unseen, _ = flow.look_unseen(place_steps(steps, anchor, sloped=False).place)
     placed = place_steps(steps, candidate)
     _, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
     score = (
@@ -148,16 +150,8 @@ def anchored_scores(
         + by_direction[:, None] * placed.d_direction
         + placed.d_log_ratio
     )
-
-    def log_shares(at: Array) -> Array:
-        shares = known_shares(coverage, flow, intrinsics, at, anchor)
-        return np.asarray(np.log(np.maximum(shares, _LEAST_SEEN)))
-
-    slopes = [
-        (log_shares(candidate + step) - log_shares(candidate - step)) / (2 * _DIFFERENCE)
-        for step in _DIFFERENCE * np.eye(4)
-    ]
-    score = score - np.stack(slopes, axis=1)[slot_idx]
+    shares = known_shares(coverage, flow, intrinsics, candidate + _AROUND, anchor)
+    score = score - _slopes(np.log(np.maximum(shares, _LEAST_SEEN)))[slot_idx]
     weight = walkers.weight * (1 - unseen) * placed.valid
     scores = np.zeros((walkers.tracks, 4))
     np.add.at(scores, steps.rows.owner_idx, weight[:, None] * score)
@@ -183,16 +177,6 @@ def _busiest(
     return float(busy[np.argmax(gain - cost - prior)])
 
 
-def _slopes(coverage: Coverage, intrinsics: Intrinsics, candidate: Array) -> tuple[Array, Array]:
-    """How the shares that are seen (S, 4) and the unknown one (4,) change with a candidate."""
-
-    def shares(at: Array) -> Array:
-        known, unknown = coverage.seen_from(intrinsics, at)
-        return np.append(known, unknown)
-
-    slopes = [
-        (shares(candidate + step) - shares(candidate - step)) / (2 * _DIFFERENCE)
-        for step in _DIFFERENCE * np.eye(4)
-    ]
-    slope = np.stack(slopes, axis=1)
-    return slope[:-1], slope[-1]
+def _slopes(around: Array) -> Array:
+    """How what is known (8, S) around a candidate changes with it (S, 4)."""
+    return np.asarray((around[:4] - around[4:]).T / (2 * _DIFFERENCE))

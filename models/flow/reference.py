@@ -15,7 +15,7 @@ from models.flow.likelihood import walkers_of
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.view import Coverage
 from models.flow.path_test import UsualFit, usual_fit
-from models.flow.registration import Peak, Site
+from models.flow.registration import Shape, Site
 from models.flow.site_map import mapped
 from models.flow.turn_detection import StillScores, learn_scores
 from models.geometry.intrinsics import Intrinsics
@@ -70,8 +70,8 @@ class FlowReference:
         """
         return 1 + people / self.people
 
-    def precision(self, peak: Peak, people: float, move: Array) -> Array:
-        """How much (4, 4) the map's part of a peak knows, some way (4,) from the prior pose.
+    def precision(self, shape: Shape, people: float, move: Array) -> Array:
+        """How much (4, 4) the map's part knows, by its shape some way (4,) from the prior pose.
 
         Source: the inverse of the sandwich covariance (Godambe's information). On top of the
         walkers' noise comes the map's, and what the bias is not known to be: at another pose, other
@@ -79,10 +79,10 @@ class FlowReference:
         """
         far = min(float(np.linalg.norm(move / _FAR)), 1.0)
         elsewhere = np.diag((_ELSEWHERE * far * self.spread) ** 2)
-        scatter = self.score_variance_inflation * self.map_noise(people) * peak.noise
+        scatter = self.score_variance_inflation * self.map_noise(people) * shape.noise
         scatter = scatter + people**2 * (self.bias_covariance + elsewhere)
         scatter = scatter + 1e-9 * np.trace(scatter) * np.eye(4)
-        return np.asarray(peak.curvature @ np.linalg.solve(scatter, peak.curvature))
+        return np.asarray(shape.curvature @ np.linalg.solve(scatter, shape.curvature))
 
 
 def candidate_of(pose: CameraPose) -> Array:

@@ -4,7 +4,7 @@ Source: Berndt, Hall, Hall and Hausman 1974, steps by the scores' outer product;
 Levenberg 1944. The curvature by differences of the scores is ours.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,68 +68,104 @@ class Belief:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peak:
-    """Where a search ended: candidate (4,), log posterior, and what the map says there.
+    """Where a climb ended: candidate (4,), and its log posterior."""
+
+    candidate: Array
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """What the map says around a candidate.
 
     `curvature` (4, 4) is how the log likelihood bends, `noise` (4, 4) how its slope scatters, by
     walking group. Were the map the truth and walking groups single walkers, they would be the same.
     """
 
-    candidate: Array
-    value: float
     curvature: Array
     noise: Array
 
 
-def register(
-    walkers: Walkers,
-    site: Site,
-    belief: Belief,
-    *,
-    variance_inflation: float,
-    headings: Sequence[float],
-) -> list[Peak]:
-    """Peaks of the posterior, the highest first.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posterior:
+    """What walkers say by a map, tempered, and what is believed beside.
 
-    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
-    are climbed from, and ends that are the same are one. `variance_inflation` divides what the map
-    says: how much larger its squared errors are than its scores would have it.
+    `variance_inflation` divides what the map says: how much larger its squared errors are than its
+    scores would have it.
     """
 
-    def posterior(candidate: Array) -> tuple[float, Likelihood]:
-        found = site.likelihood(walkers, candidate)
-        return found.value / variance_inflation + belief.log_density(candidate), found
+    walkers: Walkers
+    site: Site
+    belief: Belief
+    variance_inflation: float
 
-    tried = [belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings]
-    log_posteriors = [
-        float(site.track_log_likelihoods(walkers, candidate).sum()) / variance_inflation
-        + belief.log_density(candidate)
-        for candidate in tried
+    def value(self, candidate: Array) -> float:
+        """The log posterior of a candidate (4,), up to a constant."""
+        chance = float(self.site.track_log_likelihoods(self.walkers, candidate).sum())
+        return chance / self.variance_inflation + self.belief.log_density(candidate)
+
+    def climbed(self, candidate: Array) -> Peak:
+        """The peak above a candidate (4,)."""
+        value, found = self._asked(candidate)
+        for _ in range(_MOST_ROUNDS):
+            believed = self.belief.precision @ (candidate - self.belief.mean)
+            slope = found.scores.sum(axis=0) / self.variance_inflation - believed
+            matrix = _scatter(found.scores) / self.variance_inflation + self.belief.precision
+            move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
+            move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
+            share, gain = 1.0, -1.0
+            while share > _SHORTEST_SHARE and gain <= 0:
+                new_value, new_found = self._asked(candidate + share * move)
+                gain = new_value - value
+                share /= 2
+            if gain <= 0:
+                break
+            candidate, value, found = candidate + 2 * share * move, new_value, new_found
+            if gain < _CONVERGED:
+                break
+        return Peak(candidate=candidate, value=value)
+
+    def _asked(self, candidate: Array) -> tuple[float, Likelihood]:
+        found = self.site.likelihood(self.walkers, candidate)
+        return found.value / self.variance_inflation + self.belief.log_density(candidate), found
+
+
+def register(posterior: Posterior, headings: Sequence[float]) -> list[Peak]:
+    """Peaks of a posterior, the highest first.
+
+    The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
+    are climbed from, and ends that are the same are one.
+    """
+    tried = [
+        posterior.belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings
     ]
+    log_posteriors = [posterior.value(candidate) for candidate in tried]
     begin: list[Array] = []
     for number in np.argsort(log_posteriors)[::-1]:
         apart = [abs(tried[number][3] - other[3]) for other in begin]
         hopeless = log_posteriors[number] < max(log_posteriors) - _HOPELESS
         if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
             begin.append(tried[number])
-    ends: list[tuple[Array, float, Likelihood]] = []
-    for candidate in begin:
-        end = _climbed(candidate, posterior, belief, variance_inflation)
-        if all(np.abs(end[0] - other[0]).max() > _SAME_END for other in ends):
-            ends.append(end)
-    ends.sort(key=lambda end: -end[1])
-    return [
-        Peak(
-            candidate=candidate,
-            value=value,
-            curvature=curvature_of(walkers, site, candidate),
-            noise=noise_of(walkers, site.scores(walkers, candidate, candidate)),
-        )
-        for candidate, value, _ in ends
-    ]
+    return distinct([posterior.climbed(candidate) for candidate in begin])
+
+
+def distinct(peaks: Sequence[Peak]) -> list[Peak]:
+    """Peaks that are not about the same, the highest first."""
+    kept: list[Peak] = []
+    for peak in sorted(peaks, key=lambda peak: -peak.value):
+        if all(np.abs(peak.candidate - other.candidate).max() > _SAME_END for other in kept):
+            kept.append(peak)
+    return kept
 
 
 def settled(
-    walkers: Walkers, site: Site, belief: Belief, peak: Peak, precision: Array, bias: Array
+    walkers: Walkers,
+    site: Site,
+    belief: Belief,
+    peak: Peak,
+    shape: Shape,
+    precision: Array,
+    bias: Array,
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
@@ -141,11 +177,12 @@ def settled(
         site: to what.
         belief: what else is known.
         peak: where to begin.
+        shape: what the map says there.
         precision: what the map's part knows (4, 4).
         bias: a person's mean score at the truth (4,).
     """
     covariance = np.linalg.inv(precision + belief.precision)
-    gain = precision @ np.linalg.inv(peak.curvature)
+    gain = precision @ np.linalg.inv(shape.curvature)
     candidate = peak.candidate
     for _ in range(_SETTLING_ROUNDS):
         scores = site.scores(walkers, candidate, candidate)
@@ -155,31 +192,12 @@ def settled(
     return candidate, np.asarray(covariance)
 
 
-def _climbed(
-    candidate: Array,
-    posterior: Callable[[Array], tuple[float, Likelihood]],
-    belief: Belief,
-    variance_inflation: float,
-) -> tuple[Array, float, Likelihood]:
-    value, found = posterior(candidate)
-    for _ in range(_MOST_ROUNDS):
-        slope = found.scores.sum(axis=0) / variance_inflation - belief.precision @ (
-            candidate - belief.mean
-        )
-        matrix = _scatter(found.scores) / variance_inflation + belief.precision
-        move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
-        move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
-        share, gain = 1.0, -1.0
-        while share > _SHORTEST_SHARE and gain <= 0:
-            new_value, new_found = posterior(candidate + share * move)
-            gain = new_value - value
-            share /= 2
-        if gain <= 0:
-            break
-        candidate, value, found = candidate + 2 * share * move, new_value, new_found
-        if gain < _CONVERGED:
-            break
-    return candidate, value, found
+def shape_at(walkers: Walkers, site: Site, candidate: Array) -> Shape:
+    """What a map says around a candidate (4,)."""
+    return Shape(
+        curvature=curvature_of(walkers, site, candidate),
+        noise=noise_of(walkers, site.scores(walkers, candidate, candidate)),
+    )
 
 
 def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:

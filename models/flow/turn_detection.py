@@ -48,6 +48,12 @@ class StillScores:
         """What is compared with `level`, (W, 4): of the newest 8, 9, ... of groups (P, 4)."""
         return _squares(scores, self.mean, self.covariance, self.bent, self.walking_groups)
 
+    @property
+    def information_of_a_group(self) -> Array:
+        """How much (4, 4) the mean score of one group tells of a move, were paths all it told."""
+        ridge = self.covariance + _RIDGE * np.diag(np.diag(self.covariance)) + 1e-9 * np.eye(4)
+        return np.asarray(self.bent.T @ np.linalg.solve(ridge, self.bent))
+
     def level(self, rate: float) -> float:
         """What the statistic passes in a share `rate` of windows of a still camera."""
         return value_below(rate / self.looks / 2, self.walking_groups - 1) ** 2

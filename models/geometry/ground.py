@@ -4,6 +4,7 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
+from models.geometry.vectors import norm
 
 # Of the angle below the horizon: 0.3 deg, 200 camera heights away. A pixel of a street camera is
 # 0.05 deg, so that one of noise there moves a place by a fifth of its distance; nearer to the
@@ -68,5 +69,6 @@ def _falling(rays: Array, rotation: Array) -> tuple[Array, Array, Mask]:
     far it falls.
     """
     world = rays @ rotation  # rows are points: (R.T @ ray).T
-    valid = -world[..., 2] > LOWEST_SINE * np.linalg.norm(world, axis=-1)
-    return world, np.where(valid, -world[..., 2], 1.0), valid
+    down = -world[..., 2]
+    valid = down > LOWEST_SINE * norm(world)
+    return world, np.where(valid, down, 1.0), valid

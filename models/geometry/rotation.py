@@ -4,6 +4,7 @@ A rotation matrix has the camera's right, down and forward axes as its rows, in 
 coordinates (Z up). The signs are pinned by `tests/models/geometry/test_rotation.py`.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -25,16 +26,42 @@ def rotation_from_angles(tilt_rad: Any, roll_rad: Any, heading_rad: Any) -> Arra
     tilt, roll, heading = np.broadcast_arrays(
         *(np.asarray(angle, dtype=np.float64) for angle in (tilt_rad, roll_rad, heading_rad))
     )
-    zero = np.zeros_like(tilt)
-    forward = np.stack(
-        [np.sin(heading) * np.cos(tilt), np.cos(heading) * np.cos(tilt), -np.sin(tilt)], axis=-1
+    if tilt.ndim == 0:
+        return _rotation(float(tilt), float(roll), float(heading))
+    rows = _rows(
+        *(turn for angle in (tilt, roll, heading) for turn in (np.cos(angle), np.sin(angle)))
     )
-    right0 = np.stack([np.cos(heading), -np.sin(heading), zero], axis=-1)
-    down0 = np.cross(forward, right0)
-    cos_roll, sin_roll = np.cos(roll)[..., None], np.sin(roll)[..., None]
-    right = cos_roll * right0 + sin_roll * down0
-    down = -sin_roll * right0 + cos_roll * down0
-    return np.stack([right, down, forward], axis=-2)
+    rotation = np.empty((*tilt.shape, 3, 3))
+    for number, row in enumerate(rows):
+        for axis, entries in enumerate(row):
+            rotation[..., number, axis] = entries
+    return rotation
+
+
+def _rotation(tilt_rad: float, roll_rad: float, heading_rad: float) -> Array:
+    """One of them: estimators ask for tens of thousands, each alone."""
+    turns = [turn(a) for a in (tilt_rad, roll_rad, heading_rad) for turn in (math.cos, math.sin)]
+    return np.array(_rows(*turns))
+
+
+def _rows(
+    cos_tilt: Any, sin_tilt: Any, cos_roll: Any, sin_roll: Any, cos_heading: Any, sin_heading: Any
+) -> list[list[Any]]:
+    """The rows right, down, forward: the level camera's first two, turned about the third."""
+    down0 = [-sin_heading * sin_tilt, -cos_heading * sin_tilt, -cos_tilt]
+    return [
+        [
+            cos_roll * cos_heading + sin_roll * down0[0],
+            -cos_roll * sin_heading + sin_roll * down0[1],
+            sin_roll * down0[2],
+        ],
+        [
+            -sin_roll * cos_heading + cos_roll * down0[0],
+            sin_roll * sin_heading + cos_roll * down0[1],
+            cos_roll * down0[2],
+        ],
+        [sin_heading * cos_tilt, cos_heading * cos_tilt, -sin_tilt],
+    ]
 
 
 def rotation_and_derivatives(
@@ -45,12 +72,14 @@ def rotation_and_derivatives(
     Tilting turns forward towards down0 and down0 away from forward; rolling turns right towards
     down and down away from right.
     """
-    level = rotation_from_angles(tilt_rad, 0.0, heading_rad)  # right0, down0, forward
-    rotation = rotation_from_angles(tilt_rad, roll_rad, heading_rad)
-    turn = rotation @ level.T
-    by_tilt = turn @ np.stack([np.zeros(3), -level[2], level[1]])
-    by_roll = np.stack([rotation[1], -rotation[0], np.zeros(3)])
-    return rotation, np.stack([by_tilt, by_roll])
+    rotation = _rotation(tilt_rad, roll_rad, heading_rad)
+    derivatives = np.zeros((2, 3, 3))
+    level = _rotation(tilt_rad, 0.0, heading_rad)  # right0, down0, forward
+    derivatives[0, 0] = -math.sin(roll_rad) * level[2]
+    derivatives[0, 1] = -math.cos(roll_rad) * level[2]
+    derivatives[0, 2] = level[1]
+    derivatives[1, 0], derivatives[1, 1] = rotation[1], -rotation[0]
+    return rotation, derivatives
 
 
 def angles_from_rotation(rotation: Array) -> tuple[Array, Array, Array]:

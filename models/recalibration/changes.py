@@ -1,6 +1,7 @@
 """Whether a camera has moved among the tracks of a window, by how people walk and where."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,17 +10,26 @@ from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
+from models.flow.after_change import widened
+from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
 from models.flow.likelihood import walkers_of
-from models.flow.reference import candidate_of
 from models.flow.turn_detection import moved_within
 from models.recalibration.site import CameraSite
 
-_CUT_RATE = 1e-6  # of windows of a still camera are cut where nothing happened
+_SUSPECT_RATE = 0.01  # of windows of a camera that stands are looked at twice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posed:
+    """The pose of some tracks: `joint` by speeds alone, `fused` by places too."""
+
+    joint: JointEstimate
+    fused: FusedEstimate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Searched:
-    """What a window comes to: the tracks from the newest change on, and their pose by speeds.
+    """What a window comes to: the tracks from the newest change on, and their pose.
 
     `change_idx` is the first track after the change; None where there was none. `first` is the
     first that ended with it or later: `tracks` are from there on.
@@ -28,11 +38,26 @@ class Searched:
     change_idx: int | None
     first: int
     tracks: Observations
-    joint: JointEstimate
+    posed: Posed
+
+
+def posed(tracks: Observations, site: CameraSite) -> Posed:
+    """The pose of tracks that are of one: by speeds, and by places where these are known."""
+    joint = joint_estimate(tracks, site.prior, site.speed_reference)
+    if site.flow is None:
+        fused = by_speeds_alone(joint, site.prior)
+    else:
+        fused = fused_estimate(
+            tracks, site.intrinsics, site.prior, joint, site.speed_reference, site.flow
+        )
+    return Posed(joint=joint, fused=fused)
 
 
 def search_change(tracks: Observations, site: CameraSite) -> Searched:
     """The newest change of the camera that is beyond doubt, and the pose from there on.
+
+    Where people walk another way than before, or elsewhere, a window is suspected; it is cut
+    where the parts before and after, each asked alone, are of two poses beyond doubt.
 
     Args:
         tracks: of the window, in the order of their ends.
@@ -41,26 +66,47 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    prior, speed_reference = site.prior, site.speed_reference
-    found = find_change(tracks, prior, speed_reference)
+    whole = posed(tracks, site)
+    for change_idx in _suspected(tracks, site, whole.fused):
+        first, parts = _parted(tracks, change_idx)
+        if parts is None:
+            continue
+        before, after = (posed(part, site) for part in parts)
+        if moved_beyond_doubt(
+            before.fused, before.joint.walking_groups, after.fused, after.joint.walking_groups
+        ):
+            fused = widened(
+                before.fused,
+                after.fused,
+                after.joint.walking_groups,
+                site.speed_reference,
+                site.flow,
+            )
+            return Searched(
+                change_idx=change_idx,
+                first=first,
+                tracks=parts[1],
+                posed=replace(after, fused=fused),
+            )
+    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole)
+
+
+def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
+    """Where the camera may have moved, by speeds and by places: the first tracks after it.
+
+    Both are asked where the camera stands by all tracks together. Asked at the prior pose, a
+    camera that moved long ago seems to move with every change of the crowd.
+    """
+    turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
+    found = find_change(tracks, turned, site.speed_reference)
     if found is not None:
-        first, parts = _parted(tracks, found.track_idx)
-        if parts is not None:
-            before, after = (joint_estimate(part, prior, speed_reference) for part in parts)
-            if moved_beyond_doubt(before, after):
-                return Searched(
-                    change_idx=found.track_idx, first=first, tracks=parts[1], joint=after
-                )
+        yield found.track_idx
     if site.flow is not None:
-        at = candidate_of(prior)
+        at = whole.values
         paths = site.flow.site(site.intrinsics)
-        turned = moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _CUT_RATE)
-        first, parts = (0, None) if turned is None else _parted(tracks, turned)
-        if parts is not None:
-            joint = joint_estimate(parts[1], prior, speed_reference)
-            return Searched(change_idx=turned, first=first, tracks=parts[1], joint=joint)
-    joint = joint_estimate(tracks, prior, speed_reference)
-    return Searched(change_idx=None, first=0, tracks=tracks, joint=joint)
+        moved = moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _SUSPECT_RATE)
+        if moved is not None:
+            yield moved
 
 
 def _parted(

@@ -9,9 +9,9 @@ from models.drift.verdict import Drift, DriftLimits, asks_again, drift_between, 
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
-from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
+from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
-from models.recalibration.changes import search_change
+from models.recalibration.changes import posed, search_change
 from models.recalibration.lacks import Lack, unless_failed
 from models.recalibration.site import CameraSite
 
@@ -33,7 +33,7 @@ class PoseFinding:
     `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
     same without the newest people; None unless a verdict asks for it. `change_idx` is the first
     track after the change, None where there was none, and `first` the first that counts.
-    `searched_by_map` says whether the flow map was asked for a change, `lacks` what failed beside.
+    `lacks` says what failed beside.
     """
 
     prior: CameraPose
@@ -42,7 +42,6 @@ class PoseFinding:
     earlier: FusedEstimate | None = None
     change_idx: int | None = None
     first: int = 0
-    searched_by_map: bool = False
     lacks: tuple[Lack, ...] = ()
 
     @property
@@ -82,30 +81,20 @@ def estimate_pose(
     searched = None
     if site.flow is not None:
         searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site))
-    searched_by_map = searched is not None
     if searched is None:
         site = replace(site, flow=None)
         searched = search_change(tracks, site)
-    fused = by_speeds_alone(searched.joint, prior)
-    if site.flow is not None:
-        by_map = unless_failed(
-            lacks, FLOW_MAP, partial(_fused, searched.tracks, searched.joint, site)
-        )
-        if by_map is None:
-            site = replace(site, flow=None)
-        else:
-            fused = by_map
+    fused = searched.posed.fused
     earlier = None
     if second_look is not None:
         earlier = _look_again(searched.tracks, drift_of(fused, prior), second_look, site)
     return PoseFinding(
         prior=prior,
-        joint=searched.joint,
+        joint=searched.posed.joint,
         fused=fused,
         earlier=earlier,
         change_idx=searched.change_idx,
         first=searched.first,
-        searched_by_map=searched_by_map,
         lacks=tuple(lacks),
     )
 
@@ -113,13 +102,6 @@ def estimate_pose(
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
     """How far an estimate is from the prior pose."""
     return drift_between(fused.parameters, fused.sd, fused.identifiable, prior)
-
-
-def _fused(tracks: Observations, joint: JointEstimate, site: CameraSite) -> FusedEstimate:
-    """By speeds, and by places where these are known."""
-    if site.flow is None:
-        return by_speeds_alone(joint, site.prior)
-    return fused_estimate(tracks, site.intrinsics, site.prior, joint, site.flow)
 
 
 def _look_again(
@@ -136,4 +118,4 @@ def _look_again(
     if walkers.size < limits.people + FEWEST_WALKERS:
         return None
     older = of_tracks(tracks, np.arange(walkers[-limits.people]))
-    return _fused(older, joint_estimate(older, site.prior, site.speed_reference), site)
+    return posed(older, site).fused

@@ -13,7 +13,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.site import Lane, SiteConfig, walk_site
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, by_end
 
 DAY_S = 86_400.0
 _LANE_MIXES = 10  # lanes stand so often in a list as people take them
@@ -102,7 +102,7 @@ def walk_days(
                 replace(track, time_s=track.time_s + start_s)
                 for track in walk_site(intrinsics, pose, taken, paced, count, rng)
             ]
-        yield sorted(tracks, key=lambda track: float(track.time_s[-1]))
+        yield by_end(tracks)
 
 
 def draw_mixes(lanes: int, habits: HabitConfig, rng: np.random.Generator) -> Array:

@@ -43,14 +43,7 @@ def accept_pose(
     view = view_pose(session, settings, decision.camera_id)
     if not view.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
-    close_pose_alerts(session, decision.camera_id, Outcome.ACCEPTED, decision.by, decision.note)
-    note_activity(
-        session,
-        Activity.POSE_ACCEPTED,
-        by=decision.by,
-        camera_id=decision.camera_id,
-        text=decision.note,
-    )
+    _close(session, decision, Outcome.ACCEPTED, Activity.POSE_ACCEPTED)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     renew_prior_pose(
         session,
@@ -85,14 +78,7 @@ def learn_anew(
         NotFoundError: there is no such camera.
     """
     require_camera(session, decision.camera_id)
-    close_pose_alerts(session, decision.camera_id, Outcome.PUT_BACK, decision.by, decision.note)
-    note_activity(
-        session,
-        Activity.REFERENCE_RESET,
-        by=decision.by,
-        camera_id=decision.camera_id,
-        text=decision.note,
-    )
+    _close(session, decision, Outcome.PUT_BACK, Activity.REFERENCE_RESET)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     begin_reference(session, decision.camera_id, Origin.RESET, from_s=from_s, by=decision.by)
     request_estimate(session, queue, decision.camera_id)
@@ -145,9 +131,14 @@ def _resolve(
 
 def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answer) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
-    camera_id, by, note = decision.camera_id, decision.by, decision.note
-    close_pose_alerts(session, camera_id, Outcome(answer), by, note)
     what = Activity.POSE_PUT_BACK if answer == Answer.PUT_BACK else Activity.POSE_FALSE_ALARM
+    _close(session, decision, Outcome(answer), what)
+    keep_answer(session, decision.camera_id, answer, decision.by)
+    request_estimate(session, queue, decision.camera_id)
+
+
+def _close(session: Session, decision: Decision, outcome: Outcome, what: Activity) -> None:
+    """Close a camera's alerts about its pose, and keep who said what came of them."""
+    camera_id, by, note = decision.camera_id, decision.by, decision.note
+    close_pose_alerts(session, camera_id, outcome, by, note)
     note_activity(session, what, by=by, camera_id=camera_id, text=note)
-    keep_answer(session, camera_id, answer, by)
-    request_estimate(session, queue, camera_id)

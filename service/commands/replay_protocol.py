@@ -85,7 +85,8 @@ def replay_protocol(
     parting = HALVES_IN_TIME if by_time else HALVES_OF_PEOPLE
     case = draw_case(load_scene(folder), seed, RANGES[knock], parting)
     wanted = len(case.reference)
-    if wanted < _FEWEST or observe(case.seen, case.intrinsics).walkers < FEWEST_WALKERS:
+    walking = np.unique(observe(case.seen, case.intrinsics).steps.rows.owner_idx)
+    if wanted < _FEWEST or walking.size < FEWEST_WALKERS:
         raise TooFewTrajectoriesError(
             f"tracks: {_FEWEST} before and after the knock are needed, got {wanted} and "
             f"{len(case.seen)}"
@@ -103,7 +104,6 @@ def replay_protocol(
             http, camera_id, lambda pose: pose["reference"]["state"] == ReferenceState.READY,
             lambda pose: on_progress("reference", pose["reference"]["tracks"], wanted),
         )  # fmt: skip
-        walking = np.unique(observe(case.seen, case.intrinsics).steps.rows.owner_idx)
         for at in range(0, len(case.seen), batch):
             some = case.seen[at : at + batch]
             lost += _post(http, camera_id, some, f"s{at}-", shifts[1], case.intrinsics)

@@ -6,11 +6,13 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
 from service.delivery.messages import Message, all_firing, message_of
 from service.delivery.outbox import wake
 from service.delivery.send import Outcome
 from service.job_queue import JobQueue
 from service.kinds import DeliveryState, WebhookFormat
+from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
@@ -202,12 +204,15 @@ def _failed(
         rest_s = max(min(delay_s, _LONGEST_HOLD_S), _retry_after_s(outcome))
         webhook.held_until = now + timedelta(seconds=rest_s)
     if outcome.status_code == GONE:
-        webhook.enabled, webhook.disabled_reason = False, "it answered 410: it is gone for good"
-    elif now - webhook.failing_since > timedelta(hours=settings.webhook_patience_h):
-        webhook.enabled = False
-        webhook.disabled_reason = (
-            f"it failed for more than {settings.webhook_patience_h:g} h: {outcome.error}"
-        )
+        webhook.disable(Reason(code=ServiceCode.ENDPOINT_GONE))
+        return
+    patience = timedelta(hours=settings.webhook_patience_h)
+    if now - webhook.failing_since > patience:
+        values: dict[str, Value] = {
+            "patience_s": patience.total_seconds(),
+            "error": str(outcome.error),
+        }
+        webhook.disable(Reason(code=ServiceCode.ENDPOINT_FAILS, values=values))
 
 
 def _finish(delivery: DeliveryRecord, state: DeliveryState, now: datetime) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason
 from service.data_dir import KEY_FILE, StartError
 from service.delivery.sealing import (
     Sealer,
@@ -14,12 +15,12 @@ from service.delivery.sealing import (
     write_key_file,
 )
 from service.delivery.signing import new_secret
+from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
 from service.store.tables.deliveries import WebhookRecord
 
 NEW_KEY_FILE = f"{KEY_FILE}.new"
-_LOST = "its secret was lost with the key: fetch a new one, tell the receiver, enable it"
 
 
 def secret_of(settings: Settings, record: WebhookRecord) -> str | None:
@@ -97,7 +98,7 @@ def give_up_secrets(session: Session, new: Sealer) -> int:
         if record.secret is not None:
             record.secret = new.seal(new_secret(), _purpose(record.id))
             record.old_secret = None
-            record.enabled, record.disabled_reason = False, _LOST
+            record.disable(Reason(code=ServiceCode.SECRET_LOST))
             count += 1
     return count
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason
 from service.access.activity import note
 from service.delivery.addresses import AddressError, check_url
 from service.delivery.keys import sealed_secret
@@ -16,12 +17,14 @@ from service.delivery.signing import new_secret
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
 from service.kinds import Activity, AlertKind, DeliveryState, MessageType, WebhookFormat
+from service.reason_words import in_words
+from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 OLD_SECRET_STAYS = timedelta(hours=24)
-_BY_A_PERSON = "disabled by a person"
+_BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +87,7 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
         format=spec.format,
         kinds=None if spec.kinds is None else list(spec.kinds),
         enabled=spec.enabled,
-        disabled_reason=None if spec.enabled else _BY_A_PERSON,
+        disabled_reasons=() if spec.enabled else (_BY_A_PERSON,),
         secret=None if secret is None else sealed_secret(settings, webhook_id, secret),
         created_at=now,
         updated_at=now,
@@ -129,10 +132,10 @@ def change_webhook(
     record.updated_at = now
     _note(session, Activity.WEBHOOK_CHANGED, record, sorted(changes))
     if changes.get("enabled") is False:
-        record.disabled_reason = _BY_A_PERSON
+        record.disable(_BY_A_PERSON)
     elif changes.get("enabled") or "url" in changes:
         if record.enabled:
-            record.disabled_reason = None
+            record.disabled_reasons = ()
         record.held_until = record.failing_since = record.last_error = None
         webhooks.bring_forward(session, webhook_id, now, refused=())
         wake(session, queue, record, now)
@@ -251,5 +254,6 @@ def _require(session: Session, webhook_id: str) -> WebhookRecord:
 def _require_enabled(session: Session, webhook_id: str) -> WebhookRecord:
     record = _require(session, webhook_id)
     if not record.enabled:
-        raise ConflictError(f"enabled: this webhook is disabled: {record.disabled_reason}")
+        why = in_words(record.disabled_reasons)
+        raise ConflictError(f"enabled: this webhook is disabled: {why}")
     return record

@@ -192,7 +192,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
     lacks.take(found.lacks)
     reading = None
-    if found.searched_by_map and site.chart is not None:
+    if site.chart is not None:
         reading = lacks.unless_failed(
             "chart", partial(_read, evidence, observed, site, found.first)
         )

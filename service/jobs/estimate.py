@@ -17,13 +17,10 @@ from service.estimation.lacks import Lacks
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
 from service.jobs.context import JobContext
 from service.jobs.predictions import predict_pending
-from service.reason_words import in_words
 from service.windows.looking import begin_look, end_look, fail_look, leave_poisoned, note_lacks
 from service.windows.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
-
-_GROWTH_RESTS_S = 3600.0
 
 
 def run_estimate(context: JobContext, camera_id: str) -> None:
@@ -67,8 +64,9 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
         said = lacks.said if finding is None else finding.lacks
+        resting = context.growth_rests.lacks_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks=in_words(said) or None)
+        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks=(*said, *resting))
     _grow_unless_failed(context, camera_id, unpacked)
 
 
@@ -119,11 +117,12 @@ def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None
 
 def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
-    if time.monotonic() < context.no_growth_before_s.get(camera_id, 0.0):
+    if context.growth_rests.lacks_of(camera_id):
         return
     lacks = Lacks(camera_id)
     lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id, unpacked))
     if lacks.said:
-        context.no_growth_before_s[camera_id] = time.monotonic() + _GROWTH_RESTS_S
+        said = tuple(lacks.said)
+        context.growth_rests.begin(camera_id, said)
         with context.store.write() as session:
-            note_lacks(session, camera_id, lacks.said)
+            note_lacks(session, camera_id, said)

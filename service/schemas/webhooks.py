@@ -7,7 +7,10 @@ from pydantic import BaseModel, Field, field_validator
 
 from service.delivery.webhooks import DeliveryView, SecretMade, WebhookView
 from service.kinds import AlertKind, DeliveryState, MessageType, WebhookFormat
+from service.reason_words import in_words
+from service.reasons import code_of
 from service.schemas.base import Body
+from service.schemas.reasons import ReasonCode
 from service.store.tables.deliveries import WebhookRecord
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
@@ -49,6 +52,7 @@ class WebhookOut(BaseModel):
     kinds: list[AlertKind] | None
     enabled: bool
     disabled_reason: str | None
+    disabled_reason_code: ReasonCode | None
     pending: int
     delivered_at: datetime | None
     failing_since: datetime | None
@@ -128,5 +132,10 @@ class DeliveryList(BaseModel):
 
 
 def _fields(record: WebhookRecord) -> dict[str, Any]:
-    names = WebhookOut.model_fields.keys() - {"pending"}
-    return {name: getattr(record, name) for name in names}
+    names = WebhookOut.model_fields.keys() - {"pending", "disabled_reason", "disabled_reason_code"}
+    why = record.disabled_reasons
+    return {
+        **{name: getattr(record, name) for name in names},
+        "disabled_reason": in_words(why) or None,
+        "disabled_reason_code": code_of(why),
+    }

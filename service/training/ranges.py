@@ -24,7 +24,7 @@ _SAME_M = 1.0
 def beyond_range(
     session: Session, camera_id: str, pose: CameraPose, identifiable: tuple[str, ...]
 ) -> Reason | None:
-    """Which identifiable number is at the edge of what the model in use was trained for."""
+    """Which identifiable parameter is at the edge of what the model in use was trained for."""
     model = trainings.newest_model(session, camera_id)
     if model is None:
         return None

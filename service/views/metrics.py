@@ -1,4 +1,4 @@
-"""The metrics of a moment: what operators of the service watch, for metrics."""
+"""The metrics of a moment: what operators of the service watch."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime

@@ -1,12 +1,10 @@
 """The marks of an estimate job on its camera: due, looked at up to which track, failing."""
 
-from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
-from models.reasons import Reason
-from service.reason_words import in_words
+from service.reasons import Reasons
 from service.store import cameras
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import tracks
@@ -62,11 +60,11 @@ def end_look(
     newest_pk: int | None,
     *,
     rest_s: float = 0.0,
-    lacks: str | None = None,
+    lacks: Reasons = (),
 ) -> None:
     """Note up to which track a job has looked; the reconcile sees what came after.
 
-    The camera rests for `rest_s`, so that others have their turn. `lacks` names what failed beside
+    The camera rests for `rest_s`, so that others have their turn. `lacks` says what failed beside
     the served estimate.
     """
     camera = cameras.find(session, camera_id)
@@ -75,14 +73,14 @@ def end_look(
         camera.estimate_tries = 0
         camera.estimate_error = camera.estimate_failing_since = None
         camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_REST_S))
-        camera.estimate_lacks = lacks
+        camera.lacks = lacks
 
 
-def note_lacks(session: Session, camera_id: str, said: Sequence[Reason]) -> None:
+def note_lacks(session: Session, camera_id: str, said: Reasons) -> None:
     """Note what failed beside an estimate after that was stored."""
     camera = cameras.find(session, camera_id)
     if camera is not None:
-        camera.estimate_lacks = "; ".join((*filter(None, [camera.estimate_lacks]), in_words(said)))
+        camera.lacks = (*camera.lacks, *said)
 
 
 def fail_look(session: Session, camera_id: str, error: str) -> None:

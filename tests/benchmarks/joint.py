@@ -16,7 +16,8 @@ from models.drift.change_point import find_change
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.reference import learn_speed_reference
 from models.simulation.walkers import WalkConfig
-from tests.models.sites import KNOCKED, PRIOR, in_time, seen, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
 
 TRACKS, RUNS = 400, 7
 LIMIT_S = 1.0
@@ -35,7 +36,7 @@ def _measure(form: str) -> float:
     started = time.perf_counter()
     reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     learned_s = time.perf_counter() - started
-    after = in_time(after)
+    after = by_end(after)
     estimate_s = median_s(lambda: joint_estimate(seen(after), PRIOR, reference))
     change_s = median_s(lambda: find_change(seen(after), PRIOR, reference))
     Console().print(

@@ -44,7 +44,7 @@ def main() -> None:
         assert flow is not None
         learned_s = median_s(lambda of=reference_tracks: learn_flow(of, LENS, PRIOR, 0))
         fused_s = median_s(
-            lambda flow=flow: fused_estimate(tracks, LENS, PRIOR, joint, flow)
+            lambda flow=flow: fused_estimate(tracks, LENS, PRIOR, joint, speeds, flow)
         )  # fmt: skip
         console.print(
             f"map of {size} tracks: learned in {learned_s:.2f} s ({learned_s / joint_s:.1f} joint "

@@ -1,6 +1,5 @@
 """The fleet page in a browser: live, sifted by keyboard, on a phone."""
 
-import time
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -41,10 +40,8 @@ def test_an_alert_comes_up_by_itself(page, fleet):
     page.evaluate("window.same = true")
     fetched = []
     page.on("request", lambda request: fetched.append(request.url.split("/", 3)[3]))
-    at = time.monotonic()
     fleet.knock("beta", tilt_deg=4.0)
-    page.locator("#row-beta.drifting").wait_for(timeout=3000)
-    assert time.monotonic() - at < 3
+    page.locator("#row-beta.drifting").wait_for()
     assert shown(page) == ["Beta", "Alpha", "Gamma"]
     assert "turned 4.1° (tilt +4." in page.locator("#row-beta .words").inner_text()
     assert "Beta: turned" in page.locator("#announce").inner_text()

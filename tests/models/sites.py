@@ -1,7 +1,6 @@
 """Simulated sites whose camera was knocked, for tests of the joint estimator."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -40,11 +39,6 @@ def tracks_of(
         start_s = float(tracks[-1].time_s[-1]) + 20
         found.append(tracks)
     return found
-
-
-def in_time(tracks: Iterable[Trajectory]) -> list[Trajectory]:
-    """Tracks in the order of their ends, as the service sees them; ours are by their starts."""
-    return sorted(tracks, key=lambda track: float(track.time_s[-1]))
 
 
 def seen(tracks: list[Trajectory]) -> Observations:

@@ -29,7 +29,8 @@ from models.recalibration import (
     read_alarm_chart,
 )
 from models.simulation.site import SiteConfig
-from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, near, seen, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
@@ -42,7 +43,7 @@ LIMITS = DriftLimits(
 def tracks():
     """Reference tracks, then some of the still camera and of the knocked one."""
     known, still, after = tracks_of(3, (PRIOR, 150), (PRIOR, 60), (KNOCKED, 60), config=CONFIG)
-    return [in_time(part) for part in (known, still, after)]
+    return [by_end(part) for part in (known, still, after)]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def site(tracks):
 
 @pytest.fixture(scope="module")
 def window(tracks):
-    return seen(in_time([*tracks[1], *tracks[2]]))
+    return seen(by_end([*tracks[1], *tracks[2]]))
 
 
 def swapped(tracks):
@@ -69,8 +70,8 @@ def test_the_pose_is_from_the_change_on(site, window, tracks):
     alone = estimate_pose(of_tracks(window, np.arange(found.first, window.tracks)), site)
     assert alone.change_idx is None
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
-    np.testing.assert_array_equal(found.fused.covariance, alone.fused.covariance)
-    assert (found.searched_by_map, found.lacks) == (True, ())
+    assert found.fused.registered
+    assert not found.lacks
 
 
 def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
@@ -140,7 +141,7 @@ def test_few_people_make_no_map_and_fewer_no_site(tracks):
     assert few.learned
     assert (few.flow, few.chart) == (None, None)
     found = estimate_pose(seen(tracks[2]), few)
-    assert (found.searched_by_map, found.fused.raw) == (False, None)
+    assert not found.fused.registered
     assert read_alarm_chart(seen(tracks[2]), few, ONE_A_YEAR) is None
     with pytest.raises(TooFewTrajectoriesError, match="at least 5"):
         learn_site(seen(tracks[0][:3]), LENS, PRIOR)
@@ -157,21 +158,18 @@ def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
 
 
 @pytest.mark.parametrize("fails_at", ["search", "pose"])
-def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, window, tracks, fails_at):
-    flow, asked = site.flow, window
-    if fails_at == "search":  # the map is asked for a change where speeds show none
-        flow, asked = (
-            replace(flow, still=replace(flow.still, covariance=np.eye(3))),
-            seen(tracks[1]),
-        )
+def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, tracks, fails_at):
+    asked = seen(tracks[1])
+    if fails_at == "search":
+        flow = replace(site.flow, still=replace(site.flow.still, covariance=np.eye(3)))
     else:
-        flow = replace(flow, bias=np.zeros(3))
+        flow = replace(site.flow, bias=np.zeros(3))
     spoilt = replace(site, flow=flow)
     found = estimate_pose(asked, spoilt)
     (lack,) = found.lacks
     assert lack.part == "flow_map"
     assert isinstance(lack.error, ValueError)
-    assert found.searched_by_map == (fails_at == "pose")
+    assert not found.fused.registered
     blind = estimate_pose(asked, replace(site, flow=None))
     assert found.change_idx == blind.change_idx
     np.testing.assert_array_equal(found.fused.values, blind.fused.values)
@@ -187,7 +185,7 @@ def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, 
         prior_pose=PRIOR,
         true_pose=KNOCKED,
         reference=tuple(tracks[0]),
-        seen=tuple(in_time([*tracks[1], *tracks[2]])),
+        seen=tuple(by_end([*tracks[1], *tracks[2]])),
     )
     learned = Learned(
         case=case, seen=window, site=site, feet=window, feet_speed_reference=site.speed_reference
@@ -230,12 +228,12 @@ def test_tracks_out_of_order_are_refused(site, tracks, call):
 
 
 def test_tracks_that_ended_together_are_in_order(site, tracks):
-    """Of a crowd, many end with the film; a cut never goes through them."""
-    last_s = tracks[2][0].time_s[-1]
+    """People who leave a train: ten at a time are seen no more. A cut never goes through them."""
+    ends = [tracks[2][number - number % 10].time_s[-1] for number in range(60)]
     together = [
-        replace(track, time_s=track.time_s - track.time_s[-1] + last_s) for track in tracks[2]
+        replace(track, time_s=track.time_s - track.time_s[-1] + end_s)
+        for track, end_s in zip(tracks[2], ends, strict=True)
     ]
-    crowd = observe([*tracks[1], *together], LENS)
-    found = estimate_pose(crowd, site)
+    found = estimate_pose(observe([*tracks[1], *together], LENS), site)
     assert found.change_idx is not None
     assert found.first == 60 <= found.change_idx

@@ -5,11 +5,12 @@ offset; the modes are a mixture, weighed by their posterior at their ends.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.joint.fit import Fit, fit_pose
+from models.estimation.joint.fit import Channel, Fit, fit_pose
 from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
@@ -23,6 +24,7 @@ from models.reasons import Reason, TracksCode, Value
 _STARTS = 2
 _START_TRACKS = 80
 _FEWEST_GROUPS = 5
+_HOPELESS = 12.0  # of that log likelihood, for another end to be named
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
 
@@ -30,20 +32,24 @@ _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
-    `raw` (3,) is before that. `identifiable` names those of tilt, roll, height that the tracks
-    determine; `reason` says what is missing, and is None where they determine all. `walkers` is
-    the parameter of tracks that were used, `walking_groups` that of people or groups who walked
-    independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood.
+    `raw` (3,) is before that. `score` is its log likelihood, over the variance inflation, up to
+    what is the same for the same tracks. `identifiable` names those of tilt, roll, height that the
+    tracks determine; `reason` says what is missing, and is None where they determine all. `walkers`
+    is the number of tracks that were used, `walking_groups` that of people or groups who walked
+    independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other
+    poses (3,) that explain the tracks, if not as well.
     """
 
     values: Array
     covariance: Array
     raw: Array
     bound: Array
+    score: float
     walkers: int
     walking_groups: int
     identifiable: tuple[str, ...]
     reason: Reason | None
+    others: tuple[Array, ...] = ()
 
     @property
     def raw_parameters(self) -> PoseParameters:
@@ -61,9 +67,34 @@ def joint_estimate(
     begin = starts(few, plane_parameters_of(prior), _STARTS)
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    return _said_of(observations, channels, ends, reference)
+
+
+def joint_near(
+    observations: Observations, prior: CameraPose, reference: SpeedReference, candidate: Array
+) -> JointEstimate:
+    """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
+
+    How fast people are where, and which way, is another question once a camera has been panned.
+    """
+    turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
+    channels = channels_of(observations, reference, turned)
+    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior))
+    return _said_of(observations, channels, [fit], reference)
+
+
+def _said_of(
+    observations: Observations,
+    channels: Sequence[Channel],
+    ends: list[Fit],
+    reference: SpeedReference,
+) -> JointEstimate:
+    """What is said of the ends of fits, the best first."""
     best = ends[0]
     covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
-    walking_groups = count_walking_groups(channels[0].measure(best.candidate))
+    walking_groups = count_walking_groups(
+        channels[0].measure(candidate=best.candidate, sloped=False)
+    )
     # One walking group is one draw of pace and pauses, however many tracks it has.
     covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
     covariance = covariance + reference.offset_covariance
@@ -85,10 +116,16 @@ def joint_estimate(
         covariance=covariance,
         raw=best.candidate,
         bound=best.bound,
+        score=best.score / reference.pose_variance_inflation,
         walkers=observations.walkers,
         walking_groups=walking_groups,
         identifiable=identifiable,
         reason=reason,
+        others=tuple(
+            end.candidate - reference.offset
+            for end in ends[1:]
+            if end.score > best.score - _HOPELESS * reference.pose_variance_inflation
+        ),
     )
 
 

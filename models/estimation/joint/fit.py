@@ -7,8 +7,9 @@ Source: Triggs, McLauchlan, Hartley and Fitzgibbon 2000, Bundle Adjustment, for 
 weights of each round are those of `hierarchy`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -49,11 +50,18 @@ class Learned:
     usual: float
 
 
+class Measure(Protocol):
+    """What some tracks show at a candidate (3,), with derivatives if it is `sloped`."""
+
+    def __call__(self, *, candidate: Array, sloped: bool = True) -> Measured:
+        """Measure."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
     """One kind of evidence: how to measure it at a candidate, and what is usual at the site."""
 
-    measure: Callable[[Array], Measured]
+    measure: Measure
     learned: Learned
 
 
@@ -201,7 +209,7 @@ def _linear(
     channel: Channel, candidate: Array, mean: Array
 ) -> tuple[Measured, Array, Array, Weights]:
     """What is measured at a candidate, derivatives (M, 3 + P), residuals (M,) and weights."""
-    measured = channel.measure(candidate)
+    measured = channel.measure(candidate=candidate)
     learned = channel.learned
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ mean, 0.0)
@@ -212,7 +220,7 @@ def _linear(
 
 
 def _log_likelihoods(channel: Channel, candidate: Array, mean: Array) -> Array:
-    measured = channel.measure(candidate)
+    measured = channel.measure(candidate=candidate, sloped=False)
     residual = measured.value - channel.learned.field.features(measured) @ mean
     return composite_log_likelihoods(
         residual, measured.value, measured.valid, measured.rows, channel.learned.spread

@@ -16,6 +16,7 @@ from models.geometry.ground import ground_of_rays
 from models.geometry.ground_flow import down_to, ground_flow, rotation_and_turns
 from models.geometry.rotation import Array, Mask
 from models.geometry.upright import stature_ratio
+from models.geometry.vectors import aside_of, dot, norm
 
 _LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
 
@@ -42,8 +43,12 @@ class Measured:
     rows: Rows
 
 
-def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measured:
+def measure_speeds(
+    steps: Steps, candidate: Array, heading_rad: float, *, sloped: bool = True
+) -> Measured:
     """Log speeds of steps: the distance on the ground between both ends over the time.
+
+    Unless it is `sloped`, the derivatives are nothing, and it takes half of the time.
 
     The derivative is that of a short step in the middle: uᵀ∇F u for its direction u and the flow F
     of ground points under a turn. Of the very ends it would share their noise: a step that noise
@@ -55,26 +60,27 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
     end, end_valid = ground_of_rays(steps.end_rays, rotation, beyond=0.0)
     valid = start_valid & end_valid
     across = end - start
-    length = _norm(across)
+    length = norm(across)
     direction = across / np.maximum(length, 1e-12)[:, None]
     place = (start + end) / 2
-    aside = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-    noisy_end, noisy_valid = ground_of_rays(steps.noisy_end_rays, rotation, beyond=0.0)
-    off = np.where(noisy_valid, ((noisy_end - end) * aside).sum(axis=1), 0.0)
-    turned = off / np.maximum(length / 2, 1e-12)
-    toward, beside = (direction * place).sum(axis=1), (aside * place).sum(axis=1)
-    d_direction_noise = np.zeros((len(place), 3))
-    d_value = np.ones((len(place), 3))
-    d_place = np.empty((len(place), 2, 3))
-    d_direction = np.zeros((len(place), 2, 3))
-    for number, turn in enumerate(turns):
-        d_place[:, :, number], fall = ground_flow(place, turn)
-        along = direction @ turn[:2, 2]
-        d_value[:, number] = fall + toward * along
-        d_direction_noise[:, number] = turned * (beside * along + toward * (aside @ turn[:2, 2]))
-        bent = direction @ turn[:2, :2] + place * along[:, None]
-        across = (bent * direction).sum(axis=1)
-        d_direction[:, :, number] = bent - across[:, None] * direction
+    count = len(place)
+    d_direction_noise, d_value = np.zeros((count, 3)), np.ones((count, 3))
+    d_place, d_direction = np.zeros((2, count, 2, 3))
+    if sloped:
+        aside = aside_of(direction)
+        noisy_end, noisy_valid = ground_of_rays(steps.noisy_end_rays, rotation, beyond=0.0)
+        off = np.where(noisy_valid, dot(noisy_end - end, aside), 0.0)
+        turned = off / np.maximum(length / 2, 1e-12)
+        toward, beside = dot(direction, place), dot(aside, place)
+        for number, turn in enumerate(turns):
+            d_place[:, :, number], fall = ground_flow(place, turn)
+            along = direction @ turn[:2, 2]
+            d_value[:, number] = fall + toward * along
+            d_direction_noise[:, number] = turned * (
+                beside * along + toward * (aside @ turn[:2, 2])
+            )
+            bent = direction @ turn[:2, :2] + place * along[:, None]
+            d_direction[:, :, number] = bent - dot(bent, direction)[:, None] * direction
     d_place[:, :, 2] = place
     return Measured(
         value=np.where(
@@ -91,8 +97,13 @@ def measure_speeds(steps: Steps, candidate: Array, heading_rad: float) -> Measur
     )
 
 
-def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measured:
-    """Log heights of people, from feet to the tops of their boxes."""
+def measure_statures(
+    tops: Tops, candidate: Array, heading_rad: float, *, sloped: bool = True
+) -> Measured:
+    """Log heights of people, from feet to the tops of their boxes.
+
+    Unless it is `sloped`, the derivatives are nothing.
+    """
     height_m = float(np.exp(candidate[2]))
     rotation, turns = rotation_and_turns(candidate[0], candidate[1], heading_rad)
     place, valid = ground_of_rays(tops.foot_rays, rotation, beyond=0.0)
@@ -105,11 +116,11 @@ def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measur
     lean = tops.top_y[:, None] * rotation[2] - rotation[1]  # (M, 3)
     lever = -lean[:, 2]
     d_value = np.ones((len(ratio), 3))
-    d_place = np.empty((len(ratio), 2, 3))
-    for number, turn in enumerate(turns):
+    d_place = np.zeros((len(ratio), 2, 3))
+    for number, turn in enumerate(turns if sloped else ()):
         d_place[:, :, number], _ = ground_flow(place, turn)
         d_lean = lean @ turn
-        d_top = (d_lean * on_ground).sum(1) + (lean[:, :2] * d_place[:, :, number]).sum(1)
+        d_top = dot(d_lean, on_ground) + dot(lean[:, :2], d_place[:, :, number])
         d_value[:, number] = (d_top + ratio * d_lean[:, 2]) / lever / ratio
     d_place[:, :, 2] = place
     return Measured(
@@ -123,7 +134,3 @@ def measure_statures(tops: Tops, candidate: Array, heading_rad: float) -> Measur
         d_direction_noise=np.zeros((len(place), 3)),
         rows=tops.rows,
     )
-
-
-def _norm(vectors: Array) -> Array:
-    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))

@@ -16,6 +16,7 @@ from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.speed_reference import (
+    PLAUSIBLE_OFFSET,
     USUAL_SPEEDS_MPS,
     USUAL_STATURES_M,
     SpeedReference,
@@ -62,7 +63,6 @@ _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, n
 _DOUBT_RAD = float(np.radians(4.0))
 _DOUBT_SIGMAS = 4.0
 _FOLDS = 4
-_PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])
 # Squared errors over predicted variances: before any are seen, and what that guess weighs.
 _ASSUMED_INFLATION = 3.0
 _ASSUMED_INFLATION_WEIGHT = 6.0
@@ -129,7 +129,7 @@ def learn_speed_reference(
         observations, prior, _with_spreads(blank, site), offset, seed
     )
     # A bias is of a degree or so: what the tracks leave free is not taken for one.
-    plausible = np.diag(_PLAUSIBLE_OFFSET**2)
+    plausible = np.diag(PLAUSIBLE_OFFSET**2)
     noise = whole.covariance * inflation
     kept = plausible @ np.linalg.inv(plausible + noise)
     site = replace(

@@ -4,6 +4,7 @@ Ours: pose = estimate - offset, which is learned while the pose is known.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from models.reasons import Reason
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
 USUAL_STATURES_M = (1.4, 2.2)  # of boxes
+PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])  # of ours on a site
 _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log height
 
 
@@ -50,6 +52,16 @@ class SpeedReference:
         """How tall the boxes say that people are; None where boxes are not used."""
         return None if self.statures is None else float(np.exp(self.statures.usual))
 
+    @property
+    def information_of_a_track(self) -> Array:
+        """What one of the reference's tracks told (3, 3) of tilt, roll, log height, on average."""
+        if not self.tracks:
+            return np.zeros((3, 3))
+        # The offset's covariance is the reference's own, held by how far off we are anywhere.
+        known = np.linalg.inv(self.offset_covariance) - np.diag(PLAUSIBLE_OFFSET**-2.0)
+        sizes, axes = np.linalg.eigh((known + known.T) / 2)
+        return np.asarray((axes * np.maximum(sizes, 0.0)) @ axes.T) / self.tracks
+
 
 def channels_of(
     observations: Observations, reference: SpeedReference, prior: CameraPose
@@ -59,14 +71,14 @@ def channels_of(
     steps, tops = observations.steps, observations.tops
     found = [
         Channel(
-            measure=lambda candidate: measure_speeds(steps, candidate, heading),
+            measure=partial(measure_speeds, steps, heading_rad=heading),
             learned=reference.speeds,
         )
     ]
     if reference.statures is not None and len(tops.rows):
         found.append(
             Channel(
-                measure=lambda candidate: measure_statures(tops, candidate, heading),
+                measure=partial(measure_statures, tops, heading_rad=heading),
                 learned=reference.statures,
             )
         )

@@ -41,7 +41,7 @@ def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array
 
 
 def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Array]]:
-    measures = [channel.measure(candidate) for channel in channels]
+    measures = [channel.measure(candidate=candidate, sloped=False) for channel in channels]
     speeds = measures[0]
     if not speeds.valid.size or speeds.valid.mean() < _LEAST_VALID:
         return []

@@ -28,7 +28,7 @@ from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
 from models.recalibration import Observations, observe
 from models.simulation.knocked import knock_trajectory
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, by_end
 
 _LONGEST = 1200  # walking groups that a knock is waited for
 _DRAWS = 10
@@ -116,7 +116,7 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
         knock_trajectory(track, scene.intrinsics, scene.true_pose, moved) for track in tracks
     )
     kept = [track for track in knocked if track is not None and track.long_enough]
-    return observe(sorted(kept, key=lambda track: float(track.time_s[-1])), scene.intrinsics)
+    return observe(by_end(kept), scene.intrinsics)
 
 
 def _groups_a_track(observations: Observations, prior: CameraPose) -> float:

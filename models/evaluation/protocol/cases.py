@@ -20,7 +20,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, by_end
 
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks
 
@@ -234,8 +234,7 @@ def pose_of_plane_parameters(numbers: Array, prior: CameraPose) -> CameraPose:
 
 def _taken(tracks: Sequence[SceneTrack]) -> tuple[Trajectory, ...]:
     """What the service takes, in the order that trackers post: as the tracks end."""
-    taken = [track.trajectory for track in tracks if track.trajectory.long_enough]
-    return tuple(sorted(taken, key=lambda trajectory: float(trajectory.time_s[-1])))
+    return tuple(by_end(t.trajectory for t in tracks if t.trajectory.long_enough))
 
 
 def angle_deg(one: CameraPose, other: CameraPose) -> float:

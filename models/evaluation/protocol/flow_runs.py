@@ -8,10 +8,19 @@ from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of
 from models.evaluation.protocol.cases import Answer, nothing_identifiable
 from models.evaluation.protocol.learned import Learned
 from models.evaluation.protocol.served import served_pose
-from models.flow.fusion import elsewhere
+from models.flow.ends import elsewhere
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
-from models.flow.registration import Belief, Peak, Site, register, settled
+from models.flow.registration import (
+    Belief,
+    Peak,
+    Posterior,
+    Site,
+    curvature_of,
+    register,
+    settled,
+    shape_at,
+)
 from models.geometry.rotation import Array
 from models.recalibration import CameraSite, Observations
 
@@ -62,10 +71,11 @@ def registration(learned: Learned) -> Answer:
     belief = Belief(mean=mean, precision=_BROAD)
     peaks = _peaks(walkers, site, belief, variance_inflation)
     best = peaks[0]
-    known = reference.precision(best, walkers.people, best.candidate - mean)
-    values, covariance = settled(walkers, site, belief, best, known, reference.bias)
-    odds = np.exp([peak.value - best.value for peak in peaks])
-    covariance = covariance + elsewhere(peaks, odds)
+    shape = shape_at(walkers, site, best.candidate)
+    known = reference.precision(shape, walkers.people, best.candidate - mean)
+    values, covariance = settled(walkers, site, belief, best, shape, known, reference.bias)
+    chances = np.exp([peak.value - best.value for peak in peaks])
+    covariance = covariance + elsewhere(peaks, chances)
     sd = np.sqrt(np.diag(covariance))[:3]
     answer = replace(
         nothing_identifiable(case),
@@ -77,29 +87,25 @@ def registration(learned: Learned) -> Answer:
 
 def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
-
-    def log_posterior(candidate: Array) -> float:
-        return float(
-            site.track_log_likelihoods(walkers, candidate).sum()
-        ) / variance_inflation + belief.log_density(candidate)
-
+    posterior = Posterior(
+        walkers=walkers, site=site, belief=belief, variance_inflation=variance_inflation
+    )
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
-        number: max(log_posterior(belief.mean + node + turn) for turn in turns)
+        number: max(posterior.value(belief.mean + node + turn) for turn in turns)
         for number, node in enumerate(_NODES)
     }
     likeliest = sorted(starts, key=lambda number: -starts[number])
     peaks: list[Peak] = []
     for node in (_NODES[number] for number in likeliest[:_CLIMBED]):
         around = replace(belief, mean=belief.mean + node)
-        for peak in register(
-            walkers, site, around, variance_inflation=variance_inflation, headings=_HEADINGS
-        ):
+        for peak in register(replace(posterior, belief=around), _HEADINGS):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            posterior = peak.curvature / variance_inflation + belief.precision
-            candidate = peak.candidate - np.linalg.solve(posterior, belief.precision @ node)
+            bent = curvature_of(walkers, site, peak.candidate)
+            precision = bent / variance_inflation + belief.precision
+            candidate = peak.candidate - np.linalg.solve(precision, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
-                peaks.append(replace(peak, candidate=candidate, value=log_posterior(candidate)))
+                peaks.append(replace(peak, candidate=candidate, value=posterior.value(candidate)))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

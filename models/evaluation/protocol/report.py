@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.evaluation.protocol.cases import Outcome
-from models.geometry.rotation import Array
+from models.evaluation.slopes import slope_with_error
 
 ENOUGH_TRACKS = 70  # slopes are of scenes with so many tracks after the knock
 _ALARM_SIGMAS = 4.0
@@ -127,11 +127,11 @@ def _slopes(
 ) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
     true = np.array([outcome.true_drift for outcome in outcomes]).reshape(-1, 3)
     found = np.array([outcome.drift for outcome in outcomes]).reshape(-1, 3)
-    if len(true) < 3 or not (true.std(axis=0) > 0).all():
+    told = [slope_with_error(true[:, number], found[:, number]) for number in range(3)]
+    slopes = tuple(slope for slope, _ in told if slope is not None)
+    errors = tuple(error for _, error in told if error is not None)
+    if len(slopes) != 3 or len(errors) != 3:
         return None, None
-    slopes, errors = zip(
-        *(_slope(true[:, number], found[:, number]) for number in range(3)), strict=True
-    )
     return slopes, errors
 
 
@@ -143,15 +143,4 @@ def _heading_slope(outcomes: Sequence[Outcome]) -> tuple[float | None, float | N
             if o.heading_error_deg is not None
         ]
     ).reshape(-1, 2)
-    if len(pairs) < 3 or not pairs[:, 0].std() > 0:
-        return None, None
-    return _slope(pairs[:, 0], pairs[:, 1])
-
-
-def _slope(true: Array, found: Array) -> tuple[float, float]:
-    """Least squares' slope with an intercept, and its standard error."""
-    centred = true - true.mean()
-    power = float(centred @ centred)
-    slope = float(centred @ found) / power
-    residual = found - found.mean() - slope * centred
-    return slope, float(np.sqrt(residual @ residual / max(len(true) - 2, 1) / power))
+    return slope_with_error(pairs[:, 0], pairs[:, 1])

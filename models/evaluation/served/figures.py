@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
+from models.evaluation.slopes import slope_with_error
 from models.geometry.pose_parameters import PARAMETERS
 
 FARTHEST_SD = 5.0  # no error should be beyond it
@@ -82,7 +83,8 @@ def figures_of(outcomes: Sequence[ServedOutcome]) -> Figures:
 def _parameter(column: Sequence[ParameterOutcome], cases: int) -> ParameterFigures:
     own = [parameter for parameter in column if parameter.identifiable]
     errors = np.abs([parameter.error for parameter in own])
-    slope, slope_se = _slope(own)
+    moved = np.array([parameter.moved for parameter in own])
+    slope, slope_se = slope_with_error(moved, moved + [parameter.error for parameter in own])
     return ParameterFigures(
         identifiable=len(own) / cases,
         error=float(np.median(errors)) if own else None,
@@ -92,16 +94,3 @@ def _parameter(column: Sequence[ParameterOutcome], cases: int) -> ParameterFigur
         slope=slope,
         slope_se=slope_se,
     )
-
-
-def _slope(parameters: Sequence[ParameterOutcome]) -> tuple[float | None, float | None]:
-    """Slope of estimated against true moves, with an intercept, and its standard error."""
-    true = np.array([parameter.moved for parameter in parameters])
-    told = true + np.array([parameter.error for parameter in parameters])
-    if len(true) < 3 or not np.ptp(true) > 1e-9:
-        return None, None
-    centred = true - true.mean()
-    power = float(centred @ centred)
-    slope = float(centred @ told) / power
-    residual = told - told.mean() - slope * centred
-    return slope, float(np.sqrt(residual @ residual / max(len(true) - 2, 1) / power))

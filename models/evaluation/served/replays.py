@@ -27,6 +27,7 @@ from models.recalibration import (
     observe,
     read_alarm_chart,
 )
+from models.trajectory import by_end
 
 _YEAR_S = 365.25 * 86_400
 _MOVED_BETWEEN = (0.2, 0.8)  # of the tracks after the reference
@@ -188,4 +189,4 @@ def _start(track: SceneTrack) -> float:
 
 
 def _in_order(tracks: Sequence[SceneTrack]) -> list[Trajectory]:
-    return sorted((track.trajectory for track in tracks), key=lambda walk: float(walk.time_s[-1]))
+    return by_end(track.trajectory for track in tracks)

@@ -34,9 +34,9 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """An estimate after `tracks` tracks had come: of those from the parameter `first` on.
+    """An estimate after `tracks` tracks had come: of those from the number `first` on.
 
-    `seen` are these, and `cut` the parameter of the first track after a change that was found.
+    `seen` are these, and `cut` the number of the first track after a change that was found.
     """
 
     tracks: int

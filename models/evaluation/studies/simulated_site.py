@@ -13,7 +13,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.recalibration import CameraSite, Observations, learn_site, observe
 from models.simulation.site import Lane, SiteConfig, draw_lanes, walk_site
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, by_end
 
 # Of the reference: a site's speeds are known by then, and learning them from more is slow.
 SPEED_TRACKS = 400
@@ -109,5 +109,4 @@ def observe_feet(tracks: Sequence[Trajectory], intrinsics: Intrinsics) -> Observ
 
     Simulated boxes are truer than any detector's, and left out.
     """
-    feet = [replace(track, top_v=None) for track in tracks]
-    return observe(sorted(feet, key=lambda track: float(track.time_s[-1])), intrinsics)
+    return observe(by_end(replace(track, top_v=None) for track in tracks), intrinsics)

@@ -23,6 +23,7 @@ _ANY_WAY = 0.15  # of those at a place walk any way
 _QUANTILE = 0.002  # of the places at each side are left out of the grid
 _UNKNOWN_COST = 0.5  # of a person on ground that nobody knows, against the usual log density
 _SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins with
+_CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,40 +77,47 @@ class FlowMap:
         way = np.floor(turn).astype(np.int64)
         shares, steepness = _cubic(turn - way)
         ways = (way + np.arange(-1, 3)[:, None]) % DIRECTIONS  # (4, M)
-        value, slopes = np.zeros(len(parts)), np.zeros((len(parts), 3))
-        for corner in np.ndindex(2, 2):
-            sides = np.array(corner)
-            share = np.where(sides == 1, parts, 1 - parts)
-            nodes = self.log_density[
-                slot_idx, first[:, 0] + corner[0], first[:, 1] + corner[1], ways
-            ]
-            node = (shares * nodes).sum(axis=0)
-            value += share.prod(axis=1) * node
-            slopes[:, :2] += (2 * sides - 1) * share[:, ::-1] * node[:, None]
-            slopes[:, 2] += share.prod(axis=1) * (steepness * nodes).sum(axis=0)
-        slopes *= np.array([1 / self.cell_m, 1 / self.cell_m, DIRECTIONS / (2 * np.pi)])
-        slopes[~inside] = 0.0
-        return np.where(inside, value, self.elsewhere), slopes[:, :2], slopes[:, 2]
+        column, row = first
+        nodes = np.stack(
+            [self.log_density[slot_idx, column + i, row + j, ways] for i, j in _CORNERS]
+        )  # (corners, 4, M)
+        value, slopes = self._blended(np.einsum("kwm,wm->km", nodes, shares), parts, inside)
+        turning, _ = self._blended(np.einsum("kwm,wm->km", nodes, steepness), parts, inside)
+        return (
+            np.where(inside, value, self.elsewhere),
+            slopes,
+            turning * (DIRECTIONS / (2 * np.pi)),
+        )
 
     def look_unseen(self, place: Array) -> tuple[Array, Array]:
         """Which part (M,) of the ground at places was not seen, and its slopes (M, 2)."""
         first, parts, inside = self._cells(place)
-        value, slopes = np.zeros(len(parts)), np.zeros((len(parts), 2))
-        for corner in np.ndindex(2, 2):
-            sides = np.array(corner)
-            share = np.where(sides == 1, parts, 1 - parts)
-            node = self.unseen[first[:, 0] + corner[0], first[:, 1] + corner[1]]
-            value += share.prod(axis=1) * node
-            slopes += (2 * sides - 1) * share[:, ::-1] * node[:, None]
-        return np.where(inside, value, 0.0), np.where(inside[:, None], slopes / self.cell_m, 0.0)
+        corners = np.stack([self.unseen[first[0] + i, first[1] + j] for i, j in _CORNERS])
+        return self._blended(corners, parts, inside)
+
+    def _blended(
+        self, corners: Array, parts: Array, inside: npt.NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Values (M,) between those at a cell's corners (4, M), and slopes (M, 2) by place.
+
+        Outside of the grid both are 0.
+        """
+        x, y = parts
+        left, right = corners[1] - corners[0], corners[3] - corners[2]
+        low, high = corners[0] + left * y, corners[2] + right * y
+        across = high - low
+        value = low + across * x
+        slopes = np.stack([across, left + (right - left) * x], axis=1) / self.cell_m
+        return np.where(inside, value, 0.0), np.where(inside[:, None], slopes, 0.0)
 
     def _cells(self, place: Array) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
-        """The nodes (M, 2) before places, how far beyond (M, 2) these are, and who is inside."""
-        at = (place - self.corner) / self.cell_m
-        size = np.array(self.log_density.shape[1:3])
-        inside = np.all((at >= 0) & (at < size - 1.001), axis=1)
-        at = np.where(inside[:, None], at, 0.5)
-        first = np.floor(at).astype(np.int64)
+        """The nodes (2, M) before places, how far beyond (2, M) these are, and who is inside."""
+        at = (place.T - self.corner[:, None]) / self.cell_m
+        columns, rows = self.log_density.shape[1:3]
+        x, y = at
+        inside = (x >= 0) & (x < columns - 1.001) & (y >= 0) & (y < rows - 1.001)
+        at = np.where(inside, at, 0.5)
+        first = at.astype(np.int64)
         return first, at - first, inside
 
 

@@ -28,48 +28,56 @@ class Coverage:
     unknown: Array
     block_m: float
 
-    def seen_from(self, intrinsics: Intrinsics, candidate: Array) -> tuple[Array, float]:
-        """Shares (S,) of the people, and the unknown ones, where a camera (4,) looks."""
-        seen = in_view(intrinsics, candidate, self.places, self.block_m)
-        return self.shares @ seen, float(self.unknown @ seen)
+    def seen_from(self, intrinsics: Intrinsics, candidates: Array) -> tuple[Array, Array]:
+        """Shares (..., S) of people, and of unknown ones (...), where cameras (..., 4) look."""
+        seen = in_view(intrinsics, candidates, self.places, self.block_m)
+        return seen @ self.shares.T, seen @ self.unknown
 
 
 def known_shares(
-    coverage: Coverage, flow: FlowMap, intrinsics: Intrinsics, candidate: Array, anchor: Array
+    coverage: Coverage, flow: FlowMap, intrinsics: Intrinsics, candidates: Array, anchor: Array
 ) -> Array:
-    """Shares (S,) of people in those parts of the picture that see known ground from an anchor.
+    """Shares (..., S) of people in parts of the picture that see known ground from an anchor.
 
-    The parts of the picture stay as they are while the candidate (4,) moves: what people in them
+    These parts stay as they are while the candidates (..., 4) move: what people in them
     say must not hang on where known ground ends.
     """
-    seen = in_view(intrinsics, candidate, coverage.places, coverage.block_m)
-    rotation = rotation_from_angles(candidate[0], candidate[1], candidate[3])
-    height = np.full((len(coverage.places), 1), -np.exp(candidate[2]))
-    rays = np.concatenate([coverage.places, height], axis=1) @ rotation.T
+    rays = _rays(candidates, coverage.places)
     there = rays @ rotation_from_angles(anchor[0], anchor[1], anchor[3])
-    down = np.where(there[:, 2] < -_NEAREST_M, -there[:, 2], np.inf)
-    unseen, _ = flow.look_unseen(there[:, :2] * (np.exp(anchor[2]) / down)[:, None])
-    return np.asarray(coverage.shares @ (seen * (1 - unseen)))
+    down = np.where(there[..., 2] < -_NEAREST_M, -there[..., 2], np.inf)
+    places = there[..., :2] * (np.exp(anchor[2]) / down)[..., None]
+    unseen, _ = flow.look_unseen(places.reshape(-1, 2))
+    seen = _inside(intrinsics, rays, coverage.block_m) * (1 - unseen.reshape(down.shape))
+    return np.asarray(seen @ coverage.shares.T)
 
 
-def in_view(intrinsics: Intrinsics, candidate: Array, places: Array, size_m: float) -> Array:
-    """Which part (B,) of pieces of ground around places (B, 2) a camera (4,) sees.
+def in_view(intrinsics: Intrinsics, candidates: Array, places: Array, size_m: float) -> Array:
+    """Which part (..., B) of pieces of ground around places (B, 2) cameras (..., 4) see.
 
     A piece crosses the edge bit by bit, so that the part has slopes and no steps. Lens distortion
     is left out.
     """
-    tilt, roll, log_height, heading = candidate
-    rotation = rotation_from_angles(tilt, roll, heading)
-    height = np.full((len(places), 1), -np.exp(log_height))
-    rays = np.concatenate([places, height], axis=1) @ rotation.T
-    ahead = rays[:, 2] > _NEAREST_M
-    depth = np.where(ahead, rays[:, 2], 1.0)
-    u = intrinsics.fx * rays[:, 0] / depth + intrinsics.cx
-    v = intrinsics.fy * rays[:, 1] / depth + intrinsics.cy
-    blur = intrinsics.fx * size_m / depth
+    return _inside(intrinsics, _rays(candidates, places), size_m)
+
+
+def _rays(candidates: Array, places: Array) -> Array:
+    """Rays (..., B, 3) of cameras (..., 4) to places (B, 2)."""
+    rotations = rotation_from_angles(candidates[..., 0], candidates[..., 1], candidates[..., 3])
+    below = np.exp(candidates[..., 2])[..., None, None] * rotations[..., None, :, 2]
+    return np.asarray(places @ np.swapaxes(rotations[..., :2], -1, -2) - below)
+
+
+def _inside(intrinsics: Intrinsics, rays: Array, size_m: float) -> Array:
+    """Which part (...) of pieces of ground along rays (..., 3) is in the picture."""
+    ahead = rays[..., 2] > _NEAREST_M
+    per_depth = 1 / np.where(ahead, rays[..., 2], 1.0)
+    edge = 1 / (intrinsics.fx * size_m * per_depth)
+    u = (intrinsics.fx * rays[..., 0] * per_depth + intrinsics.cx) * edge
+    v = (intrinsics.fy * rays[..., 1] * per_depth + intrinsics.cy) * edge
     inside = ahead.astype(np.float64)
     for at, size in ((u, intrinsics.width), (v, intrinsics.height)):
-        inside *= np.clip(at / blur + 0.5, 0, 1) * np.clip((size - at) / blur + 0.5, 0, 1)
+        inside *= np.minimum(np.maximum(at + 0.5, 0), 1)
+        inside *= np.minimum(np.maximum(size * edge - at + 0.5, 0), 1)
     return inside
 
 

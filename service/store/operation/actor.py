@@ -1,4 +1,4 @@
-"""The person in whose name a session writes: what is kept of a activity says so by itself."""
+"""The person in whose name a session writes: what is kept of an act says so by itself."""
 
 from dataclasses import dataclass
 

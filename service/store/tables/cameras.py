@@ -8,6 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from service.kinds import (
     Origin,
 )
+from service.reasons import Reasons
 from service.store.tables.base import camera_key
 from service.store.tables.record import Record, one_of
 
@@ -18,7 +19,7 @@ class CameraRecord(Record):
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `estimate_lacks` names what failed beside the served estimate.
+    `estimate_after`. `lacks` says what failed beside the served estimate.
     """
 
     __tablename__ = "cameras"
@@ -43,7 +44,7 @@ class CameraRecord(Record):
     estimate_error: Mapped[str | None]
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
-    estimate_lacks: Mapped[str | None]
+    lacks: Mapped[Reasons] = mapped_column(default=())
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 

@@ -6,7 +6,9 @@ from typing import Any
 from sqlalchemy import JSON, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
+from models.reasons import Reason
 from service.kinds import DeliveryState, MessageType, WebhookFormat
+from service.reasons import Reasons
 from service.store.tables.record import Record, one_of
 
 
@@ -26,7 +28,7 @@ class WebhookRecord(Record):
     format: Mapped[WebhookFormat]
     kinds: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))  # None: all
     enabled: Mapped[bool]
-    disabled_reason: Mapped[str | None]
+    disabled_reasons: Mapped[Reasons] = mapped_column(default=())
     secret: Mapped[str | None]
     old_secret: Mapped[str | None]
     old_secret_until: Mapped[datetime | None]
@@ -40,6 +42,10 @@ class WebhookRecord(Record):
     updated_at: Mapped[datetime]
 
     __table_args__ = (one_of("format", WebhookFormat),)
+
+    def disable(self, why: Reason) -> None:
+        """Send nothing more to it, until a person enables it."""
+        self.enabled, self.disabled_reasons = False, (why,)
 
 
 class DeliveryRecord(Record):

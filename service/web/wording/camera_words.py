@@ -11,6 +11,7 @@ from models.geometry.pose_parameters import PoseParameters
 from models.quantiles import Z90
 from service.delivery.outbox import is_silenced
 from service.kinds import AlertKind, Outcome
+from service.reasons import ServiceCode
 from service.store.tables.estimates import EstimateRecord
 from service.views.camera_page import CameraPage
 from service.web.wording.moments import when
@@ -113,7 +114,11 @@ def _off_words(one: Misplacement) -> str:
 
 def flags(page: CameraPage, clock: Clock) -> tuple[str, ...]:
     """What else is to be known at a glance, of open alerts and maintenance."""
-    found = []
+    found = [
+        f"Without the {str(lack.values['part']).replace('_', ' ')}"
+        for lack in page.camera.record.lacks
+        if lack.code == ServiceCode.WITHOUT_PART
+    ]
     if page.attended is not None:
         found.append(f"Maintenance until {clock.when(page.attended.to_at)}")
     for story in page.firing:

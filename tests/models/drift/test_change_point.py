@@ -10,7 +10,8 @@ from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.reference import learn_speed_reference
 from models.evaluation.scenes import Knock
 from models.simulation.walkers import WalkConfig
-from tests.models.sites import KNOCKED, PRIOR, in_time, seen, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
 
 SLIGHT = Knock(tilt_rad=math.radians(1.5), roll_rad=0.0, log_height=0.0).apply(PRIOR)
 
@@ -24,7 +25,7 @@ def known():
 def window(*views):
     """Tracks of the site that `known` was learned on, other people."""
     _, *found = tracks_of(6, (PRIOR, 120), *views)
-    return seen(in_time(track for tracks in found for track in tracks))
+    return seen(by_end(track for tracks in found for track in tracks))
 
 
 @pytest.mark.parametrize("before", [15, 60, 100])
@@ -48,5 +49,5 @@ def test_a_still_camera_has_no_change(known, pose):
 
 def test_a_few_tracks_after_a_knock_are_too_few(known):
     tracks = window((PRIOR, 60), (KNOCKED, FEWEST_BESIDE))
-    assert find_change(of_tracks(tracks, np.arange(60 + FEWEST_BESIDE // 2)), PRIOR, known) is None
+    assert find_change(of_tracks(tracks, np.arange(60 + FEWEST_BESIDE // 4)), PRIOR, known) is None
     assert find_change(of_tracks(tracks, np.arange(2 * FEWEST_BESIDE - 1)), PRIOR, known) is None

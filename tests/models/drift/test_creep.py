@@ -17,7 +17,8 @@ from models.evaluation.scenes import Knock
 from models.packing import flattened
 from models.recalibration import begin_creep_log, learn_site, log_creep, observe, without_creep
 from models.simulation.knocked import knock_trajectory
-from tests.models.sites import LENS, PRIOR, in_time, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import LENS, PRIOR, tracks_of
 
 PERSON_SD = np.array([math.radians(5), math.radians(4), 0.2, math.radians(6), 0.2])
 MONTH_DAYS = 365.25 / 12
@@ -119,13 +120,13 @@ def test_a_turn_is_believed_once_it_is_clear_and_a_still_camera_is_left_alone():
 @pytest.fixture(scope="module")
 def first():
     (known, later) = tracks_of(3, (PRIOR, 60), (PRIOR, 80))
-    site = learn_site(observe(in_time(known), LENS), LENS, PRIOR)
-    later = in_time(later)
+    site = learn_site(observe(by_end(known), LENS), LENS, PRIOR)
+    later = by_end(later)
     spread = [
         replace(track, time_s=track.time_s + DAY_S * (number // 10))
         for number, track in enumerate(later)
     ]
-    return site, in_time(known), in_time(spread)
+    return site, by_end(known), by_end(spread)
 
 
 def test_a_log_is_the_same_however_its_days_came(first):
@@ -148,7 +149,7 @@ def test_a_turned_camera_pulls_its_log_that_way(first):
         ).apply(PRIOR)
         seen = [knock_trajectory(track, LENS, PRIOR, knocked) for track in later]
         seen = [track for track in seen if track is not None and track.long_enough]
-        log = log_creep(begin_creep_log(site, 0.0), observe(in_time(seen), LENS), site)
+        log = log_creep(begin_creep_log(site, 0.0), observe(by_end(seen), LENS), site)
         pull = log.pulls.sum(axis=0) * np.sqrt(np.diag(np.linalg.inv(log.information)))
         assert pull[number] > 0
         without = log_creep(begin_creep_log(site, 0.0), observe(later, LENS), site)

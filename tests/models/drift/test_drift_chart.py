@@ -28,6 +28,7 @@ from models.flow.folds import fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
+from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR
 
 AT = candidate_of(PRIOR)
@@ -41,8 +42,7 @@ def read_chart(chart, scores, alarms):
 
 def feet(tracks):
     """What is read of feet, in the order of the tracks' ends."""
-    tracks = sorted(tracks, key=lambda track: track.time_s[-1])
-    return observe([replace(track, top_v=None) for track in tracks], LENS)
+    return observe(by_end(replace(track, top_v=None) for track in tracks), LENS)
 
 
 @pytest.fixture(scope="module")

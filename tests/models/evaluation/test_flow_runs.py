@@ -15,7 +15,8 @@ from models.evaluation.protocol.joint_runs import joint, joint_feet
 from models.evaluation.protocol.learned import learn_case
 from models.simulation.site import SiteConfig
 from models.simulation.walkers import WalkConfig
-from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, seen, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))
 
@@ -27,8 +28,8 @@ def case_of(known, after) -> ProtocolCase:
         intrinsics=LENS,
         prior_pose=PRIOR,
         true_pose=TURNED,
-        reference=tuple(in_time(known)),
-        seen=tuple(in_time(after)),
+        reference=tuple(by_end(known)),
+        seen=tuple(by_end(after)),
     )
 
 

@@ -149,7 +149,7 @@ def test_a_turned_camera_is_told_with_its_heading(site):
     reference, speeds, after, still, _ = site
     for tracks, pose in ((after, TURNED), (still, PRIOR)):
         joint = joint_estimate(tracks, PRIOR, speeds)
-        fused = fused_estimate(tracks, LENS, PRIOR, joint, reference)
+        fused = fused_estimate(tracks, LENS, PRIOR, joint, speeds, reference)
         assert fused.registered
         assert fused.identifiable == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
@@ -163,7 +163,7 @@ def test_few_people_make_no_map_and_no_registration(site):
     (few,) = tracks_of(3, (PRIOR, 8))
     assert learn_flow(seen(few), LENS, PRIOR, 0) is None
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
-    fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, reference)
+    fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, speeds, reference)
     assert not fused.registered
     assert "heading" not in fused.identifiable
     assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])

@@ -24,6 +24,7 @@ from models.simulation.site import (
     walk_site,
 )
 from models.simulation.walkers import WalkConfig
+from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR
 
 AT = candidate_of(PRIOR)
@@ -96,7 +97,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
-    fused = fused_estimate(changed, LENS, PRIOR, joint, flow)
+    fused = fused_estimate(changed, LENS, PRIOR, joint, speeds, flow)
     assert fused.reason == Reason(code=TracksCode.PATHS_CHANGED)
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
@@ -105,11 +106,19 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
 
 def test_a_fit_is_judged_by_its_drop():
     fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
-    # t of 99 degrees at 1e-4: 3.86; times sqrt(1/25 + 1/100) = 0.2236: a drop of 0.863
-    assert not fit.has_changed(np.full(25, -1.85))
-    assert fit.has_changed(np.full(25, -1.88))
-    assert not fit.has_changed(np.full(10_000, -1.3))  # sure, but too little to matter
+    # t of 99 degrees at 1e-4: 3.86; times sqrt(1/16 + 1/100) = 0.2693: a drop of 1.039
+    assert not fit.has_changed(np.full(16, -2.03))
+    assert fit.has_changed(np.full(16, -2.05))
+    assert not fit.has_changed(np.full(10_000, -1.99))  # sure, but hours differ by as much
     assert not fit.has_changed(np.empty(0))
+
+
+def test_the_map_says_the_less_the_worse_it_fits():
+    fit = UsualFit(mean=-1.0, sd=1.0, walking_groups=100.0)
+    assert fit.variance_inflation(np.full(9, -1.35)) == pytest.approx(2.0)
+    assert fit.variance_inflation(np.full(9, -1.7)) == pytest.approx(5.0)
+    for as_well in (np.full(9, -1.0), np.full(9, -0.5), np.empty(0)):
+        assert fit.variance_inflation(as_well) == 1.0
 
 
 def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
@@ -121,7 +130,7 @@ def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
         for number, track in enumerate(walks):
             shift = hour * 3600 + number % 2 * day_s - track.time_s[0] + 20 * number
             tracks.append(replace(track, time_s=track.time_s + shift))
-    tracks.sort(key=lambda track: float(track.time_s[-1]))
+    tracks = by_end(tracks)
     reference = learn_flow(feet(tracks), LENS, PRIOR, 0)
     assert reference is not None
     assert reference.flow.slots == 4
@@ -157,7 +166,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
-    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), flow)
+    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), speeds, flow)
     assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS

@@ -1,4 +1,4 @@
-"""The numbers of a pose as API, events, messages and pages tell them, digit by digit.
+"""The numbers of a pose as API, events, messages and pages tell them, to their twelfth digit.
 
 `tests/golden/pose_parameters.json` is what was told when degrees were kept in the store; `told`
 made it, of what `lived` went through.
@@ -54,7 +54,12 @@ def told(bench):
     }
 
 
+def read(text):
+    """What is told, without the digits that a sum in another order changes."""
+    return json.loads(text, parse_float=lambda number: float(f"{float(number):.12g}"))
+
+
 def test_all_numbers_are_told_as_before(bench):
-    golden = json.loads(GOLDEN.read_text())
+    golden = read(GOLDEN.read_text())
     for when in lived(bench):
-        assert json.loads(json.dumps(told(bench))) == golden[when], when
+        assert read(json.dumps(told(bench))) == golden[when], when

@@ -40,13 +40,14 @@ def averaged_of(service):
     return service.http.get("/cameras/town-centre/pose").json()["estimates"].get("averaged")
 
 
-def test_a_replay_through_http_is_the_offline_evaluation(service):
+def test_a_replay_through_http_is_the_offline_evaluation(training_service):
+    service = training_service
+    service.start_again(epochs=2)  # after one the held-out walks are not told well enough
     scene = load_scene(SCENES / "town_centre")
-    service.start_again(epochs=3)
     output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
     assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
     served = wait_for(lambda: averaged_of(service), timeout_s=180)
-    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=3)
+    offline = run_averaged(scene, recipe_name="default", seed=0, training_speed_mps=1.4, epochs=2)
     assert served["tracks"] == offline.tracks
     assert served["height_m"] == pytest.approx(offline.height_m, abs=1e-4)
     assert served["tilt_deg"] == pytest.approx(offline.tilt_deg, abs=1e-3)
@@ -65,34 +66,27 @@ def test_every_recorded_camera_can_be_loaded():
 def test_centred_prints_a_table_and_writes_json_and_a_plot(tmp_path):
     output, plot = tmp_path / "out.json", tmp_path / "out.png"
     text = surefoot(
-        "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0,1",
+        "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "1",
         "--speeds", "1.4", "--processes", "2", "--output", str(output), "--plot", str(plot),
     )  # fmt: skip
     assert "town-centre" in text
     runs = json.loads(output.read_text())["runs"]
-    assert [run["seed"] for run in runs] == [0, 1]
+    assert [run["seed"] for run in runs] == [1]
     assert plot.stat().st_size > 5000
 
 
-def test_evaluate_knocks_scenes_and_says_how_each_estimator_did(tmp_path):
-    output = tmp_path / "out.json"
+def test_evaluate_knocks_scenes_says_how_each_estimator_did_and_draws_it(tmp_path):
+    output, plots = tmp_path / "out.json", tmp_path / "plots"
     scenes = [str(SCENES / name) for name in ("pets2009_s2l1_v001_sort", "meva_g336_school")]
     text = surefoot(
-        "evaluate", *scenes, "--seeds", "2", "--knocks", "knock,still", "--output", str(output)
-    )
+        "evaluate", *scenes, "--seeds", "1", "--knocks", "knock,still", "--output", str(output),
+        "--plots", str(plots),
+    )  # fmt: skip
     outcomes = json.loads(output.read_text())["outcomes"]
-    assert len(outcomes) == 2 * 2 * 2 * 5  # scenes, ranges, seeds, estimators
+    assert len(outcomes) == 2 * 2 * 5  # scenes, ranges, estimators
     assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
     assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
     assert "bar (or declared)" in text  # the bar stands beside the figures
-
-
-def test_evaluate_draws_each_scene_and_range(tmp_path):
-    plots = tmp_path / "plots"
-    surefoot(
-        "evaluate", str(SCENES / "meva_g336_school"), "--seeds", "1", "--knocks", "knock,still",
-        "--output", str(tmp_path / "out.json"), "--plots", str(plots),
-    )  # fmt: skip
     for name in (
         "drift-knock.png",
         "ground-meva_g336_school.png",

@@ -92,7 +92,7 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
 
 @pytest.mark.slow
 @pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}")
-@pytest.mark.parametrize("batch", [1, 12])
+@pytest.mark.parametrize("batch", [1, 50])
 def test_what_is_served_by_time_and_in_batches_is_what_windows_say_offline(service, batch):
     folder = SCENES / "pets2009_s2l1_v001_sort"
     done = subprocess.run(

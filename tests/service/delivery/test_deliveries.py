@@ -134,6 +134,7 @@ def test_an_endpoint_that_fails_for_days_is_disabled_with_its_reason(post_room, 
     shown = post_room.show(hook)
     assert shown["enabled"] is False
     assert shown["disabled_reason"].startswith("it failed for more than 72 h: answered 500")
+    assert shown["disabled_reason_code"] == "endpoint_fails"
 
 
 def test_no_transaction_is_open_while_a_request_is_under_way(post_room, inbox):

@@ -37,6 +37,9 @@ def test_a_webhook_is_made_shown_changed_and_removed(post_room, inbox):
     assert changed["disabled_reason"] == "disabled by a person"
     again = http.patch(f"/webhooks/{made['id']}", json={"kinds": None, "enabled": True}).json()
     assert (again["kinds"], again["disabled_reason"]) == (None, None)
+    assert (changed["disabled_reason_code"], again["disabled_reason_code"]) == (
+        "disabled_by_person", None
+    )  # fmt: skip
     assert http.delete(f"/webhooks/{made['id']}").status_code == 204
     problem(http.get(f"/webhooks/{made['id']}"), 404, "not_found")
 
@@ -214,7 +217,7 @@ def test_a_replay_is_the_same_message_again(post_room, inbox):
     assert first.body == second.body
     assert len(inbox.deduped()) == 1
     assert len(post_room.log(hook)[0]["attempts"]) == 2
-    post_room.change(hook, enabled=False, disabled_reason="gone")
+    post_room.change(hook, enabled=False)
     problem(post_room.http.post(f"/deliveries/{delivery['id']}/replay"), 409, "conflict")
 
 

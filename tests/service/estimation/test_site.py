@@ -185,7 +185,7 @@ def test_one_group_walking_one_way_tells_nothing(known):
     known.http.post("/cameras/corner/tracks", json={"tracks": people}).raise_for_status()
     body = known.look()
     assert (body["state"], body["estimated"]) == ("learning", [])
-    assert "walking together" in body["reason"]
+    assert "of 1 walking group, at least" in body["reason"]
     assert served(body) == pytest.approx(numbers(PRIOR))
     assert "joint" in body["estimates"]
     assert known.alerts() == []

@@ -14,6 +14,11 @@ pytestmark = pytest.mark.slow
 FLOODED = [f"flooded-{n}" for n in range(6)]
 
 
+@pytest.fixture
+def service(training_service):
+    return training_service
+
+
 def post(http, camera_id, first, count):
     start_s = time.time() - 6000
     tracks = [track(str(n), start_s=start_s + n) for n in range(first, first + count)]

@@ -122,6 +122,12 @@ SAID = [
      "its tracks cannot be looked at: 3 tries failed in a row, the last with KeyError('x')"),
     (S.TRACKS_WAIT, {"waits_s": 1230.0, "limit_s": 900.0},
      "its tracks have waited for 20 min; up to 15 min are waited for"),
+    (S.DISABLED_BY_PERSON, {}, "disabled by a person"),
+    (S.ENDPOINT_GONE, {}, "it answered 410: it is gone for good"),
+    (S.ENDPOINT_FAILS, {"patience_s": 259200.0, "error": "answered 500"},
+     "it failed for more than 72 h: answered 500"),
+    (S.SECRET_LOST, {},
+     "its secret was lost with the key: fetch a new one, tell the receiver, enable it"),
 ]  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def site(truth, valid=lambda candidate: True, tracks=TRACKS):
     )
     side = rows.owner_idx % 3 - 1.0
 
-    def measure(candidate):
+    def measure(*, candidate, sloped):
         apart = np.hypot(*(candidate - truth)[:2])
         seen = np.full(count, bool(valid(candidate)))
         value = USUAL + candidate[2] - truth[2] + 3 * apart * side

@@ -14,7 +14,8 @@ from models.evaluation.served.replays import ReplayPlan, replay
 from models.evaluation.served.windows import Window, looks
 from models.recalibration import CameraSite, DriftLimits, Trajectory, learn_site, observe
 from models.simulation.site import SiteConfig
-from tests.models.sites import KNOCKED, LENS, PRIOR, in_time, tracks_of
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 
 pytestmark = pytest.mark.slow
 CONFIG = SiteConfig(between_sd=0.15, standing_share=0.05)
@@ -24,7 +25,7 @@ CONFIG = SiteConfig(between_sd=0.15, standing_share=0.05)
 def walked() -> list[list[Trajectory]]:
     """Tracks of the reference, of the same pose after it, and after a knock."""
     parts = tracks_of(3, (PRIOR, 150), (PRIOR, 80), (KNOCKED, 80), config=CONFIG)
-    return [in_time(part) for part in parts]
+    return [by_end(part) for part in parts]
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import sqlalchemy as sa
 from alembic import op
 
-revision = "2026_11_27_anchors"
-down_revision = "2026_11_26_stored_models"
+revision = "2026_11_28_anchors"
+down_revision = "2026_11_27_reasons_of_lacks"
 branch_labels = None
 depends_on = None
 

@@ -1,0 +1,146 @@
+"""Where speeds and places together lead from several starts, and how sure that makes of a pose."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.estimation.joint.estimate import JointEstimate, joint_near
+from models.estimation.joint.observations import Observations
+from models.estimation.joint.speed_reference import SpeedReference
+from models.flow.likelihood import Walkers
+from models.flow.path_test import loss
+from models.flow.registration import Belief, Peak, Posterior, Site, distinct, register
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+
+HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
+REACH_RAD = math.radians(30.0)  # of the headings that are tried, both ways
+_HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
+_ROUNDS = 2  # in which the speeds are asked again
+_UNLIKELY = 12.0  # of the log posterior, for the speeds to be asked no more
+_SHARED = 3  # parameters that speeds and places both determine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class End:
+    """A peak, with the posterior that it is one of.
+
+    `score` is how much better the speeds are explained with its heading than with the prior
+    pose's; it is part of the peak's value.
+    """
+
+    peak: Peak
+    posterior: Posterior
+    score: float
+
+    @property
+    def belief(self) -> Belief:
+        """What was believed where it was climbed."""
+        return self.posterior.belief
+
+    @property
+    def candidate(self) -> Array:
+        """Tilt, roll, log height, heading (4,)."""
+        return self.peak.candidate
+
+    @property
+    def believed(self) -> float:
+        """The part of its value that is not by places."""
+        return self.belief.log_density(self.candidate) + self.score
+
+
+def ends_of(
+    walkers: Walkers,
+    site: Site,
+    variance_inflation: float,
+    joint: JointEstimate,
+    observations: Observations,
+    prior: CameraPose,
+    speed_reference: SpeedReference,
+) -> list[End]:
+    """The ends of climbs from several headings, and poses by speeds; the likeliest first.
+
+    Args:
+        walkers: who is asked where they walk.
+        site: the map of that.
+        variance_inflation: what the map's part is divided by.
+        joint: what the speeds say, the heading taken for the prior pose's.
+        observations: of all tracks, for the speeds to be asked again.
+        prior: where the camera was.
+        speed_reference: how people walk at the site.
+    """
+    first = Posterior(
+        walkers=walkers,
+        site=site,
+        belief=_belief(joint, prior),
+        variance_inflation=variance_inflation,
+    )
+    peaks = register(first, _HEADINGS)
+    begin = [(peak, peak.value > peaks[0].value - _UNLIKELY) for peak in peaks]
+    for other in joint.others:
+        candidate = np.append(other, peaks[0].candidate[3])
+        begin.append((Peak(candidate=candidate, value=first.value(candidate)), True))
+    ends = []
+    for start, likely in begin:
+        peak, posterior, score = start, first, 0.0
+        for _ in range(_ROUNDS if likely else 0):
+            near = joint_near(observations, prior, speed_reference, peak.candidate)
+            posterior = replace(first, belief=_belief(near, prior))
+            score = near.score - joint.score
+            peak = posterior.climbed(peak.candidate)
+        peak = replace(peak, value=peak.value + score)
+        ends.append(End(peak=peak, posterior=posterior, score=score))
+    kept = distinct([end.peak for end in ends])
+    return [next(end for end in ends if end.peak is peak) for peak in kept]
+
+
+def _belief(joint: JointEstimate, prior: CameraPose) -> Belief:
+    """What the speeds say, and that knocks turn a camera by so much."""
+    precision = np.zeros((4, 4))
+    precision[:3, :3] = np.linalg.inv(joint.covariance)
+    precision[3, 3] = HEADING_SD**-2.0
+    return Belief(mean=np.append(joint.values, prior.heading_rad), precision=precision)
+
+
+def apart(belief: Belief, known: Array, values: Array) -> float:
+    """How much farther speeds and places are apart than their covariances say: 1 or more.
+
+    Neither is trusted over the other: both are then less sure than they say.
+
+    Source: Birge 1932, the ratio of external to internal consistency.
+    """
+    pull = belief.precision @ (values - belief.mean)
+    squared = pull @ np.linalg.solve(belief.precision, pull) + pull @ np.linalg.solve(known, pull)
+    return max(1.0, float(squared) / _SHARED)
+
+
+def odds_of(walkers: Walkers, site: Site, ends: list[End]) -> Array:
+    """How likely each end is against the first, by all it says or by known ground alone."""
+    best = ends[0]
+    odds = [1.0]
+    for end in ends[1:]:
+        worse = max(loss(walkers, site, best.candidate, end.candidate), 0.0)
+        by_known = math.exp(-0.5 * worse**2 + min(end.believed - best.believed, 0.0))
+        odds.append(max(math.exp(end.peak.value - best.peak.value), by_known))
+    return np.array(odds)
+
+
+def elsewhere(peaks: list[Peak], odds: Array) -> Array:
+    """What other peaks add to the covariance (4, 4), each by its odds (P,); the first is best."""
+    away = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
+    return np.asarray((away * (odds / odds.sum())[:, None]).T @ away)
+
+
+def flatter(best: End, covariance: Array) -> Array:
+    """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
+
+    Looked at along the heading, the other parameters following as they do around the peak.
+    """
+    line = covariance[:, 3] / covariance[3, 3]
+    sd = math.sqrt(covariance[3, 3])
+    turns = sd * np.linspace(-4, 4, 17)
+    values = np.array([best.posterior.value(best.candidate + turn * line) for turn in turns])
+    density = np.exp(values - values.max())
+    variance = float(density @ turns**2 / density.sum())
+    return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))
