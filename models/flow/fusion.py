@@ -10,7 +10,7 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.joint.speed_reference import PLAUSIBLE_OFFSET, SpeedReference
 from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
 from models.flow.ends import (
     HEADING_SD,
@@ -30,11 +30,13 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import Array
+from models.quantiles import chi_squared_above
 from models.reasons import Reason, TracksCode
 
 _FEWEST_GROUPS = 5
 _EDGE_RAD = math.radians(2.0)
 _FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
+_BY_CHANCE = 0.01  # tilt and roll of a camera that stands are so far off in so many cases
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 
 
@@ -110,6 +112,9 @@ def fused_estimate(
     move = best.candidate - candidate_of(prior)
     fits = group_fits(walkers, site, best.candidate)
     if reference.fit.has_changed(fits):
+        stood = group_fits(walkers, site, candidate_of(prior))
+        if not reference.fit.has_changed(stood) and _same_angles(joint, prior):
+            return by_speeds_alone(joint, prior)  # only times have changed: a clock
         return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
     known = reference.precision(shape, walkers.people, move)
     known = known / reference.fit.variance_inflation(fits)
@@ -151,14 +156,21 @@ def fused_estimate(
 def by_speeds_alone(
     joint: JointEstimate, prior: CameraPose, reason: Reason | None = None
 ) -> FusedEstimate:
-    """The joint estimate with the prior's heading, which speeds leave open."""
+    """The joint estimate with the prior's heading, which speeds leave open.
+
+    Where people were held against a map and do not fit it, as the `reason` says, they are not the
+    reference's people: how fast these walk where is known no better than at any other site.
+    """
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = joint.covariance
+    if reason is not None:
+        covariance[:3, :3] += np.diag(PLAUSIBLE_OFFSET**2)
     covariance[3, 3] = HEADING_SD**2
+    known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return FusedEstimate(
         values=np.append(joint.values, prior.heading_rad),
         covariance=covariance,
-        identifiable=joint.identifiable,
+        identifiable=tuple(name for name in joint.identifiable if name in known),
         reason=reason,
     )
 
@@ -177,6 +189,13 @@ def _reason(
 def _out_of_reach(values: Array, prior: CameraPose) -> bool:
     """Whether a heading is at the edge of those that were tried: beyond may be a better one."""
     return abs(float(values[3]) - prior.heading_rad) > REACH_RAD - _EDGE_RAD
+
+
+def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
+    """Whether speeds tell no turn in tilt or roll, whatever they say of the scale."""
+    turn = joint.values[:2] - candidate_of(prior)[:2]
+    squared = float(turn @ np.linalg.solve(joint.covariance[:2, :2], turn))
+    return squared < chi_squared_above(_BY_CHANCE, 2)
 
 
 def _unrepeated(posterior: Posterior, values: Array, covariance: Array) -> Array:

@@ -32,4 +32,6 @@ def knock_trajectory(
             intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
         )
         top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
-    return replace(trajectory, uv=uv, top_v=top_v).part(longest)
+        top_v = top_v[longest]
+    # What is behind the camera now has no pixels.
+    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v)

@@ -19,7 +19,7 @@ from models.reasons import Reason
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
 USUAL_STATURES_M = (1.4, 2.2)  # of boxes
-PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])  # of ours on a site
+PLAUSIBLE_OFFSET = np.array([np.radians(1.0), np.radians(1.0), 0.1])  # of ours on most sites
 _PRIOR_SD = np.array([np.radians(10), np.radians(10), 0.3])  # tilt, roll, log height
 
 
@@ -57,8 +57,10 @@ class SpeedReference:
         """What one of the reference's tracks told (3, 3) of tilt, roll, log height, on average."""
         if not self.tracks:
             return np.zeros((3, 3))
-        # The offset's covariance is the reference's own, held by how far off we are anywhere.
-        known = np.linalg.inv(self.offset_covariance) - np.diag(PLAUSIBLE_OFFSET**-2.0)
+        # The offset's covariance is the reference's own, held by how far off we may be here: what
+        # is left of a large offset is somewhat less than what held it.
+        held = np.maximum(PLAUSIBLE_OFFSET, np.abs(self.offset))
+        known = np.linalg.inv(self.offset_covariance) - np.diag(held**-2.0)
         sizes, axes = np.linalg.eigh((known + known.T) / 2)
         return np.asarray((axes * np.maximum(sizes, 0.0)) @ axes.T) / self.tracks
 

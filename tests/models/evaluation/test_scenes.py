@@ -10,6 +10,7 @@ from models.errors import ShapeError
 from models.evaluation.scenes import Knock, load_scene
 from models.evaluation.studies import centred_run
 from models.evaluation.studies.centred_run import run_averaged
+from models.geometry.ground import pixel_from_ground
 from models.simulation.knocked import knock_trajectory
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
@@ -104,6 +105,26 @@ def test_only_the_longest_run_inside_the_image_is_seen(lens, pose):
     assert seen.time_s.tolist() == [5, 6, 7, 8, 9]
     sky = replace(pose, tilt_rad=-1.0)
     assert knock_trajectory(track, lens, pose, sky) is None
+
+
+def test_who_walks_behind_a_camera_that_was_turned_is_seen_before(lens, pose):
+    # Across the view from 30 m to its right on: turned by 80 deg, the last of them are behind it.
+    ahead_m, right_m = 12.0, np.linspace(30.0, -30.0, 21)
+    world = pose.centre_m[:2] + np.stack(
+        [
+            ahead_m * math.sin(pose.heading_rad) + right_m * math.cos(pose.heading_rad),
+            ahead_m * math.cos(pose.heading_rad) - right_m * math.sin(pose.heading_rad),
+        ],
+        axis=1,
+    )
+    uv, before = pixel_from_ground(lens, pose.rotation, pose.centre_m, world)
+    turned = replace(pose, heading_rad=pose.heading_rad + math.radians(80))
+    _, after = pixel_from_ground(lens, turned.rotation, turned.centre_m, world)
+    assert before.all()
+    assert not after.all()
+    track = Trajectory(time_s=np.arange(21.0), uv=uv)
+    seen = knock_trajectory(track, lens, pose, turned)
+    assert 2 <= seen.time_s.size < after.sum()
 
 
 def test_an_evaluation_reports_its_errors(tmp_path, lens, pose, monkeypatch):

@@ -102,6 +102,22 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
     assert fused.values[3] == PRIOR.heading_rad
+    # They are others than the reference's: a site's usual bias, 1 deg and 10 %, is not known.
+    wider = np.diag(fused.covariance)[:3] - np.diag(joint.covariance)
+    np.testing.assert_allclose(np.sqrt(wider), [math.radians(1), math.radians(1), 0.1])
+
+
+def test_times_that_are_wrong_change_no_paths(lanes, known, flow):
+    speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
+    slow = [
+        replace(track, time_s=1.5 * track.time_s)
+        for track in walk_site(LENS, PRIOR, lanes, CONFIG, 120, np.random.default_rng(12))
+    ]
+    joint = joint_estimate(feet(slow), PRIOR, speeds)
+    fused = fused_estimate(feet(slow), LENS, PRIOR, joint, speeds, flow)
+    assert joint.values[2] == pytest.approx(math.log(1.5 * PRIOR.height_m), abs=0.15)
+    assert fused.reason is None
+    np.testing.assert_allclose(fused.covariance[:3, :3], joint.covariance)
 
 
 def test_a_fit_is_judged_by_its_drop():

@@ -209,6 +209,7 @@ def test_a_wrong_frame_rate_is_named(known):
     (alert,) = known.alerts(state="firing")
     assert alert["kind"] == "clock"
     assert "frames a second were taken for 25" in alert["reason"]
+    assert "paths have changed" not in body["reason"]
     assert alert["drift"]["height_m"] == pytest.approx(0.5 * 6, rel=0.25)
 
 

@@ -10,7 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
-from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
+from models.estimation.joint.reference import (
+    assumed_speed_reference,
+    learn_speed_reference,
+    shrink_offset,
+)
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
@@ -63,6 +67,35 @@ def test_the_reference_knows_its_site(site):
     assert 1 <= reference.pose_variance_inflation < 4
     assert reference.doubt is None
     assert np.abs(reference.offset[:2]).max() < math.radians(0.3)
+
+
+def test_an_offset_beyond_doubt_is_taken_off_almost_whole():
+    # A degree of noise: of a tenth of a degree half is kept, 1 / (1 + 1); of 6.5 deg, as at a
+    # corridor, (42.25 - 1) / 42.25, for it says itself how large offsets are there.
+    offset, noise = (
+        np.array([math.radians(0.1), math.radians(-6.5), 0.3]),
+        np.square([math.radians(1), math.radians(1), 0.1]),
+    )
+    kept, covariance = shrink_offset(offset, np.diag(noise))
+    assert_allclose(np.degrees(kept[:2]), [0.05, -6.5 * 41.25 / 42.25])
+    assert kept[2] == pytest.approx(0.3 * 8 / 9)
+    assert_allclose(np.diag(covariance) / noise, [1 / 2, 41.25 / 42.25, 8 / 9])
+    assert_array_equal(shrink_offset(np.zeros(3), np.diag(noise))[0], 0)
+
+
+def test_times_that_differ_make_an_estimate_less_sure():
+    """The same people, by turns and as two crowds: in the second half those far away hurry."""
+    (tracks,) = tracks_of(5, (PRIOR, 120))
+    away = np.array([track.uv[:, 1].mean() for track in tracks])
+    hurried = [
+        replace(track, time_s=track.time_s[0] + (track.time_s - track.time_s[0]) / 1.25)
+        if late and place < np.median(away)
+        else track
+        for late, track, place in zip(np.arange(120) % 2 == 1, tracks, away, strict=True)
+    ]
+    by_turns = learn_speed_reference(seen(hurried), PRIOR, WalkConfig(), 0)
+    crowds = learn_speed_reference(seen(hurried[::2] + hurried[1::2]), PRIOR, WalkConfig(), 0)
+    assert crowds.pose_variance_inflation > 1.3 * by_turns.pose_variance_inflation
 
 
 def test_a_reference_says_the_same_after_storage(site):
