@@ -25,6 +25,7 @@ class TracksCode(StrEnum):
     BEYOND_LIMITS_LAST_IDENTIFIABLE = "beyond_limits_last_told"
     WITHIN_LIMITS = "within_limits"
     CHART = "chart"
+    CREPT = "crept"
     SCALE_CHANGED = "scale_changed"
     PATHS_CHANGED = "paths_changed"
     HEADING_AMBIGUOUS = "heading_ambiguous"
@@ -34,4 +35,4 @@ class TracksCode(StrEnum):
     SPEED_UNUSUAL = "speed_unusual"
     STATURE_UNUSUAL = "stature_unusual"
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"
-    NOT_ALL_WALKERS = "not_all_walkers"
+    PIECES = "pieces"

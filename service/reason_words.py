@@ -89,6 +89,15 @@ def _chart(v: _Values) -> str:
     )
 
 
+def _crept(v: _Values) -> str:
+    by, sd = math.degrees(v["by_rad"]), math.degrees(v["sd_rad"])
+    return (
+        f"has crept by {by:+.1f} deg (sd {sd:.1f}) in {v['number']} since "
+        f"{datetime.fromisoformat(v['since']):%Y-%m-%d}, by the first map and speeds of its "
+        f"reference (creep: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
+    )
+
+
 def _scale_changed(v: _Values) -> str:
     factor, rate_hz = v["factor"], v["rate_hz"]
     return (
@@ -153,15 +162,6 @@ def _prior_doubted(v: _Values) -> str:
     return (
         f"the reference tracks put the camera {tilt:+.1f} deg in tilt and {roll:+.1f} deg in "
         "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
-    )
-
-
-def _not_all_walkers(v: _Values) -> str:
-    kinds = {"walker": "walk", "standing": "stand", "wheels": "ride", "other": "are unclear"}
-    said = ", ".join(f"{v[kind]:g} {does}" for kind, does in kinds.items() if v[kind])
-    return (
-        f"of {v['tracks']:g} tracks {v['linked']:g} go on another's walk; of the rest {said}: "
-        "who rides or is unclear has no say"
     )
 
 
@@ -250,6 +250,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ),
     TracksCode.WITHIN_LIMITS: lambda v: f"{_numbers(v)}: not beyond {_limit(v)}",
     TracksCode.CHART: _chart,
+    TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
     TracksCode.PATHS_CHANGED: lambda v: "the paths have changed: the flow map is left out",
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
@@ -259,7 +260,10 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.SPEED_UNUSUAL: _speed,
     TracksCode.STATURE_UNUSUAL: _stature,
     TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,
-    TracksCode.NOT_ALL_WALKERS: _not_all_walkers,
+    TracksCode.PIECES: lambda v: (
+        f"{v['pieces']:g} of {v['tracks']:g} tracks are pieces of others' walks: the tracker loses "
+        "people, each of whom counts once"
+    ),
     ServiceCode.AS_SAID: lambda v: str(v["text"]),
     ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: f"{v['tracks']} of {v['wanted']} reference tracks",

@@ -33,6 +33,7 @@ CALLED = {
     "site_references": {"id": 1, "origin": "registered", "wanted": 50, "tracks": 1,
                         "from_s": NOW_S - 50, "doubt": "", "data": None, "ready_at": None},
     "flow_maps": {"reference_id": 1, "data": None, "chart": None},
+    "anchors": {"reference_id": 1, "creep": None},
     "tracks": {"id": 1, "source": "s", "track_id": "17", "started_s": NOW_S, "ended_s": NOW_S + 8,
                "points": b"".join(struct.pack("<3d", NOW_S + 0.4 * n, 300 + 12 * n, 400 + 5 * n)
                                   for n in range(20))},

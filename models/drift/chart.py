@@ -28,7 +28,7 @@ CLOCK = 4  # beside the four of a pose: times that are too long
 HABITS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
 RUN = 1000  # walking groups; levels are of so many in a row
 # The reference's noise counts for so much: whoever walks by on other days is another sample, too.
-_OTHER_PEOPLE = 1.5
+OTHER_PEOPLE = 1.5
 _STRONGEST = 2.0  # times a knock of the grid, that it stands for
 _SUSPICION = 100.0  # times as many alarms
 _LEAST_LEVEL = 5.4  # of a run of endless normal walking groups that is wrong once in e runs
@@ -200,11 +200,11 @@ class Trace:
 
 def ratios_of(chart: DriftChart) -> Ratios:
     """The weights of a chart for each number of newest walking groups."""
-    slopes = np.stack([_slope(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
+    slopes = np.stack([slope_of(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
     habits = (slopes * HABITS) @ (slopes * HABITS).T
     weights, strengths = [], []
     for length in LENGTHS:
-        noise = chart.covariance * (1 / length + _OTHER_PEOPLE / chart.walking_groups) + habits
+        noise = chart.covariance * (1 / length + OTHER_PEOPLE / chart.walking_groups) + habits
         weights.append(np.linalg.solve(noise, chart.responses))
         strengths.append(np.einsum("fk,fk->k", chart.responses, weights[-1]))
     return Ratios(weights=np.array(weights), strengths=np.maximum(strengths, 1e-12))
@@ -252,7 +252,7 @@ def _ratio(shown: Array, strengths: Array) -> Array:
     return np.asarray(times * shown - times**2 * strengths / 2)
 
 
-def _slope(chart: DriftChart, parameter: int) -> Array:
+def slope_of(chart: DriftChart, parameter: int) -> Array:
     """The response (14,) to a unit of a parameter, by its smallest knocks both ways."""
     size = _SIZES[parameter][0]
     on, back = (KNOCKS.index(Knocked(parameter=parameter, size=sign * size)) for sign in (1, -1))

@@ -1,6 +1,10 @@
 """What a verdict and a chart give as their reason: codes and values."""
 
+from datetime import UTC, datetime
+
 from models.drift.chart import CLOCK, Reading
+from models.drift.creep import Creep
+from models.drift.creep_log import DAY_S
 from models.drift.verdict import Drift, DriftLimits, DriftVerdict
 from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode, Value
@@ -46,3 +50,21 @@ def reason_of_reading(reading: Reading) -> Reason | None:
         "level": reading.level,
     }
     return Reason(code=TracksCode.CHART, values=values)
+
+
+def reason_of_creep(creep: Creep) -> Reason | None:
+    """Which way a camera has crept, how far and since when; None where it has not.
+
+    `since` is a time, as of `datetime.isoformat`.
+    """
+    if not creep.moved:
+        return None
+    values: dict[str, Value] = {
+        "number": PARAMETERS[creep.parameter],
+        "by_rad": creep.by,
+        "sd_rad": creep.sd,
+        "since": datetime.fromtimestamp(creep.since_day * DAY_S, UTC).isoformat(),
+        "statistic": creep.statistic,
+        "level": creep.level,
+    }
+    return Reason(code=TracksCode.CREPT, values=values)

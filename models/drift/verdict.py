@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from models.drift.chart import Reading
+from models.drift.creep import Creep
 from models.estimation.parameters import ANGLES
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS, PoseParameters
@@ -130,16 +131,18 @@ def judge(
     drifted: tuple[str, ...],
     reading: Reading | None = None,
     earlier: Drift | None = None,
+    creep: Creep | None = None,
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
-    Drifting begins at once where the chart is beyond its level, and where an identifiable parameter
-    is beyond its limit, by the window and by the same without its newest `people`: one outlier
-    does not do it, and it matters not how many jobs have looked meanwhile. The chart's level is of
-    a rate of false alarms already, and far moves, which the chart is not made for, are seen in the
-    pose. It ends where both, and the chart, are below `clear_ratio`. A parameter that is not
-    identifiable is never beyond, and its drift does not end until it is identifiable again or the
-    chart, which asks for all four, is calm. Where nothing is identifiable, nothing changes.
+    Drifting begins at once where the chart or the creep is beyond its level, and where an
+    identifiable parameter is beyond its limit, by the window and by the same without its newest
+    `people`: one outlier does not do it, and it matters not how many jobs have looked meanwhile.
+    The chart's level is of a rate of false alarms already, and far moves, which the chart is not
+    made for, are seen in the pose. It ends where both, the chart and the creep are below
+    `clear_ratio`. A parameter that is not identifiable is never beyond, and its drift does not end
+    until it is identifiable again or the chart, which asks for all four, is calm. Where nothing is
+    identifiable, nothing changes.
 
     Args:
         drift: of the window.
@@ -148,14 +151,16 @@ def judge(
         reading: of the chart, where there is one.
         earlier: of the window without its newest people; None where too few are left, or nobody
             has asked (`asks_again`).
+        creep: of the weeks up to now, where there is an anchor.
     """
     ratios = _ratios(drift, limits)
-    if not ratios and reading is None:
+    crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
+    if not ratios and reading is None and not crept:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     excess = max(ratios.values(), default=0.0)
     beyond = _beyond(drift, limits)
-    charted = (_CHARTED[reading.parameter],) if reading is not None and reading.moved else ()
-    calm = reading is None or reading.excess < limits.clear_ratio
+    charted = (_CHARTED[reading.parameter],) if reading is not None and reading.moved else crept
+    calm = all(said is None or said.excess < limits.clear_ratio for said in (reading, creep))
     well = calm and _is_well(drift, limits, drifted, reading)
     streak = 1 if beyond or charted else -1 if well else 0
     if drifted:

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import CalibrationError, ShapeError
-from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.upright import statures, tops_of_boxes, tops_seen
+from models.geometry.upright import tops_of_boxes
 from models.trajectory import Trajectory
 
 # How WILDTRACK's notes say that a track's number is a person's and a running one.
@@ -110,32 +109,6 @@ def load_scene(folder: Path) -> Scene:
         raise
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise ShapeError(f"scene {folder}: camera.json or tracks.csv: {error!r}") from error
-
-
-def knock_trajectory(
-    trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, knocked: CameraPose
-) -> Trajectory | None:
-    """What the camera sees of the same people after a move; the longest run inside the image.
-
-    None where fewer than two points stay in the picture. Exact for the feet, which lie on the
-    ground; the boxes' upper edges are those of upright people of the same height.
-    """
-    ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, trajectory.uv)
-    uv, _ = pixel_from_ground(intrinsics, knocked.rotation, knocked.centre_m, ground)
-    seen = on_ground & intrinsics.contains(uv)
-    runs = np.split(np.arange(seen.size), np.flatnonzero(np.diff(seen)) + 1)
-    longest = max((run for run in runs if seen[run[0]]), key=len, default=np.arange(0))
-    if longest.size < 2:
-        return None
-    top_v = None
-    if trajectory.top_v is not None:
-        tall, _ = statures(
-            intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
-        )
-        top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
-        top_v = top_v[longest]
-    # What is behind the camera now has no pixels.
-    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v)
 
 
 def _tops(path: Path, intrinsics: Intrinsics) -> dict[tuple[str, str], float]:

@@ -1,1 +1,1 @@
-"""Who is behind the tracks: pieces of one walk put together, and which of them are walkers."""
+"""Who is behind the tracks: the pieces of one walk are put together."""

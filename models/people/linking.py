@@ -1,8 +1,9 @@
 """Which tracks are pieces of one walk: a tracker that loses people gives them new names.
 
-Tracklet association: a piece follows another where it begins shortly after the other's end, at the
-place where that one was bound for, as fast and as tall. What is allowed is told in the walkers' own
-speed and in pixels of noise, so that it holds at a pose that is some way off, too.
+Tracklet association (Huang, Wu and Nevatia 2008) on the ground: a piece follows another where it
+begins shortly after the other's end, at the place where that one was bound for, as fast and as
+tall. What is allowed is told in the walkers' own speed and in pixels of noise, so that it holds at
+a pose that is some way off, too.
 """
 
 from collections.abc import Sequence

@@ -4,18 +4,19 @@ All that these three take and give can be imported from here.
 """
 
 from models.drift.chart import Reading
+from models.drift.creep import Creep, read_creep
+from models.drift.creep_log import CreepLog
 from models.drift.verdict import Drift, DriftLimits
 from models.estimation.joint.observations import Observations
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.people.kinds import Kind
 from models.people.linking import count_walks
-from models.people.people import People, Seen, see_people
+from models.people.walks import Walks, observe, observe_walks
 from models.recalibration.alarms import AlarmRate, read_alarm_chart
+from models.recalibration.anchoring import begin_creep_log, log_creep, without_creep
 from models.recalibration.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
 from models.recalibration.lacks import Lack
 from models.recalibration.learning import assume_site, learn_site
-from models.recalibration.observing import observe
 from models.recalibration.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
@@ -24,25 +25,29 @@ __all__ = [
     "AlarmRate",
     "CameraPose",
     "CameraSite",
+    "Creep",
+    "CreepLog",
     "Drift",
     "DriftLimits",
     "Intrinsics",
-    "Kind",
     "Lack",
     "Observations",
-    "People",
     "PoseFinding",
     "Reading",
     "SecondLook",
-    "Seen",
     "Trajectory",
     "WalkConfig",
+    "Walks",
     "assume_site",
+    "begin_creep_log",
     "count_walks",
     "drift_of",
     "estimate_pose",
     "learn_site",
+    "log_creep",
     "observe",
+    "observe_walks",
     "read_alarm_chart",
-    "see_people",
+    "read_creep",
+    "without_creep",
 ]

@@ -1,4 +1,4 @@
-"""Commands of the studies: evaluate, protocol, flow-study, alarm-study, centred."""
+"""Commands of the studies: evaluate, protocol, flow-study, alarm-study, creep-study, centred."""
 
 from pathlib import Path
 from typing import Annotated
@@ -134,6 +134,34 @@ def alarm_study(
     run_alarm_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
 
 
+def creep_study(
+    sites: Annotated[int, typer.Option(min=1, help="How many simulated cameras.")] = 20,
+    still_days: Annotated[
+        int, typer.Option(min=0, help="How long each stands, beside its creeps; 0: not at all.")
+    ] = 730,
+    tracks_a_day: Annotated[float, typer.Option(min=1, help="People it sees.")] = 18.0,
+    reference_tracks: Annotated[int, typer.Option(min=20, help="Of its reference.")] = 200,
+    alarms_a_year: Annotated[
+        float, typer.Option(min=0.001, help="False ones allowed, of which a tenth may be these.")
+    ] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
+    processes: Annotated[int, typer.Option(min=1, help="Cameras at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("creep-study.json"),
+) -> None:
+    """Simulated cameras that creep in tilt, roll or heading, or stand: when the anchor tells it."""
+    from models.evaluation.alarms.creep_years import CreepPlan
+    from service.studies.creep import run_creep_study
+
+    plan = CreepPlan(
+        tracks_a_day=tracks_a_day,
+        reference_tracks=reference_tracks,
+        alarms_a_year=alarms_a_year,
+        days=730,
+        still_days=still_days,
+    )
+    run_creep_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
+
+
 def centred(
     scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
     recipe: Annotated[str, typer.Option(help="Recipe: default or paper.")] = "default",
@@ -159,4 +187,4 @@ def centred(
     )
 
 
-STUDIES = (evaluate, protocol, flow_study, alarm_study, centred)
+STUDIES = (evaluate, protocol, flow_study, alarm_study, creep_study, centred)

@@ -7,7 +7,8 @@ from sqlalchemy.orm import Session
 
 from models.drift.chart import CLOCK
 from models.drift.clock import clock_fault, may_be_clock
-from models.drift.said import reason_of_drift, reason_of_reading
+from models.drift.creep_log import DAY_S
+from models.drift.said import reason_of_creep, reason_of_drift, reason_of_reading
 from models.drift.verdict import (
     Drift,
     DriftVerdict,
@@ -16,11 +17,11 @@ from models.drift.verdict import (
 )
 from models.estimation.parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
-from models.people.said import reason_of_people
 from models.reasons import Reason
 from models.recalibration import drift_of
 from service.alerting.alerts import end_alert, fired_by_estimate, open_alert
-from service.estimation.evidence import Evidence, Finding
+from service.estimation.evidence import Evidence
+from service.estimation.finding import Finding
 from service.estimation.limits import drift_limits
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
@@ -107,7 +108,8 @@ def _judge(
     if reading is not None and clock is None and not drifted and may_be_clock(reading):
         reading = None
     earlier = None if finding.earlier is None else drift_of(finding.earlier, evidence.prior)
-    verdict = judge(drift, limits, drifted, reading, earlier)
+    creep = finding.creep
+    verdict = judge(drift, limits, drifted, reading, earlier, creep)
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
     edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.identifiable)
@@ -121,6 +123,7 @@ def _judge(
             session, queue, settings, camera_id, pose_after(drift, evidence.prior)
         )
     record.reasons = some(
+        None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, limits),
         clock,
         edge,
@@ -129,12 +132,13 @@ def _judge(
         finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
-        None if finding.people is None else reason_of_people(finding.people),
+        finding.pieces,
         *finding.lacks,
     )
     charted = reading is not None and reading.moved
     if charted and clock is None and reading is not None and reading.parameter == CLOCK:
         clock = reason_of_reading(reading)
+    charted = charted or (creep is not None and creep.moved)
     _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
 
 
@@ -192,6 +196,8 @@ def _since(
         reading = finding.reading
         if since is None and reading is not None and reading.moved:
             return datetime.fromtimestamp(evidence.tracks[reading.track_idx].started_s, UTC)
+        if since is None and finding.creep is not None and finding.creep.moved:
+            return datetime.fromtimestamp(finding.creep.since_day * DAY_S, UTC)
         # One pose since the reference, and never another one: it had moved before all of them.
         ended_s = finding.tracks[0 if first else -1].ended_s
         return since or datetime.fromtimestamp(ended_s, UTC)

@@ -1,47 +1,20 @@
-"""What an estimate is made of, read in one transaction, and what it comes to without one."""
+"""What an estimate is made of, read in one transaction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
-import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift.chart import Reading
-from models.drift.chart_packing import chart_from_bytes
 from models.drift.verdict import DriftLimits
-from models.estimation.averaged import (
-    FEWEST_TRACKS,
-    PoseEstimate,
-    TrackPredictions,
-    averaged_estimate,
-)
-from models.estimation.joint.estimate import JointEstimate
-from models.estimation.joint.packing import reference_from_bytes
 from models.estimation.joint.reference import FEWEST_WALKERS
-from models.flow.fusion import FusedEstimate
-from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.recalibration import (
-    AlarmRate,
-    CameraSite,
-    Observations,
-    People,
-    SecondLook,
-    assume_site,
-    count_walks,
-    estimate_pose,
-    read_alarm_chart,
-    see_people,
-)
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.alerting.alerts import fired_by_estimate
-from service.estimation.lacks import Lacks
+from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
 from service.kinds import AlertKind
-from service.reasons import Reasons
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, trainings
 from service.store.packing import intrinsics_of, pose_of_prior
@@ -51,7 +24,7 @@ from service.store.tables.tracks import PredictionRecord, TrackRecord
 from service.store.tables.trainings import ModelRecord
 from service.store.tracks import predictions as stored_predictions
 from service.store.tracks import tracks, windows
-from service.windows.people import MOST_PIECES, until_so_many
+from service.windows.people import until_so_many
 from service.windows.references import made_against, window_of
 from service.windows.unpacked import Unpacked
 
@@ -71,10 +44,10 @@ class SeenTrack:
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
-    `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
-    `chart`; None where there is none. `predictions` has what the model in use says of the tracks.
-    `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed. `drifting`
-    says that an alert tells of a drift by now.
+    `site` is the learned reference as bytes; None while it is being learned. So are `flow`, `chart`
+    and `anchor`; None where there is none. `predictions` has what the model in use says of the
+    tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
+    `drifting` says that an alert tells of a drift by now.
     """
 
     camera_id: str
@@ -82,6 +55,7 @@ class Evidence:
     site: bytes | None
     flow: bytes | None
     chart: bytes | None
+    anchor: Anchor | None
     intrinsics: Intrinsics
     prior: CameraPose
     walk: WalkConfig
@@ -92,33 +66,6 @@ class Evidence:
     drifting: bool
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """What the evidence comes to. `tracks` are those after the `change`, where one was found.
-
-    `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
-    for it. `reading` is what the drift chart says of the tracks after the change, or of all where
-    these are too few, long before a pose can say how far; None where there is no chart.
-    `people` is what became of all tracks of the window. `lacks` names what should be there beside
-    the served pose and failed.
-    """
-
-    joint: JointEstimate
-    fused: FusedEstimate
-    earlier: FusedEstimate | None
-    averaged: PoseEstimate | None
-    reading: Reading | None
-    tracks: tuple[SeenTrack, ...]
-    change: SeenTrack | None
-    people: People | None = None
-    lacks: Reasons = ()
-
-    @property
-    def newest_pk(self) -> int:
-        """The one of the tracks that was stored last."""
-        return max(track.pk for track in self.tracks)
 
 
 def load_evidence(
@@ -158,6 +105,7 @@ def load_evidence(
         site=reference.data,
         flow=None if kept is None else kept.data,
         chart=None if kept is None else kept.chart,
+        anchor=anchor_of(session, reference, bounds),
         intrinsics=intrinsics,
         prior=prior,
         walk=walk_of(camera),
@@ -180,102 +128,10 @@ def load_evidence(
     )
 
 
-def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
-    """The pose by all estimators, from the newest change on; None where too few people walk."""
-    seen_people = see_people(
-        [track.trajectory for track in evidence.tracks], evidence.intrinsics, evidence.prior
-    )
-    observed = seen_people.observations
-    if observed.walkers < FEWEST_WALKERS:
-        return None
-    lacks = Lacks(evidence.camera_id)
-    site = _site_of(evidence, observed, lacks)
-    judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
-    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
-    lacks.take(found.lacks)
-    reading = None
-    if site.chart is not None:
-        reading = lacks.unless_failed(
-            "chart", partial(_read, evidence, observed, site, found.first)
-        )
-    seen = evidence.tracks[found.first :]
-    used = {track.pk for track in seen}
-    predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
-    averaged = None
-    if len(predictions) >= FEWEST_TRACKS:
-        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
-    return Finding(
-        joint=found.joint,
-        fused=found.fused,
-        earlier=found.earlier,
-        averaged=averaged,
-        reading=reading,
-        tracks=seen,
-        change=None if found.change_idx is None else evidence.tracks[found.change_idx],
-        people=seen_people.people,
-        lacks=tuple(lacks.said),
-    )
-
-
-def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> CameraSite:
-    """What is known of the site. The pose needs neither the flow map nor its chart.
-
-    One of another release cannot be read: the next growth of the map brings new ones.
-    """
-    if evidence.site is None:
-        return assume_site(observed, evidence.intrinsics, evidence.prior, evidence.walk)
-    speed_reference = reference_from_bytes(evidence.site)
-    flow, chart = None, None
-    if evidence.flow is not None:
-        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
-    if flow is not None and evidence.chart is not None:
-        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
-    return CameraSite(
-        intrinsics=evidence.intrinsics,
-        prior=evidence.prior,
-        speed_reference=speed_reference,
-        flow=flow,
-        chart=chart,
-    )
-
-
-def _read(
-    evidence: Evidence, observed: Observations, site: CameraSite, first: int
-) -> Reading | None:
-    """What the chart says; once a person has said how the camera stands, it begins anew."""
-    rate = AlarmRate(
-        alarms_a_year=evidence.alarms_a_year,
-        tracks_a_year=evidence.tracks_a_year,
-        calm_ratio=evidence.limits.clear_ratio,
-        calm_groups=evidence.limits.people,
-    )
-    unanswered = np.array([track.unanswered for track in evidence.tracks])
-    return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)
-
-
-def asked_enough(evidence: Evidence) -> bool:
-    """Whether enough people came since a person last said how the camera stands."""
-    unanswered = [track.trajectory for track in evidence.tracks if track.unanswered]
-    wanted = evidence.limits.people
-    if not wanted <= len(unanswered) < MOST_PIECES * wanted:
-        return len(unanswered) >= wanted
-    return count_walks(unanswered, evidence.intrinsics, evidence.prior) >= wanted
-
-
 def walk_of(camera: CameraRecord) -> WalkConfig:
     """How fast people are assumed to walk where a camera looks."""
     return WalkConfig(
         speed_mean_mps=camera.walking_speed_mean_mps, speed_sd_mps=camera.walking_speed_sd_mps
-    )
-
-
-def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
-    """What a model says of tracks, as a value."""
-    return TrackPredictions(
-        height_m=np.array([record.height_m for record in records], dtype=np.float64),
-        quaternion_wxyz=np.array(
-            [(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64
-        ).reshape(-1, 4),
     )
 
 

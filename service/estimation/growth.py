@@ -1,4 +1,8 @@
-"""The flow map of a reference grows while its camera is known to be still, and forgets slowly."""
+"""The flow map of a reference grows while its camera is known to be still, and forgets slowly.
+
+It follows habits. What the camera is believed to have crept by is taken out of the tracks first;
+the window that it is to judge stays out of it; and its anchor, the first map, never grows.
+"""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -7,12 +11,14 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.drift.change_point import FEWEST_BESIDE
+from models.drift.creep_packing import creep_log_from_bytes
 from models.estimation.joint.packing import reference_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.recalibration import learn_site, observe
+from models.recalibration import learn_site, observe, without_creep
 from models.trajectory import Trajectory
+from service.estimation.anchoring import Anchor, anchor_by, anchor_of
 from service.estimation.paths import LearnedPaths, paths_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references
@@ -39,6 +45,7 @@ class GrowthPeriod:
 
     reference_id: int
     site: bytes
+    anchor: Anchor | None
     intrinsics: Intrinsics
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
@@ -65,7 +72,9 @@ def load_growth(
     assert reference.to_s is not None
     assert reference.data is not None
     attended = attendance_of(session, camera_id, datetime.now(UTC))
-    bounds = still_bounds(settings, reference, past, attended)
+    judged = window_of(session, reference, settings)
+    judged_from_s = windows.oldest_end_s(session, judged)
+    bounds = still_bounds(settings, reference, past, attended, judged_from_s)
     spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
     if not spoilt:
         since_s = None if kept is None else kept.to_s
@@ -84,6 +93,7 @@ def load_growth(
     return GrowthPeriod(
         reference_id=reference.id,
         site=reference.data,
+        anchor=anchor_of(session, reference, judged),
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
@@ -102,13 +112,20 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     """
     if not period.trajectories:
         return None
+    trajectories, weights = period.trajectories, period.weights
+    anchor = period.anchor
+    if anchor is not None and anchor.log is not None:
+        log = creep_log_from_bytes(anchor.log)
+        stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
+        trajectories = tuple(track for track in stood if track is not None)
+        weights = weights[[track is not None for track in stood]]
     grown = learn_site(
-        observe(period.trajectories, period.intrinsics, period.prior),
+        observe(trajectories, period.intrinsics, period.prior),
         period.intrinsics,
         period.prior,
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
-        weights=period.weights,
+        weights=weights,
     )
     return paths_of(grown)
 
@@ -135,6 +152,20 @@ def save_growth(
         learned_at=period.taken_at,
     )
     session.merge(grown)
+    anchor = flow_maps.anchor(session, reference.id)
+    if learned is not None and learned.chart is not None:
+        # The first map is kept; or, where tracks of a move are in it, this one in its place.
+        spoilt = period.spoilt and anchor is not None and anchor.to_s > (reference.to_s or 0.0)
+        if anchor is None or spoilt:
+            session.merge(
+                anchor_by(
+                    reference.id,
+                    flow=learned.flow,
+                    chart=learned.chart,
+                    to_s=period.to_s,
+                    learned_at=period.taken_at,
+                )
+            )
     return True
 
 

@@ -3,9 +3,16 @@
 import logging
 import time
 from dataclasses import replace
+from functools import partial
 
+from service.estimation.anchoring import (
+    compute_anchor_days,
+    load_anchor_days,
+    save_anchor_days,
+)
 from service.estimation.estimates import save_estimate
-from service.estimation.evidence import compute_finding, load_evidence
+from service.estimation.evidence import load_evidence
+from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.lacks import Lacks
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
@@ -45,6 +52,7 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     if missing:
         lacks.add("averaged estimate", missing)
     learn_if_due(context, camera_id, unpacked)
+    lacks.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
     finding = None if evidence is None else compute_finding(evidence, settings.seed)
@@ -76,6 +84,19 @@ def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
         "reference_learned" if learned else "reference_without_walkers",
         extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
     )
+
+
+def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    """Hold the whole days that have come since the last time against a camera's anchor."""
+    with context.store.read() as session:
+        days = load_anchor_days(session, context.settings, camera_id, unpacked)
+    if days is None:
+        return
+    logged = compute_anchor_days(days)
+    with context.store.write() as session:
+        save_anchor_days(session, days, logged)
+    fields = {"camera_id": camera_id, "tracks": len(days.trajectories)}
+    log.info("creep_logged", extra=fields)
 
 
 def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

@@ -54,16 +54,19 @@ def still_bounds(
     reference: SiteReferenceRecord,
     past: tuple[Doubt, ...],
     attended: Attendance,
+    judged_from_s: float | None,
 ) -> StillBounds:
     """The tracks of a time in which a camera is known to have been still, and left alone.
 
-    Of a move that nobody has noticed yet, the newest tracks may be.
+    Of a move that nobody has noticed yet, the newest tracks may be; and those from `judged_from_s`
+    on are judged by what is learned of others.
     """
     assert reference.to_s is not None
     return StillBounds(
         camera_id=reference.camera_id,
         started_from_s=reference.from_s,
         reference_to_s=reference.to_s,
+        later_before_s=judged_from_s,
         unsure=settings.flow_unsure_tracks,
         without=tuple((doubt.from_s, doubt.to_s) for doubt in past if doubt.excluded),
         attended=attended.spans,

@@ -12,7 +12,8 @@ from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.regression.recipe import plan_to_config
 from service.estimation.estimates import save_estimate
-from service.estimation.evidence import Evidence, Finding, asked_enough, load_evidence
+from service.estimation.evidence import Evidence, load_evidence
+from service.estimation.finding import Finding, asked_enough
 from service.job_queue import JobQueue
 from service.reasons import as_said
 from service.store import references, trainings
@@ -139,6 +140,7 @@ def made_up(
         earlier=before if asked_enough(evidence) else None,
         averaged=None,
         reading=None,
+        creep=None,
         tracks=evidence.tracks,
         change=None if change is None else evidence.tracks[change],
     )

@@ -22,11 +22,12 @@ from models.evaluation.alarms.watch import first_alarm, watch_over
 from models.evaluation.protocol.cases import STILL, draw_case
 from models.evaluation.protocol.learned import Learned, learn_case
 from models.evaluation.protocol.served import served_pose
-from models.evaluation.scenes import Scene, knock_trajectory
+from models.evaluation.scenes import Scene
 from models.flow.likelihood import walkers_of
 from models.flow.reference import candidate_of
 from models.geometry.pose import CameraPose
 from models.recalibration import Observations, observe
+from models.simulation.knocked import knock_trajectory
 from models.trajectory import Trajectory, by_end
 
 _LONGEST = 1200  # walking groups that a knock is waited for

@@ -6,8 +6,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from models.evaluation.scenes import Scene, SceneTrack, knock_trajectory
+from models.evaluation.scenes import Scene, SceneTrack
 from models.geometry.pose import CameraPose
+from models.simulation.knocked import knock_trajectory
 
 _NIGHT_S = 4 * 3600.0  # without anybody: another day begins
 

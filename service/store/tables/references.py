@@ -1,4 +1,4 @@
-"""Records of references and the flow maps learned with them."""
+"""Records of references, the flow maps learned with them, and their anchors."""
 
 from datetime import datetime
 
@@ -72,3 +72,21 @@ class FlowMapRecord(Record):
     weight: Mapped[float]
     to_s: Mapped[float]
     learned_at: Mapped[datetime]
+
+
+class AnchorRecord(Record):
+    """The first flow map and drift chart of a reference: they never grow (`models.recalibration`).
+
+    `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
+    days since (`models.drift.creep_log`), up to `logged_to_s`; None as long as there is none.
+    """
+
+    __tablename__ = "anchors"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    flow: Mapped[bytes] = mapped_column(LargeBinary)
+    chart: Mapped[bytes] = mapped_column(LargeBinary)
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+    creep: Mapped[bytes | None] = mapped_column(LargeBinary)
+    logged_to_s: Mapped[float | None]

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
+from sqlalchemy import ColumnElement, Integer, Select, and_, cast, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import Spans, counting, outside, started_from
+
+_DAY_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,14 +34,15 @@ class StillBounds:
     """Tracks of a camera at its prior pose: those of its reference period, and later ones.
 
     The period is of tracks that started at or after `started_from_s` and ended by
-    `reference_to_s`. Of later ones, the newest `unsure` of all its tracks do not count, nor those
-    that were seen at any time `without`. Of neither do those that were seen while somebody
-    `attended` to the camera.
+    `reference_to_s`. Of later ones, those count that ended before `later_before_s`, and not the
+    newest `unsure` of all its tracks, nor those that were seen at any time `without`. Of neither do
+    those that were seen while somebody `attended` to the camera.
     """
 
     camera_id: str
     started_from_s: float | None
     reference_to_s: float
+    later_before_s: float | None
     unsure: int
     without: Spans
     attended: Spans = ()
@@ -111,6 +114,8 @@ def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
         .limit(bounds.unsure)
     )
     later = and_(TrackRecord.id.not_in(newest), *outside(bounds.without))
+    if bounds.later_before_s is not None:
+        later = and_(later, TrackRecord.ended_s < bounds.later_before_s)
     return [
         *started_from(bounds.camera_id, bounds.started_from_s),
         *outside(bounds.attended),
@@ -118,18 +123,61 @@ def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
     ]
 
 
+def newest_end_s(session: Session, bounds: WindowBounds) -> float | None:
+    """When the newest track within bounds ended, however many they allow; None without any."""
+    return session.scalar(select(func.max(TrackRecord.ended_s)).where(*_inside(bounds)))
+
+
+def oldest_end_s(session: Session, bounds: WindowBounds) -> float | None:
+    """When the oldest track of a window ended; None of an empty one."""
+    ids = window_ids(session, bounds)
+    return session.scalar(select(func.min(TrackRecord.ended_s)).where(TrackRecord.id.in_(ids)))
+
+
+def of_days(
+    session: Session, bounds: WindowBounds, after_s: float, to_s: float, most_a_day: int
+) -> Sequence[TrackRecord]:
+    """The tracks within bounds that ended after a time and before another, by their ends.
+
+    However many tracks and days the bounds allow; of each day no more than so many, evenly.
+    """
+    day = cast(TrackRecord.ended_s / _DAY_S, Integer)
+    place = func.row_number().over(partition_by=day, order_by=(TrackRecord.ended_s, TrackRecord.id))
+    each = (
+        select(
+            TrackRecord.id.label("id"),
+            place.label("place"),
+            func.count().over(partition_by=day).label("people"),
+        )
+        .where(*_inside(bounds), TrackRecord.ended_s > after_s, TrackRecord.ended_s < to_s)
+        .subquery()
+    )
+    nth = (each.c.place * most_a_day) // each.c.people
+    before = ((each.c.place - 1) * most_a_day) // each.c.people
+    return session.scalars(
+        select(TrackRecord)
+        .where(TrackRecord.id.in_(select(each.c.id).where(nth > before)))
+        .order_by(TrackRecord.ended_s, TrackRecord.id)
+    ).all()
+
+
 def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
     """The tracks of a window, newest first."""
+    inside = _inside(bounds)
+    # The camera's own clock, not ours.
+    newest = session.scalar(select(func.max(TrackRecord.ended_s)).where(*inside)) or 0.0
+    return (
+        select(TrackRecord.id)
+        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * _DAY_S)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(bounds.tracks)
+    )
+
+
+def _inside(bounds: WindowBounds) -> list[ColumnElement[bool]]:
     inside = [*started_from(bounds.camera_id, bounds.started_from_s), *outside(bounds.without)]
     if bounds.ended_after_s is not None:
         inside.append(TrackRecord.ended_s > bounds.ended_after_s)
     if bounds.ended_from_s is not None:
         inside.append(TrackRecord.ended_s >= bounds.ended_from_s)
-    # The camera's own clock, not ours.
-    newest = session.scalar(select(func.max(TrackRecord.ended_s)).where(*inside)) or 0.0
-    return (
-        select(TrackRecord.id)
-        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * 86_400)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(bounds.tracks)
-    )
+    return inside

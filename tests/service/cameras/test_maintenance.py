@@ -186,10 +186,10 @@ def test_nor_in_a_flow_map_that_grows(bench):
     bench.see(PRIOR, people=10)
     with bench.store.read() as session:
         period = load_growth(session, grows, "corner")
-        assert len(period.trajectories) == 70
+        assert len(period.trajectories) == 60  # the window is of the 10
     bench.http.patch(f"{URL}/{window['id']}", json={"from": at(0.51)}).raise_for_status()
     with bench.store.read() as session:
-        assert len(load_growth(session, grows, "corner").trajectories) == 130
+        assert len(load_growth(session, grows, "corner").trajectories) == 120
 
 
 def test_a_window_told_of_late_has_the_map_learned_without_it(bench):
@@ -205,7 +205,7 @@ def test_a_window_told_of_late_has_the_map_learned_without_it(bench):
     bench.see(PRIOR, people=10, paths=True)
     with bench.store.read() as session:
         period = load_growth(session, grows, "corner")
-        assert (len(period.trajectories), period.spoilt) == (30, True)
+        assert (len(period.trajectories), period.spoilt) == (20, True)
 
 
 def test_windows_are_kept_as_long_as_their_tracks(bench):

@@ -107,7 +107,7 @@ def test_what_is_served_by_time_and_in_batches_is_what_windows_say_offline(servi
     )
     assert done.returncode == 0, done.stdout + done.stderr
     case = draw_case(load_scene(folder), 2, RANGES["knock"], HALVES_IN_TIME)
-    known = observe(case.reference, case.intrinsics)
+    known = observe(case.reference, case.intrinsics, case.prior_pose)
     drawn_by = service.settings.seed
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
     seen = [tops_carried(track, case.intrinsics) for track in case.seen]

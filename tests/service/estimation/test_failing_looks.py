@@ -122,10 +122,10 @@ def test_a_map_that_cannot_grow_is_left_as_it_was(street):
         reference = references.newest(session, "corner")
         before = flow_maps.find(session, reference.id).learned_at
     # Read by the growth alone: the pose does without.
-    change(street, flow_unsure_tracks=5, flow_half_life_days="not a number")
-    street.keep_to_lanes(PRIOR, 60)
+    change(street, window_tracks=40, flow_unsure_tracks=5, flow_half_life_days="not a number")
+    street.keep_to_lanes(PRIOR, 100)
     body = street.look()
-    assert (body["state"], body["tracks"]) == ("ok", 60)
+    assert (body["state"], body["tracks"]) == ("ok", 40)
     (lack,) = camera(street).lacks
     assert lack.values["part"] == "growth_of_the_flow_map"
     page = " ".join(street.http.get("/ui/cameras/corner").text.split())

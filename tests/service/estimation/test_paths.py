@@ -7,7 +7,8 @@ from datetime import UTC, datetime
 import pytest
 
 from models.drift.chart_packing import chart_from_bytes
-from service.estimation.evidence import compute_finding, load_evidence
+from service.estimation.evidence import load_evidence
+from service.estimation.finding import compute_finding
 from service.store import flow_maps, references
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
@@ -31,6 +32,12 @@ def street(learned):
 
 def turned(degrees: float):
     return replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(degrees))
+
+
+def judge_by(street, tracks):
+    """Have windows of so many tracks; the map grows by those of before."""
+    settings = street.context.settings.model_copy(update={"window_tracks": tracks})
+    street.context = replace(street.context, settings=settings)
 
 
 def tracks_of_map(street):
@@ -64,11 +71,12 @@ def test_a_turn_is_an_alert_within_sixty_tracks_that_says_since_when_and_stops_t
     street.keep_to_lanes(turned(-6), 30)
     street.look()
     assert [one["id"] for one in street.alerts()] == [alert["id"]]
-    assert tracks_of_map(street) == WANTED + 60
+    assert tracks_of_map(street) == WANTED
 
 
 def test_a_still_camera_is_not_suspected_and_its_map_grows(street):
-    street.keep_to_lanes(PRIOR, 60)
+    judge_by(street, 60)
+    street.keep_to_lanes(PRIOR, 120)
     body = street.look()
     assert "drift chart" not in body["reason"]
     assert body["estimated"] == ["height_m", "tilt_deg", "roll_deg", "heading_deg"]
@@ -119,10 +127,22 @@ def test_a_chart_of_another_release_is_done_without(street):
     with street.context.store.write() as session:
         reference = references.newest(session, "corner")
         flow_maps.find(session, reference.id).chart = b"of another release"
-    street.keep_to_lanes(PRIOR, 60)
+    judge_by(street, 60)
+    street.keep_to_lanes(PRIOR, 120)
     assert street.look()["state"] == "ok"
     with street.context.store.read() as session:
         kept = flow_maps.find(session, references.newest(session, "corner").id)
     assert (
         chart_from_bytes(kept.chart).walking_groups > 100
     )  # the map has grown, and its chart with it
+
+
+def test_a_wrong_frame_rate_is_named(known):
+    for _ in range(2):
+        known.walk(PRIOR, 60, rate=20 / 30)
+        body = known.look()
+    (alert,) = known.alerts(state="firing")
+    assert (body["state"], alert["kind"]) == ("drifting", "clock")
+    assert "frames a second were taken for 25" in alert["reason"]
+    assert "paths have changed" not in body["reason"]
+    assert alert["drift"]["height_m"] == pytest.approx(3.0, rel=0.25)

@@ -64,7 +64,7 @@ def test_a_reference_is_of_so_many_people_however_they_were_posted(pieces, sizes
     pieces.play(sizes(len(pieces.people)))
     assert pieces.pose()["reference"]["tracks"] == wanted
     assert pieces.end() == ("drifting", ["drift"])
-    assert "go on another's walk" in pieces.pose()["reason"]
+    assert "are pieces of others' walks" in pieces.pose()["reason"]
 
 
 def test_as_many_tracks_are_read_as_are_of_so_many_people(pieces):

@@ -49,6 +49,10 @@ SAID = [
     (T.CHART, {"number": "times", "sign": 1, "parties": 20, "statistic": 30.4, "level": 8.6},
      "the last 20 walking groups walk as they would if all times were too long "
      "(drift chart: 30, alarm at 9)"),
+    (T.CREPT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
+               "since": "2026-08-20T07:12:00+00:00", "statistic": 17.2, "level": 14.4},
+     "has crept by +1.2 deg (sd 0.3) in heading since 2026-08-20, by the first map and speeds of "
+     "its reference (creep: 17, alarm at 14)"),
     (T.SCALE_CHANGED, {"factor": 1.2, "rate_hz": 25.0},
      "the scale has changed by +20 % and the angles have not: as if 30 frames a second were taken "
      "for 25, or the camera was raised"),
@@ -77,11 +81,9 @@ SAID = [
     (T.STATURE_UNUSUAL, {"stature_m": 2.5, "short_m": 1.4, "tall_m": 2.2},
      "boxes say that people are 2.50 m tall at the prior pose, 1.4 to 2.2 m is usual: the prior "
      "height is wrong"),
-    (T.NOT_ALL_WALKERS,
-     {"tracks": 400.0, "linked": 250.0, "walker": 120.0, "standing": 0.0, "wheels": 30.0,
-      "other": 0.0, "unseen": 0.0},
-     "of 400 tracks 250 go on another's walk; of the rest 120 walk, 30 ride: who rides or "
-     "is unclear has no say"),
+    (T.PIECES, {"tracks": 400.0, "pieces": 250.0},
+     "250 of 400 tracks are pieces of others' walks: the tracker loses people, each of whom "
+     "counts once"),
     (T.PRIOR_POSE_DOUBTED, {"tilt_rad": math.radians(5), "roll_rad": math.radians(-0.3)},
      "the reference tracks put the camera +5.0 deg in tilt and -0.3 deg in roll from its prior "
      "pose: the prior pose is wrong, or the camera had moved before"),

@@ -30,7 +30,7 @@ def walked() -> list[list[Trajectory]]:
 
 @pytest.fixture(scope="module")
 def site(walked) -> CameraSite:
-    return learn_site(observe(walked[0], LENS), LENS, PRIOR, chart=False)
+    return learn_site(observe(walked[0], LENS, PRIOR), LENS, PRIOR, chart=False)
 
 
 def case_of(walked: Sequence[Sequence[Trajectory]], part: int) -> ProtocolCase:

@@ -1,0 +1,105 @@
+"""What is read of tracks, each walk once: the pieces of one are put together first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.estimation.joint.observations import Observations
+from models.estimation.joint.observations import observe as observe_each
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.people.linking import link_pieces, walks_of
+from models.reasons import Reason, TracksCode
+from models.trajectory import Trajectory
+
+_MANY = 0.1  # of the tracks: so many pieces are worth a word
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walks:
+    """What is read of N tracks, by the order that they were given in.
+
+    `walk_idx` (N,) is the track that each counts with, the last piece of its walk: the steps and
+    boxes of a walk in several pieces are that one's, and the others have none.
+    """
+
+    observations: Observations
+    walk_idx: npt.NDArray[np.int64]
+
+    @property
+    def pieces(self) -> int:
+        """How many tracks are another's walk: they do not count by themselves."""
+        return int((self.walk_idx != np.arange(self.walk_idx.size)).sum())
+
+    @property
+    def reason(self) -> Reason | None:
+        """What is to be said of a tracker that cuts walks; None where it cuts few or none."""
+        tracks = self.walk_idx.size
+        if not tracks or self.pieces < _MANY * tracks:
+            return None
+        values = {"tracks": float(tracks), "pieces": float(self.pieces)}
+        return Reason(code=TracksCode.PIECES, values=values)
+
+
+def observe_walks(
+    trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
+) -> Walks:
+    """What is read of tracks, each walk once.
+
+    The same tracks give the same, in whatever portions they came.
+
+    Args:
+        trajectories: in the order of their ends.
+        intrinsics: of the camera.
+        pose: about where it stands, its prior pose.
+    """
+    walk_idx = _last_pieces(trajectories, link_pieces(trajectories, intrinsics, pose))
+    found = observe_each(_walks(trajectories, walk_idx), intrinsics)
+    ended_s = np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64)
+    return Walks(observations=replace(found, ended_s=ended_s), walk_idx=walk_idx)
+
+
+def observe(
+    trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
+) -> Observations:
+    """The steps and boxes of tracks, each walk once: the observations of `observe_walks`."""
+    return observe_walks(trajectories, intrinsics, pose).observations
+
+
+def _last_pieces(
+    trajectories: Sequence[Trajectory], before: npt.NDArray[np.int64]
+) -> npt.NDArray[np.int64]:
+    """The last piece (N,) of each track's walk, by the piece before each."""
+    first = walks_of(before)
+    order = np.argsort([trajectory.time_s[0] for trajectory in trajectories], kind="stable")
+    last = np.empty(before.size, dtype=np.int64)
+    last[first[order]] = order  # of several the latest stays
+    return last[first]
+
+
+def _walks(pieces: Sequence[Trajectory], walk_idx: npt.NDArray[np.int64]) -> list[Trajectory]:
+    """Whole walks in the places of their last pieces; a point, no walk, in those of the others."""
+    walks = list(pieces)
+    for last in np.unique(walk_idx[walk_idx != np.arange(walk_idx.size)]):
+        members = np.flatnonzero(walk_idx == last).tolist()
+        members.sort(key=lambda n: float(pieces[n].time_s[0]))
+        walks[last] = _one_of([pieces[n] for n in members])
+        for member in members:
+            if member != last:
+                walks[member] = pieces[member].part(np.array([0]))
+    return walks
+
+
+def _one_of(pieces: Sequence[Trajectory]) -> Trajectory:
+    top_v = None
+    if any(piece.top_v is not None for piece in pieces):
+        top_v = np.concatenate(
+            [np.full(p.time_s.size, np.nan) if p.top_v is None else p.top_v for p in pieces]
+        )
+    return Trajectory(
+        time_s=np.concatenate([piece.time_s for piece in pieces]),
+        uv=np.concatenate([piece.uv for piece in pieces]),
+        top_v=top_v,
+    )

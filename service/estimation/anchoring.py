@@ -1,0 +1,193 @@
+"""The anchor of a reference: its first map and chart, and each whole day held against them."""
+
+import math
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy.orm import Session
+
+from models.drift.chart_packing import chart_from_bytes
+from models.drift.creep import SHARE
+from models.drift.creep_log import DAY_S
+from models.drift.creep_packing import creep_log_from_bytes, creep_log_to_bytes
+from models.estimation.joint.packing import reference_from_bytes
+from models.flow.packing import flow_from_bytes
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.recalibration import (
+    CameraSite,
+    Creep,
+    begin_creep_log,
+    log_creep,
+    observe,
+    read_creep,
+)
+from models.trajectory import Trajectory
+from service.settings import Settings
+from service.store import cameras, flow_maps, references
+from service.store.packing import intrinsics_of, pose_of_prior
+from service.store.tables.references import AnchorRecord, SiteReferenceRecord
+from service.store.tracks import windows
+from service.store.tracks.windows import WindowBounds
+from service.windows.references import window_of
+from service.windows.unpacked import Unpacked
+
+_MOST_A_DAY = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Anchor:
+    """What was first learned at a reference, and what whole days have said against it, as bytes.
+
+    `log` is None where there is no day yet. It counts from `from_s` on: since then the camera has
+    stood as it does, but for a creep.
+    """
+
+    flow: bytes
+    chart: bytes
+    log: bytes | None
+    from_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnchorDays:
+    """The tracks of whole days that are to be held against an anchor, in the order of their ends.
+
+    They end at `to_s`; `logged_to_s` is where those ended that it had before.
+    """
+
+    reference_id: int
+    site: bytes
+    anchor: Anchor
+    intrinsics: Intrinsics
+    prior: CameraPose
+    trajectories: tuple[Trajectory, ...]
+    anchored_to_s: float
+    learned_at: datetime
+    logged_to_s: float | None
+    to_s: float
+
+
+def anchor_of(
+    session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
+) -> Anchor | None:
+    """The anchor of a reference; None where there is none. `bounds` are those of its window."""
+    record = flow_maps.anchor(session, reference.id)
+    if record is None:
+        return None
+    since = [at for at in (bounds.started_from_s, bounds.ended_from_s) if at is not None]
+    return Anchor(
+        flow=record.flow,
+        chart=record.chart,
+        log=record.creep,
+        from_s=max(since, default=None),
+    )
+
+
+def anchor_by(
+    reference_id: int, *, flow: bytes, chart: bytes, to_s: float, learned_at: datetime
+) -> AnchorRecord:
+    """The record of a first map and chart."""
+    return AnchorRecord(
+        reference_id=reference_id,
+        flow=flow,
+        chart=chart,
+        to_s=to_s,
+        learned_at=learned_at,
+        creep=None,
+        logged_to_s=None,
+    )
+
+
+def load_anchor_days(
+    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+) -> AnchorDays | None:
+    """The whole days that a camera's anchor has not seen; None where there is none."""
+    unpacked = unpacked or Unpacked()
+    camera = cameras.find(session, camera_id)
+    reference = references.newest_if_any(session, camera_id)
+    if camera is None or reference is None or reference.data is None:
+        return None
+    record = flow_maps.anchor(session, reference.id)
+    if record is None:
+        return None
+    bounds = window_of(session, reference, settings)
+    newest_s = windows.newest_end_s(session, bounds)
+    if newest_s is None:
+        return None
+    # The day of the newest track is not over yet.
+    to_s = math.floor(newest_s / DAY_S) * DAY_S
+    after_s = record.to_s if record.logged_to_s is None else record.logged_to_s
+    if to_s <= after_s:
+        return None
+    found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY)
+    anchor = anchor_of(session, reference, bounds)
+    assert anchor is not None
+    intrinsics = intrinsics_of(camera)
+    return AnchorDays(
+        reference_id=reference.id,
+        site=reference.data,
+        anchor=anchor,
+        intrinsics=intrinsics,
+        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
+        anchored_to_s=record.to_s,
+        learned_at=record.learned_at,
+        logged_to_s=record.logged_to_s,
+        to_s=to_s,
+    )
+
+
+def compute_anchor_days(days: AnchorDays) -> bytes | None:
+    """The log with some days more, as bytes."""
+    first = first_site(
+        CameraSite(
+            intrinsics=days.intrinsics,
+            prior=days.prior,
+            speed_reference=reference_from_bytes(days.site),
+        ),
+        days.anchor,
+    )
+    log = None if days.anchor.log is None else creep_log_from_bytes(days.anchor.log)
+    log = log or begin_creep_log(first, days.anchored_to_s)
+    if log is None:
+        return None
+    if days.trajectories:
+        log = log_creep(log, observe(days.trajectories, days.intrinsics, days.prior), first)
+    return creep_log_to_bytes(log)
+
+
+def save_anchor_days(session: Session, days: AnchorDays, log: bytes | None) -> None:
+    """Keep a log, unless its anchor or its days have become others meanwhile."""
+    record = flow_maps.anchor(session, days.reference_id)
+    if record is None or record.learned_at != days.learned_at:
+        return
+    if record.logged_to_s == days.logged_to_s:
+        record.creep, record.logged_to_s = log, days.to_s
+
+
+def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
+    """A site as it was first learned.
+
+    Raises:
+        CheckpointError: what is stored cannot be read.
+    """
+    return CameraSite(
+        intrinsics=site.intrinsics,
+        prior=site.prior,
+        speed_reference=site.speed_reference,
+        flow=flow_from_bytes(anchor.flow),
+        chart=chart_from_bytes(anchor.chart),
+    )
+
+
+def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:
+    """What an anchor says by its share of the allowed false alarms; None where it says nothing.
+
+    Raises:
+        CheckpointError: what is stored cannot be read.
+    """
+    if anchor is None or anchor.log is None:
+        return None
+    log = creep_log_from_bytes(anchor.log)
+    return read_creep(log, SHARE * false_alarms_per_year, anchor.from_s)

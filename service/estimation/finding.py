@@ -1,0 +1,169 @@
+"""What the evidence of an estimate comes to; no transaction is open meanwhile."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from models.drift.chart import Reading
+from models.drift.chart_packing import chart_from_bytes
+from models.drift.creep import SHARE
+from models.estimation.averaged import (
+    FEWEST_TRACKS,
+    PoseEstimate,
+    TrackPredictions,
+    averaged_estimate,
+)
+from models.estimation.joint.estimate import JointEstimate
+from models.estimation.joint.packing import reference_from_bytes
+from models.estimation.joint.reference import FEWEST_WALKERS
+from models.flow.fusion import FusedEstimate
+from models.flow.packing import flow_from_bytes
+from models.reasons import Reason
+from models.recalibration import (
+    AlarmRate,
+    CameraSite,
+    Creep,
+    Observations,
+    SecondLook,
+    assume_site,
+    count_walks,
+    estimate_pose,
+    observe_walks,
+    read_alarm_chart,
+)
+from service.estimation.anchoring import creep_of, first_site
+from service.estimation.evidence import Evidence, SeenTrack
+from service.estimation.lacks import Lacks
+from service.reasons import Reasons
+from service.store.tables.tracks import PredictionRecord
+from service.windows.people import MOST_PIECES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What the evidence comes to. `tracks` are those after the `change`, where one was found.
+
+    `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
+    for it. `reading` is what the drift chart says of the tracks after the change, or of all where
+    these are too few, long before a pose can say how far; None where there is no chart. `creep`
+    is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
+    `pieces` says how many of the tracks are of others' walks, where these are many. `lacks` names
+    what should be there beside the served pose and failed.
+    """
+
+    joint: JointEstimate
+    fused: FusedEstimate
+    earlier: FusedEstimate | None
+    averaged: PoseEstimate | None
+    reading: Reading | None
+    creep: Creep | None
+    tracks: tuple[SeenTrack, ...]
+    change: SeenTrack | None
+    pieces: Reason | None = None
+    lacks: Reasons = ()
+
+    @property
+    def newest_pk(self) -> int:
+        """The one of the tracks that was stored last."""
+        return max(track.pk for track in self.tracks)
+
+
+def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
+    """The pose by all estimators, from the newest change on; None where too few people walk."""
+    walks = observe_walks(
+        [track.trajectory for track in evidence.tracks], evidence.intrinsics, evidence.prior
+    )
+    observed = walks.observations
+    if observed.walkers < FEWEST_WALKERS:
+        return None
+    lacks = Lacks(evidence.camera_id)
+    site = _site_of(evidence, observed, lacks)
+    creep = lacks.unless_failed(
+        "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)
+    )
+    if creep is not None and creep.moved and evidence.anchor is not None:
+        first = lacks.unless_failed("anchor", partial(first_site, site, evidence.anchor))
+        site = first or site
+    judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
+    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
+    lacks.take(found.lacks)
+    reading = None
+    if site.chart is not None:
+        reading = lacks.unless_failed(
+            "chart", partial(_read, evidence, observed, site, found.first)
+        )
+    seen = evidence.tracks[found.first :]
+    used = {track.pk for track in seen}
+    predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
+    averaged = None
+    if len(predictions) >= FEWEST_TRACKS:
+        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
+    return Finding(
+        joint=found.joint,
+        fused=found.fused,
+        earlier=found.earlier,
+        averaged=averaged,
+        reading=reading,
+        creep=creep,
+        tracks=seen,
+        change=None if found.change_idx is None else evidence.tracks[found.change_idx],
+        pieces=walks.reason,
+        lacks=tuple(lacks.said),
+    )
+
+
+def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> CameraSite:
+    """What is known of the site. The pose needs neither the flow map nor its chart.
+
+    One of another release cannot be read: the next growth of the map brings new ones.
+    """
+    if evidence.site is None:
+        return assume_site(observed, evidence.intrinsics, evidence.prior, evidence.walk)
+    speed_reference = reference_from_bytes(evidence.site)
+    flow, chart = None, None
+    if evidence.flow is not None:
+        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+    if flow is not None and evidence.chart is not None:
+        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
+    return CameraSite(
+        intrinsics=evidence.intrinsics,
+        prior=evidence.prior,
+        speed_reference=speed_reference,
+        flow=flow,
+        chart=chart,
+    )
+
+
+def _read(
+    evidence: Evidence, observed: Observations, site: CameraSite, first: int
+) -> Reading | None:
+    """What the chart says; once a person has said how the camera stands, it begins anew."""
+    rate = AlarmRate(
+        alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
+        tracks_a_year=evidence.tracks_a_year,
+        calm_ratio=evidence.limits.clear_ratio,
+        calm_groups=evidence.limits.people,
+    )
+    unanswered = np.array([track.unanswered for track in evidence.tracks])
+    return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)
+
+
+def asked_enough(evidence: Evidence) -> bool:
+    """Whether enough people came since a person last said how the camera stands."""
+    unanswered = [track.trajectory for track in evidence.tracks if track.unanswered]
+    wanted = evidence.limits.people
+    if not wanted <= len(unanswered) < MOST_PIECES * wanted:
+        return len(unanswered) >= wanted
+    return count_walks(unanswered, evidence.intrinsics, evidence.prior) >= wanted
+
+
+def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
+    """What a model says of tracks, as a value."""
+    return TrackPredictions(
+        height_m=np.array([record.height_m for record in records], dtype=np.float64),
+        quaternion_wxyz=np.array(
+            [(r.qw, r.qx, r.qy, r.qz) for r in records], dtype=np.float64
+        ).reshape(-1, 4),
+    )
