@@ -266,7 +266,10 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ),
     ServiceCode.AS_SAID: lambda v: str(v["text"]),
     ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
-    ServiceCode.REFERENCE_TRACKS: lambda v: f"{v['tracks']} of {v['wanted']} reference tracks",
+    ServiceCode.REFERENCE_TRACKS: lambda v: (
+        f"{v['tracks']} of {v['wanted']} reference tracks"
+        + ("; pieces of one walk count once" if v["tracks"] >= v["wanted"] else "")
+    ),
     ServiceCode.TRACKS_SINCE: _since,
     ServiceCode.LAST_IDENTIFIABLE: lambda v: "when it was last told:",
     ServiceCode.MAINTENANCE: _maintenance,

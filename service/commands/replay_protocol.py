@@ -22,7 +22,7 @@ from models.evaluation.scenes import load_scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, angle_between
 from models.geometry.upright import tops_of_boxes
-from models.recalibration import observe
+from models.recalibration import count_walks, observe
 from models.trajectory import Trajectory
 from service.commands.replay import camera_body, client_of
 from service.formats.degrees import degrees
@@ -84,12 +84,12 @@ def replay_protocol(
     """
     parting = HALVES_IN_TIME if by_time else HALVES_OF_PEOPLE
     case = draw_case(load_scene(folder), seed, RANGES[knock], parting)
-    wanted = len(case.reference)
+    people = count_walks(case.reference, case.intrinsics, case.prior_pose)
     seen = observe(case.seen, case.intrinsics, case.prior_pose)
     walking = np.unique(seen.steps.rows.owner_idx)
-    if wanted < _FEWEST or walking.size < FEWEST_WALKERS:
+    if people < _FEWEST or walking.size < FEWEST_WALKERS:
         raise TooFewTrajectoriesError(
-            f"tracks: {_FEWEST} before and after the knock are needed, got {wanted} and "
+            f"tracks: {_FEWEST} before and after the knock are needed, got {people} and "
             f"{len(case.seen)}"
         )
     camera_id = f"{case.scene_id}-{knock}-{seed}" + ("-by-time" if by_time else "")
@@ -99,11 +99,11 @@ def replay_protocol(
     shifts = _shifts(case)
     with client_of(url, token) as http:
         body = camera_body(camera_id, case.intrinsics, case.prior_pose)
-        http.post("/cameras", json={**body, "reference_tracks": wanted}).raise_for_status()
+        http.post("/cameras", json={**body, "reference_tracks": people}).raise_for_status()
         lost = _post(http, camera_id, case.reference, "r", shifts[0], case.intrinsics)
         _wait(
             http, camera_id, lambda pose: pose["reference"]["state"] == ReferenceState.READY,
-            lambda pose: on_progress("reference", pose["reference"]["tracks"], wanted),
+            lambda pose: on_progress("reference", pose["reference"]["tracks"], people),
         )  # fmt: skip
         for at in range(0, len(case.seen), batch):
             some = case.seen[at : at + batch]

@@ -90,6 +90,8 @@ SAID = [
     (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
     (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
     (S.REFERENCE_TRACKS, {"tracks": 40, "wanted": 60}, "40 of 60 reference tracks"),
+    (S.REFERENCE_TRACKS, {"tracks": 60, "wanted": 60},
+     "60 of 60 reference tracks; pieces of one walk count once"),
     (S.TRACKS_SINCE, {"tracks": 3, "cause": "put_back", "least_walkers": 5},
      "3 tracks since the camera was put back; at least 5 of people who walk for a few seconds "
      "inside the image are needed"),
