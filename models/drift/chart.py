@@ -101,23 +101,11 @@ class DriftChart:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """What a chart says of the newest walking groups.
-
-    `statistic` is compared with `level`: where it is below by now, the highest since the chart was
-    last calm for some walking groups in a row, so that it matters not after whom somebody looks.
-    `parameter` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
-    `walking_groups` how many say so and `track_idx` the first track of theirs. What is `suspicious`
-    would be an alarm were a hundred times as many allowed.
-    """
+class Tested:
+    """A statistic, and the level that it passes as rarely as false alarms are allowed."""
 
     statistic: float
     level: float
-    parameter: int
-    sign: int
-    walking_groups: int
-    track_idx: int
-    suspicious: bool
 
     @property
     def moved(self) -> bool:
@@ -128,6 +116,24 @@ class Reading:
     def excess(self) -> float:
         """The statistic in units of its level."""
         return self.statistic / self.level
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading(Tested):
+    """What a chart says of the newest walking groups.
+
+    `statistic` is compared with `level`: where it is below by now, the highest since the chart was
+    last calm for some walking groups in a row, so that it matters not after whom somebody looks.
+    `parameter` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
+    `walking_groups` how many say so and `track_idx` the first track of theirs. What is `suspicious`
+    would be an alarm were a hundred times as many allowed.
+    """
+
+    parameter: int
+    sign: int
+    walking_groups: int
+    track_idx: int
+    suspicious: bool
 
 
 def read_chart(

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.drift.chart import Tested
 from models.drift.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
 from models.flow.student import value_below
 from models.geometry.rotation import Array
@@ -30,29 +31,17 @@ _LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Creep:
+class Creep(Tested):
     """What a log says: a camera's turn by now, at its likeliest.
 
     `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
     how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
     """
 
-    statistic: float
-    level: float
     parameter: int
     by: float
     sd: float
     since_day: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether it is beyond its level."""
-        return self.statistic > self.level
-
-    @property
-    def excess(self) -> float:
-        """The statistic in units of its level."""
-        return self.statistic / self.level
 
 
 def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
