@@ -89,6 +89,20 @@ def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:
     return sorted(trajectories, key=lambda trajectory: float(trajectory.time_s[-1]))
 
 
+def end_to_end(pieces: Sequence[Trajectory]) -> Trajectory:
+    """One trajectory of pieces in time order; boxes are unknown where a piece has none."""
+    top_v = None
+    if any(piece.top_v is not None for piece in pieces):
+        top_v = np.concatenate(
+            [np.full(p.time_s.size, np.nan) if p.top_v is None else p.top_v for p in pieces]
+        )
+    return Trajectory(
+        time_s=np.concatenate([piece.time_s for piece in pieces]),
+        uv=np.concatenate([piece.uv for piece in pieces]),
+        top_v=top_v,
+    )
+
+
 def choose_step_s(trajectories: Sequence[Trajectory]) -> float:
     """The sampling step in seconds that a camera's tracks can offer; 0.4 s where nothing is known.
 

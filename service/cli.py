@@ -202,7 +202,7 @@ def _settings(**flags: Any) -> Settings:
 
 
 def _knock(text: str) -> "Any":
-    from models.evaluation.scenes import Knock
+    from models.simulation.knocked import Knock
 
     try:
         tilt_deg, roll_deg, log_height = (float(part) for part in text.split(","))

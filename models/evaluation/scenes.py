@@ -4,7 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -44,26 +44,6 @@ class Scene:
     frame_rate_hz: float
     tracks: tuple[SceneTrack, ...]
     beyond_picture: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Knock:
-    """A move of the camera: radians of tilt, roll, heading, and the log of the height ratio."""
-
-    tilt_rad: float = 0.0
-    roll_rad: float = 0.0
-    log_height: float = 0.0
-    heading_rad: float = 0.0
-
-    def apply(self, pose: CameraPose) -> CameraPose:
-        """The pose after the move."""
-        return replace(
-            pose,
-            height_m=pose.height_m * math.exp(self.log_height),
-            tilt_rad=pose.tilt_rad + self.tilt_rad,
-            roll_rad=pose.roll_rad + self.roll_rad,
-            heading_rad=pose.heading_rad + self.heading_rad,
-        )
 
 
 def load_scene(folder: Path) -> Scene:

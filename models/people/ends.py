@@ -41,7 +41,7 @@ class Ends:
 def ends_of(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> tuple[Ends, Ends]:
-    """The first and the last ends of tracks, as a camera at a pose would place them."""
+    """The first and the last ends of tracks, one at least, as a camera at a pose places them."""
     return tuple(  # type: ignore[return-value]
         _ends(trajectories, [_at_end(t.time_s, last) for t in trajectories], intrinsics, pose, last)
         for last in (False, True)
@@ -71,9 +71,9 @@ def _ends(
     owner = np.repeat(np.arange(count), [indices.size for indices in chosen])
     at = -1 if last else 0
     end_s = np.array([t.time_s[at] for t in trajectories])
-    since_s = _joined([t.time_s[i] for t, i in zip(trajectories, chosen, strict=True)], (0,))
+    since_s = np.concatenate([t.time_s[i] for t, i in zip(trajectories, chosen, strict=True)])
     since_s = since_s - end_s[owner]
-    uv = _joined([t.uv[i] for t, i in zip(trajectories, chosen, strict=True)], (0, 2))
+    uv = np.concatenate([t.uv[i] for t, i in zip(trajectories, chosen, strict=True)])
     ground, seen = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, uv)
     ground = np.where(seen[:, None], ground, 0.0)
     number = np.bincount(owner, seen, count)
@@ -137,7 +137,3 @@ def _tops(trajectory: Trajectory) -> Array:
 def _sums(owner: npt.NDArray[np.int64], values: Array, count: int) -> Array:
     columns = [np.bincount(owner, values[:, axis], count) for axis in range(values.shape[1])]
     return np.stack(columns, axis=1)
-
-
-def _joined(pieces: list[Array], empty: tuple[int, ...]) -> Array:
-    return np.concatenate(pieces) if pieces else np.empty(empty)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from models.estimation.joint.groups import first_joined
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -73,14 +74,9 @@ def count_walks(
 
 
 def walks_of(before: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The piece (N,) that begins the walk of each, by the pieces before them."""
-    first = np.arange(before.size)
-    back = np.where(before < 0, first, before)
-    while True:
-        further = back[back]
-        if (further == back).all():
-            return back
-        back = further
+    """The first track (N,) of the walk of each, by the pieces before them."""
+    later = np.flatnonzero(before >= 0)
+    return first_joined(np.stack([before[later], later], axis=1), before.size)
 
 
 def _pairs(heads: Ends, tails: Ends) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

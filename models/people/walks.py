@@ -12,7 +12,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.people.linking import link_pieces, walks_of
 from models.reasons import Reason, TracksCode
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, end_to_end
 
 _MANY = 0.1  # of the tracks: so many pieces are worth a word
 
@@ -85,21 +85,8 @@ def _walks(pieces: Sequence[Trajectory], walk_idx: npt.NDArray[np.int64]) -> lis
     for last in np.unique(walk_idx[walk_idx != np.arange(walk_idx.size)]):
         members = np.flatnonzero(walk_idx == last).tolist()
         members.sort(key=lambda n: float(pieces[n].time_s[0]))
-        walks[last] = _one_of([pieces[n] for n in members])
+        walks[last] = end_to_end([pieces[n] for n in members])
         for member in members:
             if member != last:
                 walks[member] = pieces[member].part(np.array([0]))
     return walks
-
-
-def _one_of(pieces: Sequence[Trajectory]) -> Trajectory:
-    top_v = None
-    if any(piece.top_v is not None for piece in pieces):
-        top_v = np.concatenate(
-            [np.full(p.time_s.size, np.nan) if p.top_v is None else p.top_v for p in pieces]
-        )
-    return Trajectory(
-        time_s=np.concatenate([piece.time_s for piece in pieces]),
-        uv=np.concatenate([piece.uv for piece in pieces]),
-        top_v=top_v,
-    )

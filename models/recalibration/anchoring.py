@@ -7,7 +7,6 @@ of the first, and so the creep is told (`models.drift.creep`).
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.recalibration.site import CameraSite
-from models.simulation.knocked import knock_trajectory
+from models.simulation.knocked import Knock, knock_trajectory
 from models.trajectory import Trajectory
 
 _NOTHING_RAD = np.radians(0.02)
@@ -77,12 +76,7 @@ def without_creep(
         if np.abs(turn).max() < _NOTHING_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
-        stood = replace(
-            prior,
-            tilt_rad=prior.tilt_rad + tilt,
-            roll_rad=prior.roll_rad + roll,
-            heading_rad=prior.heading_rad + heading,
-        )
+        stood = Knock(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)
         return knock_trajectory(track, intrinsics, stood, prior)
 
     return [seen(track, turn) for track, turn in zip(tracks, turns, strict=True)]

@@ -1,6 +1,7 @@
-"""What a camera sees of the same people after it was moved."""
+"""A move of a camera, and what it sees of the same people afterwards."""
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +10,26 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_seen
 from models.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knock:
+    """A move of the camera: radians of tilt, roll, heading, and the log of the height ratio."""
+
+    tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    log_height: float = 0.0
+    heading_rad: float = 0.0
+
+    def apply(self, pose: CameraPose) -> CameraPose:
+        """The pose after the move."""
+        return replace(
+            pose,
+            height_m=pose.height_m * math.exp(self.log_height),
+            tilt_rad=pose.tilt_rad + self.tilt_rad,
+            roll_rad=pose.roll_rad + self.roll_rad,
+            heading_rad=pose.heading_rad + self.heading_rad,
+        )
 
 
 def knock_trajectory(

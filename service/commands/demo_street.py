@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from models.evaluation.scenes import Knock, SceneTrack
+from models.evaluation.scenes import SceneTrack
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.simulation.knocked import Knock
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory

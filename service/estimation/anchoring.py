@@ -1,7 +1,7 @@
 """The anchor of a reference: its first map and chart, and each whole day held against them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from sqlalchemy.orm import Session
@@ -23,6 +23,7 @@ from models.recalibration import (
     read_creep,
 )
 from models.trajectory import Trajectory
+from service.estimation.paths import LearnedPaths
 from service.settings import Settings
 from service.store import cameras, flow_maps, references
 from service.store.packing import intrinsics_of, pose_of_prior
@@ -73,29 +74,30 @@ def anchor_of(
 ) -> Anchor | None:
     """The anchor of a reference; None where there is none. `bounds` are those of its window."""
     record = flow_maps.anchor(session, reference.id)
-    if record is None:
-        return None
-    since = [at for at in (bounds.started_from_s, bounds.ended_from_s) if at is not None]
-    return Anchor(
-        flow=record.flow,
-        chart=record.chart,
-        log=record.creep,
-        from_s=max(since, default=None),
-    )
+    return None if record is None else _anchor(record, bounds)
 
 
-def anchor_by(
-    reference_id: int, *, flow: bytes, chart: bytes, to_s: float, learned_at: datetime
-) -> AnchorRecord:
-    """The record of a first map and chart."""
-    return AnchorRecord(
-        reference_id=reference_id,
-        flow=flow,
-        chart=chart,
-        to_s=to_s,
-        learned_at=learned_at,
-        creep=None,
-        logged_to_s=None,
+def keep_anchor(
+    session: Session,
+    reference_id: int,
+    paths: LearnedPaths | None,
+    *,
+    to_s: float,
+    learned_at: datetime,
+) -> None:
+    """Make a map and its chart the anchor of a reference; nothing where there is no chart."""
+    if paths is None or paths.chart is None:
+        return
+    session.merge(
+        AnchorRecord(
+            reference_id=reference_id,
+            flow=paths.flow,
+            chart=paths.chart,
+            to_s=to_s,
+            learned_at=learned_at,
+            creep=None,
+            logged_to_s=None,
+        )
     )
 
 
@@ -121,16 +123,14 @@ def load_anchor_days(
     if to_s <= after_s:
         return None
     found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY)
-    anchor = anchor_of(session, reference, bounds)
-    assert anchor is not None
     intrinsics = intrinsics_of(camera)
     return AnchorDays(
         reference_id=reference.id,
         site=reference.data,
-        anchor=anchor,
+        anchor=_anchor(record, bounds),
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
-        trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
+        trajectories=tuple(unpacked.seen(track, intrinsics) for track in found),
         anchored_to_s=record.to_s,
         learned_at=record.learned_at,
         logged_to_s=record.logged_to_s,
@@ -172,13 +172,7 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     Raises:
         CheckpointError: what is stored cannot be read.
     """
-    return CameraSite(
-        intrinsics=site.intrinsics,
-        prior=site.prior,
-        speed_reference=site.speed_reference,
-        flow=flow_from_bytes(anchor.flow),
-        chart=chart_from_bytes(anchor.chart),
-    )
+    return replace(site, flow=flow_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
 
 
 def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:
@@ -191,3 +185,13 @@ def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | Non
         return None
     log = creep_log_from_bytes(anchor.log)
     return read_creep(log, SHARE * false_alarms_per_year, anchor.from_s)
+
+
+def _anchor(record: AnchorRecord, bounds: WindowBounds) -> Anchor:
+    since = [at for at in (bounds.started_from_s, bounds.ended_from_s) if at is not None]
+    return Anchor(
+        flow=record.flow,
+        chart=record.chart,
+        log=record.creep,
+        from_s=max(since, default=None),
+    )

@@ -18,7 +18,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.recalibration import learn_site, observe, without_creep
 from models.trajectory import Trajectory
-from service.estimation.anchoring import Anchor, anchor_by, anchor_of
+from service.estimation.anchoring import Anchor, anchor_of, keep_anchor
 from service.estimation.paths import LearnedPaths, paths_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references
@@ -153,19 +153,9 @@ def save_growth(
     )
     session.merge(grown)
     anchor = flow_maps.anchor(session, reference.id)
-    if learned is not None and learned.chart is not None:
-        # The first map is kept; or, where tracks of a move are in it, this one in its place.
-        spoilt = period.spoilt and anchor is not None and anchor.to_s > (reference.to_s or 0.0)
-        if anchor is None or spoilt:
-            session.merge(
-                anchor_by(
-                    reference.id,
-                    flow=learned.flow,
-                    chart=learned.chart,
-                    to_s=period.to_s,
-                    learned_at=period.taken_at,
-                )
-            )
+    # The first map is kept; or, where tracks of a move are in it, this one in its place.
+    if anchor is None or (period.spoilt and anchor.to_s > (reference.to_s or 0.0)):
+        keep_anchor(session, reference.id, learned, to_s=period.to_s, learned_at=period.taken_at)
     return True
 
 

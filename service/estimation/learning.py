@@ -17,7 +17,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
 from service.access.activity import note
 from service.alerting.alerts import open_alert
-from service.estimation.anchoring import anchor_by
+from service.estimation.anchoring import keep_anchor
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
 from service.kinds import Activity, AlertKind, AlertSource, Severity
@@ -145,17 +145,7 @@ def save_reference(
             learned_at=record.ready_at,
         )
     )
-    paths = learned.paths
-    if paths is not None and paths.chart is not None:
-        session.add(
-            anchor_by(
-                record.id,
-                flow=paths.flow,
-                chart=paths.chart,
-                to_s=period.to_s,
-                learned_at=record.ready_at,
-            )
-        )
+    keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.doubt is not None:
         open_alert(
             session,

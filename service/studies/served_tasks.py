@@ -13,10 +13,11 @@ from models.evaluation.injectors.catalogue import FAULTS
 from models.evaluation.protocol.cases import PANNED, RANGES, draw_case
 from models.evaluation.protocol.partings import Parting, Split
 from models.evaluation.recordings import load_recording
-from models.evaluation.scenes import Knock, Scene
+from models.evaluation.scenes import Scene
 from models.evaluation.served.outcomes import ServedOutcome, serve_case
 from models.evaluation.served.replays import ReplayOutcome, ReplayPlan, replay
 from models.recalibration import CameraSite, learn_site, observe
+from models.simulation.knocked import Knock
 
 
 class Table(StrEnum):

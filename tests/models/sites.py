@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from models.estimation.joint.observations import Observations, observe
-from models.evaluation.scenes import Knock
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.simulation.knocked import Knock
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import Trajectory
 

@@ -65,10 +65,10 @@ def walking_groups_of(
         for pair, count in together.items()
         if count >= _SHARE * min(lengths[pair[0]], lengths[pair[1]])
     ]
-    return _joined(np.array(beside, dtype=np.int64).reshape(-1, 2), owners)
+    return first_joined(np.array(beside, dtype=np.int64).reshape(-1, 2), owners)
 
 
-def _joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
+def first_joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
     """The first track (owners,) of all that pairs (K, 2) join each to."""
     from scipy.sparse import coo_array  # late: the HTTP process has no use for it
     from scipy.sparse.csgraph import connected_components

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from copy import copy, deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from models.evaluation.studies.simulated_site import (
 from models.geometry.pose import CameraPose
 from models.recalibration import CameraSite, begin_creep_log, learn_site, log_creep
 from models.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
+from models.simulation.knocked import Knock
 from models.trajectory import Trajectory
 
 MONTH_DAYS = 365.25 / 12
@@ -183,5 +184,4 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
 
 def turned(pose: CameraPose, number: str, by_deg: float) -> CameraPose:
     """A pose turned in tilt, roll or heading."""
-    name = f"{number}_rad"
-    return replace(pose, **{name: getattr(pose, name) + math.radians(by_deg)}) if by_deg else pose
+    return Knock(**{f"{number}_rad": math.radians(by_deg)}).apply(pose)

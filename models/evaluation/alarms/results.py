@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.evaluation.scenes import Knock
+from models.simulation.knocked import Knock
 
 DAYS = 365.25
 _REDRAWN = 4000

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.evaluation.injectors.view import View, ground_of, own_rng
 from models.evaluation.scenes import SceneTrack
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, end_to_end
 
 _SHORTEST, _LONGEST = 2 / 3, 4 / 3  # of a piece, of its mean length
 _LOST = 1 / 6  # of the mean length: the longest time for which nobody is followed
@@ -58,7 +58,7 @@ def switches(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -
     for number, own in sorted(parts.items()):
         own.sort(key=lambda part: part[0])
         longest = max(own, key=lambda part: part[2].time_s.size)[1]
-        joined = _joined([part for _, _, part in own])
+        joined = end_to_end([part for _, _, part in own])
         if joined.time_s.size >= 2:
             mixed.append(
                 replace(tracks[number], trajectory=joined, person_id=tracks[longest].person_id)
@@ -108,12 +108,3 @@ def _meetings(tracks: Sequence[SceneTrack], view: View) -> Iterator[_Meeting]:
                 nearest = rows[int(np.nanargmin(apart))]
                 yield _Meeting(time_s=float(mine[nearest]), people=(other, number))
         there.append(number)
-
-
-def _joined(parts: Sequence[Trajectory]) -> Trajectory:
-    tops = [part.top_v for part in parts if part.top_v is not None]
-    return Trajectory(
-        time_s=np.concatenate([part.time_s for part in parts]),
-        uv=np.concatenate([part.uv for part in parts]),
-        top_v=np.concatenate(tops) if len(tops) == len(parts) else None,
-    )

@@ -15,11 +15,12 @@ from models.evaluation.protocol.partings import (
     first_seen,
     part_people,
 )
-from models.evaluation.scenes import Knock, Scene, SceneTrack
+from models.evaluation.scenes import Scene, SceneTrack
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
+from models.simulation.knocked import Knock
 from models.trajectory import Trajectory, by_end
 
 _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too few tracks

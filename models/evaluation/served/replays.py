@@ -11,7 +11,7 @@ import numpy as np
 
 from models.drift.verdict import judge
 from models.evaluation.protocol.partings import first_seen
-from models.evaluation.scenes import Knock, Scene, SceneTrack
+from models.evaluation.scenes import Scene, SceneTrack
 from models.evaluation.served.outcomes import ParameterOutcome, parameters_beside, reason_of
 from models.evaluation.served.windows import Look, Window, looks
 from models.geometry.pose import CameraPose
@@ -27,6 +27,7 @@ from models.recalibration import (
     observe,
     read_alarm_chart,
 )
+from models.simulation.knocked import Knock
 from models.trajectory import by_end
 
 _YEAR_S = 365.25 * 86_400

@@ -14,7 +14,6 @@ import numpy as np
 from models.errors import DegenerateGeometryError
 from models.estimation.joint.observations import Observations, of_tracks
 from models.evaluation.protocol.cases import angle_deg, pose_of_plane_parameters
-from models.evaluation.scenes import Knock
 from models.evaluation.studies.simulated_site import (
     LearnedSite,
     SimulatedSite,
@@ -28,6 +27,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.reasons import Reason
+from models.simulation.knocked import Knock
 from models.simulation.site import draw_new_lane, walk_changed
 
 REFERENCE_TRACKS = 2000

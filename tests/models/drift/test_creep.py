@@ -13,10 +13,9 @@ from models.drift.creep_log import DAY_S, NUMBERS, CreepLog, add_day, begin_log,
 from models.drift.creep_packing import creep_log_from_bytes, creep_log_to_bytes
 from models.drift.group_scores import score_groups
 from models.errors import CheckpointError
-from models.evaluation.scenes import Knock
 from models.packing import flattened
 from models.recalibration import begin_creep_log, learn_site, log_creep, observe, without_creep
-from models.simulation.knocked import knock_trajectory
+from models.simulation.knocked import Knock, knock_trajectory
 from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR, tracks_of
 

@@ -12,10 +12,9 @@ from numpy.testing import assert_allclose
 
 from models.errors import ShapeError
 from models.evaluation.recordings import load_recording
-from models.evaluation.scenes import Knock
 from models.geometry.ground import ground_from_pixel
 from models.geometry.pose import CameraPose
-from models.simulation.knocked import knock_trajectory
+from models.simulation.knocked import Knock, knock_trajectory
 
 LENS = {
     "width": 1920, "height": 1080, "fx": 1000.0, "fy": 1000.0, "cx": 959.5, "cy": 539.5,

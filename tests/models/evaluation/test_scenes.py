@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from models.errors import ShapeError
-from models.evaluation.scenes import Knock, load_scene
+from models.evaluation.scenes import load_scene
 from models.evaluation.studies import centred_run
 from models.evaluation.studies.centred_run import run_averaged
 from models.geometry.ground import pixel_from_ground
-from models.simulation.knocked import knock_trajectory
+from models.simulation.knocked import Knock, knock_trajectory
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.trajectory import Trajectory

@@ -8,10 +8,11 @@ import pytest
 
 from models.evaluation.injectors.identities import fragments
 from models.evaluation.injectors.view import view_of
-from models.evaluation.scenes import Knock, Scene, SceneTrack
+from models.evaluation.scenes import Scene, SceneTrack
 from models.geometry.ground import pixel_from_ground
 from models.geometry.upright import tops_seen
 from models.people.linking import count_walks, link_pieces, walks_of
+from models.simulation.knocked import Knock
 from models.trajectory import Trajectory
 from tests.models.sites import LENS, PRIOR, tracks_of
 

@@ -6,9 +6,9 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from models.evaluation.scenes import Knock
 from models.evaluation.studies.flow_study import ChangedResult, KnockedResult, SiteResults
 from models.reasons import Reason, TracksCode
+from models.simulation.knocked import Knock
 from service.studies.flow import changed_table, knocked_table
 from tests.service.commands.test_replay import surefoot
 

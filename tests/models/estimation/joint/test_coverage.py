@@ -8,7 +8,7 @@ import pytest
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
-from models.evaluation.scenes import Knock
+from models.simulation.knocked import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import PRIOR, seen, tracks_of
 

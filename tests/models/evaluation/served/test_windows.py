@@ -8,11 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.evaluation.protocol.cases import ProtocolCase
-from models.evaluation.scenes import Knock, Scene, SceneTrack
+from models.evaluation.scenes import Scene, SceneTrack
 from models.evaluation.served.outcomes import parameters_beside, serve_case
 from models.evaluation.served.replays import ReplayPlan, replay
 from models.evaluation.served.windows import Window, looks
 from models.recalibration import CameraSite, DriftLimits, Trajectory, learn_site, observe
+from models.simulation.knocked import Knock
 from models.simulation.site import SiteConfig
 from models.trajectory import by_end
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
