@@ -78,6 +78,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items[:] = [*order, *fast]
 
 
+@pytest.fixture(autouse=True)
+def manners() -> Iterator[None]:
+    """Each test begins with the usual umask, whatever a command has made of it in this process.
+
+    What a file's mode comes to would else depend on the tests that came before.
+    """
+    os.umask(0o022)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    yield
+    os.umask(0o022)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture(scope="session")
 def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
     """A folder by its name, which is made once a run, by the first process that asks for it."""
