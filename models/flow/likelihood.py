@@ -4,6 +4,7 @@ Ours: log p(image) = log f(place, direction) + log |d(place, direction) / d(imag
 where the share is that of the map which the camera sees; a track's steps count for two at the most.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,21 +12,30 @@ import numpy.typing as npt
 
 from models.estimation.joint.groups import walking_groups_of
 from models.estimation.joint.observations import Observations, Steps, steps_where
+from models.flow.compiled.steps import (
+    Told,
+    busy_gains,
+    known_scores_of_tracks,
+    likelihood_of_tracks,
+    tell,
+)
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.placement import place_steps
 from models.flow.map.view import Coverage, known_shares
+from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, rotation_from_angles
 
 _STANDING_MPS = 0.35
 _TRACK_STEPS = 2.0  # a track tells as much as two independent steps at the most
-_NO_GROUND = -30.0
 _LEAST_SEEN = 1e-3
 _DIFFERENCE = 0.01  # radians, and log height
 _AROUND = _DIFFERENCE * np.concatenate([np.eye(4), -np.eye(4)])
 # How busy ground is that the reference did not see, against the known: tried, and a prior on it.
 _BUSY_LOG = np.linspace(np.log(0.02), np.log(4.0), 9)
 _BUSY_MEAN, _BUSY_SD = np.log(0.5), 1.0
+_BUSY = np.exp(_BUSY_LOG)
+_BUSY_PRIOR = 0.5 * ((_BUSY_LOG - _BUSY_MEAN) / _BUSY_SD) ** 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,35 +104,34 @@ def likelihood(
     camera that has turned to a square must not be pulled back for it, nor sent to an empty one.
     Unless it is `scored`, the scores are nothing, and it takes a quarter of the time.
     """
-    steps = walkers.steps
-    placed = place_steps(steps, candidate, sloped=scored)
-    slot_idx = flow.slot_of(steps.rows.time_s)
-    known, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
-    unseen, unseen_by_place = flow.look_unseen(placed.place)
+    slot_idx, log_height = flow.slot_of(walkers.steps.rows.time_s), float(candidate[2])
+    told = tell(
+        *_rays(walkers),
+        slot_idx,
+        flow.grid,
+        *_rotation(candidate),
+        log_height,
+        scored,
+    )
     around = [candidate, *candidate + _AROUND] if scored else [candidate]
     shares, beyonds = coverage.seen_from(intrinsics, np.array(around))
     seen, beyond = np.maximum(shares[0], _LEAST_SEEN), float(beyonds[0])
-    busy = _busiest(walkers, known, unseen * np.exp(flow.log_typical), seen, beyond, slot_idx)
-    extra = busy * np.exp(flow.log_typical)
-    density = np.exp(known) + extra * unseen
-    own = np.exp(known) / density
+    typical = math.exp(flow.log_typical)
+    busy = _busiest(walkers, told, typical, seen, beyond, slot_idx)
     in_all = seen + busy * beyond
-    value = np.where(placed.valid, np.log(density) + placed.log_ratio, _NO_GROUND)
-    value = value - np.log(in_all)[slot_idx]
-    owner, weight = steps.rows.owner_idx, walkers.weight
-    values, scores = np.zeros(walkers.tracks), np.zeros((walkers.tracks, 4))
-    np.add.at(values, owner, weight * value)
+    slopes = np.zeros((seen.size, 4))
     if scored:
-        by_place = own[:, None] * by_place + (extra / density)[:, None] * unseen_by_place
-        score = (
-            np.einsum("mi,mik->mk", by_place, placed.d_place)
-            + (own * by_direction)[:, None] * placed.d_direction
-            + placed.d_log_ratio
-        )
-        score[~placed.valid] = 0.0
-        d_in_all = _slopes(shares[1:]) + busy * _slopes(beyonds[1:, None])
-        score = score - (d_in_all / in_all[:, None])[slot_idx]
-        np.add.at(scores, owner, weight[:, None] * score)
+        slopes = _slopes(shares[1:]) + busy * _slopes(beyonds[1:, None])
+    values, scores = likelihood_of_tracks(
+        told,
+        np.ascontiguousarray(walkers.weight),
+        np.ascontiguousarray(walkers.steps.rows.owner_idx),
+        slot_idx,
+        busy * typical,
+        np.log(in_all),
+        np.ascontiguousarray(slopes / in_all[:, None]),
+        walkers.tracks,
+    )
     return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
 
@@ -140,41 +149,47 @@ def anchored_scores(
     the whole likelihood's, the mean of these scores is nothing at the truth whatever people do on
     ground that the reference did not see.
     """
-    steps = walkers.steps
-    slot_idx = flow.slot_of(steps.rows.time_s)
-    unseen, _ = flow.look_unseen(place_steps(steps, anchor, sloped=False).place)
-    placed = place_steps(steps, candidate)
-    _, by_place, by_direction = flow.look(placed.place, placed.direction, slot_idx)
-    score = (
-        np.einsum("mi,mik->mk", by_place, placed.d_place)
-        + by_direction[:, None] * placed.d_direction
-        + placed.d_log_ratio
-    )
     shares = known_shares(coverage, flow, intrinsics, candidate + _AROUND, anchor)
-    score = score - _slopes(np.log(np.maximum(shares, _LEAST_SEEN)))[slot_idx]
-    weight = walkers.weight * (1 - unseen) * placed.valid
-    scores = np.zeros((walkers.tracks, 4))
-    np.add.at(scores, steps.rows.owner_idx, weight[:, None] * score)
-    return scores
+    return known_scores_of_tracks(
+        *_rays(walkers),
+        np.ascontiguousarray(walkers.weight),
+        np.ascontiguousarray(walkers.steps.rows.owner_idx),
+        flow.slot_of(walkers.steps.rows.time_s),
+        flow.grid,
+        *_rotation(candidate),
+        math.exp(candidate[2]),
+        rotation_from_angles(anchor[0], anchor[1], anchor[3]),
+        math.exp(anchor[2]),
+        np.ascontiguousarray(_slopes(np.log(np.maximum(shares, _LEAST_SEEN)))),
+        walkers.tracks,
+    )
+
+
+def _rays(walkers: Walkers) -> tuple[Array, Array]:
+    """Those to both ends of the steps (M, 3), in rows in memory."""
+    steps = walkers.steps
+    return np.ascontiguousarray(steps.start_rays), np.ascontiguousarray(steps.end_rays)
+
+
+def _rotation(candidate: Array) -> tuple[Array, Array]:
+    """That of a candidate (4,), `camera_from_world` (3, 3), and its turns (2, 3, 3)."""
+    rotation, turns = rotation_and_turns(*(float(candidate[number]) for number in (0, 1, 3)))
+    return rotation, np.array(turns)
 
 
 def _busiest(
     walkers: Walkers,
-    known: Array,
-    unseen: Array,
+    told: Told,
+    typical: float,
     seen: Array,
     beyond: float,
     slot_idx: npt.NDArray[np.int64],
 ) -> float:
     """How busy unseen ground is for the tracks to be most likely, of those that are tried."""
-    there = unseen > 0
-    busy = np.exp(_BUSY_LOG)
-    weight = walkers.weight[there]
-    gain = np.log1p(np.outer(busy, unseen[there] / np.exp(known[there]))) @ weight
+    gain = busy_gains(told, np.ascontiguousarray(walkers.weight), typical, _BUSY)
     share = np.bincount(slot_idx, walkers.weight, seen.size)
-    cost = np.log(seen + np.outer(busy, np.full(seen.size, beyond))) @ share
-    prior = 0.5 * ((_BUSY_LOG - _BUSY_MEAN) / _BUSY_SD) ** 2
-    return float(busy[np.argmax(gain - cost - prior)])
+    cost = np.log(seen + np.outer(_BUSY, np.full(seen.size, beyond))) @ share
+    return float(_BUSY[np.argmax(gain - cost - _BUSY_PRIOR)])
 
 
 def _slopes(around: Array) -> Array:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.flow.compiled.place import Grid, looks_at, unseen_at_places
 from models.flow.map.placement import Placement
 from models.flow.map.rounding import rounded
 from models.geometry.rotation import Array
@@ -23,7 +24,6 @@ _ANY_WAY = 0.15  # of those at a place walk any way
 _QUANTILE = 0.002  # of the places at each side are left out of the grid
 _UNKNOWN_COST = 0.5  # of a person on ground that nobody knows, against the usual log density
 _SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins with
-_CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,83 +68,40 @@ class FlowMap:
         """The part of the day of each time (M,)."""
         return slot_of(time_s, self.slots)
 
+    @property
+    def grid(self) -> Grid:
+        """The nodes as compiled loops read them."""
+        return Grid(
+            log_density=np.ascontiguousarray(self.log_density, dtype=np.float64),
+            unseen=np.ascontiguousarray(self.unseen, dtype=np.float64),
+            corner=np.ascontiguousarray(self.corner, dtype=np.float64),
+            nodes_per_m=1 / float(self.cell_m),
+            elsewhere=float(self.elsewhere),
+        )
+
     def look(
         self, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
     ) -> tuple[Array, Array, Array]:
         """Log densities (M,) and their derivatives by place (M, 2) and direction (M,)."""
-        first, parts, inside = self._cells(place)
-        turn = (direction % (2 * np.pi)) / (2 * np.pi) * DIRECTIONS
-        way = np.floor(turn).astype(np.int64)
-        shares, steepness = _cubic(turn - way)
-        ways = (way + np.arange(-1, 3)[:, None]) % DIRECTIONS  # (4, M)
-        column, row = first
-        nodes = np.stack(
-            [self.log_density[slot_idx, column + i, row + j, ways] for i, j in _CORNERS]
-        )  # (corners, 4, M)
-        value, slopes = self._blended(np.einsum("kwm,wm->km", nodes, shares), parts, inside)
-        turning, _ = self._blended(np.einsum("kwm,wm->km", nodes, steepness), parts, inside)
-        return (
-            np.where(inside, value, self.elsewhere),
-            slopes,
-            turning * (DIRECTIONS / (2 * np.pi)),
+        return looks_at(
+            self.grid,
+            np.ascontiguousarray(place),
+            np.ascontiguousarray(direction),
+            np.ascontiguousarray(slot_idx),
         )
 
     def look_unseen(self, place: Array) -> tuple[Array, Array]:
-        """Which part (M,) of the ground at places was not seen, and its slopes (M, 2)."""
-        first, parts, inside = self._cells(place)
-        corners = np.stack([self.unseen[first[0] + i, first[1] + j] for i, j in _CORNERS])
-        return self._blended(corners, parts, inside)
-
-    def _blended(
-        self, corners: Array, parts: Array, inside: npt.NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
-        """Values (M,) between those at a cell's corners (4, M), and slopes (M, 2) by place.
+        """Which part (M,) of the ground at places was not seen, and its slopes (M, 2).
 
         Outside of the grid both are 0.
         """
-        x, y = parts
-        left, right = corners[1] - corners[0], corners[3] - corners[2]
-        low, high = corners[0] + left * y, corners[2] + right * y
-        across = high - low
-        value = low + across * x
-        slopes = np.stack([across, left + (right - left) * x], axis=1) / self.cell_m
-        return np.where(inside, value, 0.0), np.where(inside[:, None], slopes, 0.0)
-
-    def _cells(self, place: Array) -> tuple[npt.NDArray[np.int64], Array, npt.NDArray[np.bool_]]:
-        """The nodes (2, M) before places, how far beyond (2, M) these are, and who is inside."""
-        at = (place.T - self.corner[:, None]) / self.cell_m
-        columns, rows = self.log_density.shape[1:3]
-        x, y = at
-        inside = (x >= 0) & (x < columns - 1.001) & (y >= 0) & (y < rows - 1.001)
-        at = np.where(inside, at, 0.5)
-        first = at.astype(np.int64)
-        return first, at - first, inside
-
-
-def _cubic(part: Array) -> tuple[Array, Array]:
-    """Shares (4, M) of four directions in a row, a part of the way from the second to the third.
-
-    With their slopes (4, M). Between straight lines a path's direction would be where a node is.
-    Source: Catmull and Rom 1974, cubic splines through nodes.
-    """
-    squared, cubed = part**2, part**3
-    shares = [
-        -part + 2 * squared - cubed,
-        2 - 5 * squared + 3 * cubed,
-        part + 4 * squared - 3 * cubed,
-        cubed - squared,
-    ]
-    slopes = [
-        -1 + 4 * part - 3 * squared,
-        9 * squared - 10 * part,
-        1 + 8 * part - 9 * squared,
-        3 * squared - 2 * part,
-    ]
-    return np.stack(shares) / 2, np.stack(slopes) / 2
+        return unseen_at_places(self.grid, np.ascontiguousarray(place))
 
 
 def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
     """Which of so many equal parts of a UTC day each time (M,) is in."""
+    if slots == 1:
+        return np.zeros(time_s.shape, dtype=np.int64)
     return np.floor(time_s % 86_400 / 86_400 * slots).astype(np.int64) % slots
 
 

@@ -2,21 +2,18 @@
 
 A candidate is (tilt, roll, log height, heading). Places are relative to the camera's foot point, in
 metres, axes as the world's; directions are angles from +X towards +Y.
-
-Ours: the change of variables from the image to the ground, det J = h^2 / w_z^3.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.compiled import compiled
 from models.estimation.joint.observations import Steps
-from models.geometry.ground import ground_of_rays
-from models.geometry.ground_flow import ground_flow, rotation_and_turns
+from models.flow.compiled.step import log_ratio_of, slope_of, step_on_ground
+from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, Mask
-from models.geometry.vectors import aside_of, dot, norm
-
-_LEAST_RAY = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,45 +38,84 @@ def place_steps(steps: Steps, candidate: Array, *, sloped: bool = True) -> Place
     """Where steps are on the ground and which way they go, seen from a candidate (4,).
 
     Unless it is `sloped`, the derivatives are nothing, and it takes half of the time.
-
-    The image's area is that of the ground by det J = h^2 / w_z^3 for the homography's Jacobian J,
-    its directions are those of the ground by det J / |J t|^2.
     """
     tilt, roll, log_height, heading = (float(number) for number in candidate)
-    height_m = float(np.exp(log_height))
     rotation, turns = rotation_and_turns(tilt, roll, heading)
-    start, start_valid = ground_of_rays(steps.start_rays, rotation, beyond=0.0)
-    end, end_valid = ground_of_rays(steps.end_rays, rotation, beyond=0.0)
-    valid = start_valid & end_valid
-    across = end - start
-    length = np.maximum(norm(across), 1e-12)
-    way = across / length[:, None]
-    place = (start + end) / 2
-    middle = (steps.start_rays + steps.end_rays) / 2
-    down = np.where(valid, np.maximum(-(middle @ rotation)[:, 2], 1e-6), 1.0)
-    seen = np.maximum(norm(steps.end_rays - steps.start_rays), _LEAST_RAY)
-    toward, aside = dot(way, place), aside_of(way)
-    count = len(place)
-    d_place, d_direction, d_log_ratio = np.zeros((count, 2, 4)), *np.zeros((2, count, 4))
-    for number, turn in enumerate(turns if sloped else ()):
-        d_place[:, :, number], fall = ground_flow(place, turn)
-        along = way @ turn[:2, 2]
-        bent = way @ turn[:2, :2] + place * along[:, None]
-        d_direction[:, number] = dot(bent, aside)
-        d_log_ratio[:, number] = 4 * fall - 2 * toward * along
-    d_place[:, :, 2] = place
-    d_log_ratio[:, 2] = 2.0
-    # A camera that turns clockwise takes its ground along.
-    d_place[:, :, 3] = -aside_of(place)
-    d_direction[:, 3] = -1.0
-    log_ratio = 2 * (log_height - 3 * np.log(down) - np.log(length / seen))
-    return Placement(
-        place=place * height_m,
-        direction=np.arctan2(way[:, 1], way[:, 0]),
-        length_m=length * height_m,
-        valid=valid,
-        log_ratio=np.where(valid, log_ratio, 0.0),
-        d_place=d_place * height_m,
-        d_direction=d_direction,
-        d_log_ratio=np.where(valid[:, None], d_log_ratio, 0.0),
+    count = len(steps.start_rays)
+    placed = Placement(
+        place=np.empty((count, 2)),
+        direction=np.empty(count),
+        length_m=np.empty(count),
+        valid=np.empty(count, dtype=bool),
+        log_ratio=np.empty(count),
+        d_place=np.zeros((count, 2, 4)),
+        d_direction=np.zeros((count, 4)),
+        d_log_ratio=np.zeros((count, 4)),
     )
+    _place(
+        np.ascontiguousarray(steps.start_rays),
+        np.ascontiguousarray(steps.end_rays),
+        rotation,
+        log_height,
+        placed.place,
+        placed.direction,
+        placed.length_m,
+        placed.valid,
+        placed.log_ratio,
+    )
+    if sloped:
+        _slope(
+            np.ascontiguousarray(steps.start_rays),
+            np.ascontiguousarray(steps.end_rays),
+            rotation,
+            np.array(turns),
+            math.exp(log_height),
+            placed.d_place,
+            placed.d_direction,
+            placed.d_log_ratio,
+        )
+    return placed
+
+
+@compiled
+def _place(
+    starts: Array,
+    ends: Array,
+    rotation: Array,
+    log_height: float,
+    place: Array,
+    direction: Array,
+    length_m: Array,
+    valid: Mask,
+    log_ratio: Array,
+) -> None:
+    """Write where the steps between rays (M, 3) are into the last five."""
+    height_m = math.exp(log_height)
+    for number in range(len(starts)):
+        step = step_on_ground(starts, ends, number, rotation)
+        place[number, 0], place[number, 1] = step.x * height_m, step.y * height_m
+        direction[number] = math.atan2(step.way_y, step.way_x)
+        length_m[number] = step.length * height_m
+        valid[number], log_ratio[number] = step.valid, log_ratio_of(step, log_height)
+
+
+@compiled
+def _slope(
+    starts: Array,
+    ends: Array,
+    rotation: Array,
+    turns: Array,
+    height_m: float,
+    d_place: Array,
+    d_direction: Array,
+    d_log_ratio: Array,
+) -> None:
+    """Write how the steps between rays (M, 3) move into the last three."""
+    for number in range(len(starts)):
+        step = step_on_ground(starts, ends, number, rotation)
+        for parameter in range(4):
+            slope = slope_of(step, turns, parameter)
+            d_place[number, 0, parameter] = slope.x * height_m
+            d_place[number, 1, parameter] = slope.y * height_m
+            d_direction[number, parameter] = slope.direction
+            d_log_ratio[number, parameter] = slope.log_ratio if step.valid else 0.0

@@ -3,16 +3,18 @@
 Ours: share = sum over blocks of the map's people times the part of the block in the picture.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.flow.compiled.block import Lens
+from models.flow.compiled.views import known_sums_in_view, parts_in_view, sums_in_view
 from models.flow.map.flow_map import DIRECTIONS, FlowMap
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, rotation_from_angles
 
 _BLOCK = 3  # nodes along a side that are looked at as one
-_NEAREST_M = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,8 +32,16 @@ class Coverage:
 
     def seen_from(self, intrinsics: Intrinsics, candidates: Array) -> tuple[Array, Array]:
         """Shares (..., S) of people, and of unknown ones (...), where cameras (..., 4) look."""
-        seen = in_view(intrinsics, candidates, self.places, self.block_m)
-        return seen @ self.shares.T, seen @ self.unknown
+        known, beyond = sums_in_view(
+            _lens(intrinsics),
+            *_cameras(candidates),
+            *_columns(self.places),
+            float(self.block_m),
+            np.ascontiguousarray(self.shares),
+            np.ascontiguousarray(self.unknown),
+        )
+        batch = candidates.shape[:-1]
+        return known.reshape(*batch, -1), beyond.reshape(batch)
 
 
 def known_shares(
@@ -42,13 +52,17 @@ def known_shares(
     These parts stay as they are while the candidates (..., 4) move: what people in them
     say must not hang on where known ground ends.
     """
-    rays = _rays(candidates, coverage.places)
-    there = rays @ rotation_from_angles(anchor[0], anchor[1], anchor[3])
-    down = np.where(there[..., 2] < -_NEAREST_M, -there[..., 2], np.inf)
-    places = there[..., :2] * (np.exp(anchor[2]) / down)[..., None]
-    unseen, _ = flow.look_unseen(places.reshape(-1, 2))
-    seen = _inside(intrinsics, rays, coverage.block_m) * (1 - unseen.reshape(down.shape))
-    return np.asarray(seen @ coverage.shares.T)
+    known = known_sums_in_view(
+        _lens(intrinsics),
+        *_cameras(candidates),
+        *_columns(coverage.places),
+        float(coverage.block_m),
+        np.ascontiguousarray(coverage.shares),
+        flow.grid,
+        rotation_from_angles(anchor[0], anchor[1], anchor[3]),
+        math.exp(anchor[2]),
+    )
+    return known.reshape(*candidates.shape[:-1], -1)
 
 
 def in_view(intrinsics: Intrinsics, candidates: Array, places: Array, size_m: float) -> Array:
@@ -57,28 +71,36 @@ def in_view(intrinsics: Intrinsics, candidates: Array, places: Array, size_m: fl
     A piece crosses the edge bit by bit, so that the part has slopes and no steps. Lens distortion
     is left out.
     """
-    return _inside(intrinsics, _rays(candidates, places), size_m)
+    parts = parts_in_view(
+        _lens(intrinsics), *_cameras(candidates), *_columns(places), float(size_m)
+    )
+    return parts.reshape(*candidates.shape[:-1], len(places))
 
 
-def _rays(candidates: Array, places: Array) -> Array:
-    """Rays (..., B, 3) of cameras (..., 4) to places (B, 2)."""
-    rotations = rotation_from_angles(candidates[..., 0], candidates[..., 1], candidates[..., 3])
-    below = np.exp(candidates[..., 2])[..., None, None] * rotations[..., None, :, 2]
-    return np.asarray(places @ np.swapaxes(rotations[..., :2], -1, -2) - below)
+def _lens(intrinsics: Intrinsics) -> Lens:
+    return Lens(
+        fx=float(intrinsics.fx),
+        fy=float(intrinsics.fy),
+        cx=float(intrinsics.cx),
+        cy=float(intrinsics.cy),
+        width=float(intrinsics.width),
+        height=float(intrinsics.height),
+    )
 
 
-def _inside(intrinsics: Intrinsics, rays: Array, size_m: float) -> Array:
-    """Which part (...) of pieces of ground along rays (..., 3) is in the picture."""
-    ahead = rays[..., 2] > _NEAREST_M
-    per_depth = 1 / np.where(ahead, rays[..., 2], 1.0)
-    edge = 1 / (intrinsics.fx * size_m * per_depth)
-    u = (intrinsics.fx * rays[..., 0] * per_depth + intrinsics.cx) * edge
-    v = (intrinsics.fy * rays[..., 1] * per_depth + intrinsics.cy) * edge
-    inside = ahead.astype(np.float64)
-    for at, size in ((u, intrinsics.width), (v, intrinsics.height)):
-        inside *= np.minimum(np.maximum(at + 0.5, 0), 1)
-        inside *= np.minimum(np.maximum(size * edge - at + 0.5, 0), 1)
-    return inside
+def _cameras(candidates: Array) -> tuple[Array, Array]:
+    """Rotations (K, 3, 3) and heights (K,) in metres of candidates (..., 4)."""
+    flat = candidates.reshape(-1, 4)
+    if len(flat) == 1:  # numbers are turned into a matrix in a tenth of the time
+        rotations = rotation_from_angles(flat[0, 0], flat[0, 1], flat[0, 3])[None]
+    else:
+        rotations = rotation_from_angles(flat[:, 0], flat[:, 1], flat[:, 3])
+    return rotations, np.exp(flat[:, 2])
+
+
+def _columns(places: Array) -> tuple[Array, Array]:
+    """Both coordinates (B,) of places (B, 2), each in a row in memory."""
+    return np.ascontiguousarray(places[:, 0]), np.ascontiguousarray(places[:, 1])
 
 
 def coverage_of(flow: FlowMap) -> Coverage:

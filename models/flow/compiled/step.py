@@ -1,0 +1,134 @@
+"""One step on the ground: where it is, which way it goes, and how that moves with a candidate.
+
+Lengths are in camera heights, from the camera's foot point; axes are the world's. A candidate is
+(tilt, roll, log height, heading).
+
+Ours: the change of variables from the image to the ground, det J = h^2 / w_z^3 for the homography's
+Jacobian J.
+"""
+
+import math
+from typing import NamedTuple
+
+from models.compiled import compiled
+from models.geometry.ground import LOWEST_SINE
+from models.geometry.rotation import Array
+
+_LEAST_LENGTH = 1e-12
+_LEAST_RAY = 1e-9
+_LEAST_FALL = 1e-6
+_TURNS = 2  # of the parameters, tilt and roll: the rays' directions change by a matrix
+_LOG_HEIGHT = 2
+
+
+class Landing(NamedTuple):
+    """Where a ray hits the ground, `x` and `y`; both are 0 where it is not `valid`."""
+
+    x: float
+    y: float
+    valid: bool
+
+
+class Step(NamedTuple):
+    """Its middle `x`, `y`, its way (of length 1), and its length on the ground.
+
+    `fall` is how far the ray to its middle falls, 1 of what is not `valid`, and `seen` how long
+    the step is between its rays.
+    """
+
+    x: float
+    y: float
+    way_x: float
+    way_y: float
+    length: float
+    fall: float
+    seen: float
+    valid: bool
+
+
+class Slope(NamedTuple):
+    """By one parameter: of the place, the direction (radians), and the log ratio."""
+
+    x: float
+    y: float
+    direction: float
+    log_ratio: float
+
+
+@compiled
+def landing(rays: Array, number: int, rotation: Array) -> Landing:
+    """Where one of rays (M, 3) of the camera frame lands; `rotation` (3, 3) `camera_from_world`."""
+    ray_x, ray_y, ray_z = rays[number, 0], rays[number, 1], rays[number, 2]
+    x = ray_x * rotation[0, 0] + ray_y * rotation[1, 0] + ray_z * rotation[2, 0]
+    y = ray_x * rotation[0, 1] + ray_y * rotation[1, 1] + ray_z * rotation[2, 1]
+    down = -(ray_x * rotation[0, 2] + ray_y * rotation[1, 2] + ray_z * rotation[2, 2])
+    if down > LOWEST_SINE * math.sqrt(x * x + y * y + down * down):
+        heights = 1 / down
+        return Landing(x * heights, y * heights, True)
+    return Landing(0.0, 0.0, False)
+
+
+@compiled
+def step_on_ground(starts: Array, ends: Array, number: int, rotation: Array) -> Step:
+    """One of the steps between rays (M, 3) to both ends, by `camera_from_world` (3, 3)."""
+    start, end = landing(starts, number, rotation), landing(ends, number, rotation)
+    across_x, across_y = end.x - start.x, end.y - start.y
+    length = max(math.sqrt(across_x * across_x + across_y * across_y), _LEAST_LENGTH)
+    valid = start.valid and end.valid
+    fall, seen = 1.0, 0.0
+    middle_falls = 0.0
+    for axis in range(3):
+        apart = ends[number, axis] - starts[number, axis]
+        seen += apart * apart
+        middle_falls -= (starts[number, axis] + ends[number, axis]) / 2 * rotation[axis, 2]
+    if valid:
+        fall = max(middle_falls, _LEAST_FALL)
+    return Step(
+        (start.x + end.x) / 2,
+        (start.y + end.y) / 2,
+        across_x / length,
+        across_y / length,
+        length,
+        fall,
+        max(math.sqrt(seen), _LEAST_RAY),
+        valid,
+    )
+
+
+@compiled
+def log_ratio_of(step: Step, log_height: float) -> float:
+    """The log of a density over place and direction in the image, over that on the ground.
+
+    The image's area is that of the ground by det J = h^2 / w_z^3, its directions are those of the
+    ground by det J / |J t|^2. 0 of what is not valid.
+    """
+    if not step.valid:
+        return 0.0
+    stretch = step.fall * step.fall * step.fall * (step.length / step.seen)
+    return 2 * (log_height - math.log(stretch))
+
+
+@compiled
+def slope_of(step: Step, turns: Array, parameter: int) -> Slope:
+    """How a step on the ground moves with one of the four parameters.
+
+    `turns` (2, 3, 3) are those of `rotation_and_turns`. The place is in camera heights of now.
+    """
+    if parameter < _TURNS:
+        turn = turns[parameter]
+        x, y = step.x, step.y
+        fall = x * turn[0, 2] + y * turn[1, 2] - turn[2, 2]
+        along = step.way_x * turn[0, 2] + step.way_y * turn[1, 2]
+        bent_x = step.way_x * turn[0, 0] + step.way_y * turn[1, 0] + x * along
+        bent_y = step.way_x * turn[0, 1] + step.way_y * turn[1, 1] + y * along
+        toward = step.way_x * x + step.way_y * y
+        return Slope(
+            x * turn[0, 0] + y * turn[1, 0] - turn[2, 0] + x * fall,
+            x * turn[0, 1] + y * turn[1, 1] - turn[2, 1] + y * fall,
+            bent_y * step.way_x - bent_x * step.way_y,
+            4 * fall - 2 * toward * along,
+        )
+    if parameter == _LOG_HEIGHT:
+        return Slope(step.x, step.y, 0.0, 2.0)
+    # A camera that turns clockwise takes its ground along.
+    return Slope(step.y, -step.x, -1.0, 0.0)

@@ -1,0 +1,174 @@
+"""What steps say at a candidate: loops over M steps that add up by track.
+
+The steps run between rays (M, 3) to both ends; `rotation` (3, 3) is `camera_from_world`, `turns`
+(2, 3, 3) are those of `rotation_and_turns`, `slot_idx` (M,) is the part of the day.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from models.compiled import compiled
+from models.flow.compiled.place import Grid, look_at, unseen_at
+from models.flow.compiled.step import landing, log_ratio_of, slope_of, step_on_ground
+from models.geometry.rotation import Array, Mask
+
+_NO_GROUND = -30.0
+Index = npt.NDArray[np.int64]
+
+
+class Told(NamedTuple):
+    """What each step says before it is known how busy unseen ground is.
+
+    The log density `known` (M,) of known ground, which part is `unseen` (M,), and the log ratio
+    (M,) of what is `valid`. `slopes` (M, 3, 4) are by the candidate of the three; (0, 3, 4) of what
+    is not scored.
+    """
+
+    known: Array
+    unseen: Array
+    log_ratio: Array
+    valid: Mask
+    slopes: Array
+
+
+@compiled
+def tell(
+    starts: Array,
+    ends: Array,
+    slot_idx: Index,
+    grid: Grid,
+    rotation: Array,
+    turns: Array,
+    log_height: float,
+    scored: bool,
+) -> Told:
+    """What each step says at a candidate."""
+    count = len(starts)
+    known, unseen, log_ratio = np.empty(count), np.empty(count), np.empty(count)
+    valid = np.empty(count, dtype=np.bool_)
+    slopes = np.empty((count if scored else 0, 3, 4))
+    height_m = math.exp(log_height)
+    for number in range(count):
+        step = step_on_ground(starts, ends, number, rotation)
+        x_m, y_m = step.x * height_m, step.y * height_m
+        direction = math.atan2(step.way_y, step.way_x)
+        look = look_at(grid, slot_idx[number], x_m, y_m, direction)
+        hidden = unseen_at(grid, x_m, y_m)
+        known[number], unseen[number] = look.value, hidden.value
+        log_ratio[number], valid[number] = log_ratio_of(step, log_height), step.valid
+        if scored:
+            for parameter in range(4):
+                slope = slope_of(step, turns, parameter)
+                slopes[number, 0, parameter] = (
+                    height_m * (look.by_x * slope.x + look.by_y * slope.y)
+                    + look.by_direction * slope.direction
+                )
+                slopes[number, 1, parameter] = height_m * (
+                    hidden.by_x * slope.x + hidden.by_y * slope.y
+                )
+                slopes[number, 2, parameter] = slope.log_ratio
+    return Told(known, unseen, log_ratio, valid, slopes)
+
+
+@compiled
+def busy_gains(told: Told, weight: Array, typical: float, busy: Array) -> Array:
+    """How much likelier (L,) steps are in all for unseen ground being so busy (L,)."""
+    gains = np.zeros(busy.size)
+    for number in range(weight.size):
+        if told.unseen[number] > 0:
+            ratio = told.unseen[number] * typical / math.exp(told.known[number])
+            for level in range(busy.size):
+                gains[level] += weight[number] * math.log1p(busy[level] * ratio)
+    return gains
+
+
+@compiled
+def likelihood_of_tracks(
+    told: Told,
+    weight: Array,
+    owner_idx: Index,
+    slot_idx: Index,
+    extra: float,
+    log_share: Array,
+    d_log_share: Array,
+    tracks: int,
+) -> tuple[Array, Array]:
+    """Values (tracks,) and scores (tracks, 4), nothing of what was not told with slopes.
+
+    Args:
+        told: what the steps say.
+        weight: of each step (M,).
+        owner_idx: the track of each step (M,).
+        slot_idx: the part of the day (M,).
+        extra: how dense people are on unseen ground.
+        log_share: of all people, those that the camera sees (S,).
+        d_log_share: its derivatives by the candidate (S, 4).
+        tracks: how many there are.
+    """
+    values, scores = np.zeros(tracks), np.zeros((tracks, 4))
+    scored = len(told.slopes) > 0
+    for number in range(weight.size):
+        owner, slot = owner_idx[number], slot_idx[number]
+        density = math.exp(told.known[number])
+        own = density
+        density += extra * told.unseen[number]
+        value = _NO_GROUND
+        if told.valid[number]:
+            value = math.log(density) + told.log_ratio[number]
+        values[owner] += weight[number] * (value - log_share[slot])
+        if scored:
+            for parameter in range(4):
+                score = -d_log_share[slot, parameter]
+                if told.valid[number]:
+                    score += (
+                        own / density * told.slopes[number, 0, parameter]
+                        + extra / density * told.slopes[number, 1, parameter]
+                        + told.slopes[number, 2, parameter]
+                    )
+                scores[owner, parameter] += weight[number] * score
+    return values, scores
+
+
+@compiled
+def known_scores_of_tracks(
+    starts: Array,
+    ends: Array,
+    weight: Array,
+    owner_idx: Index,
+    slot_idx: Index,
+    grid: Grid,
+    rotation: Array,
+    turns: Array,
+    height_m: float,
+    anchor: Array,
+    anchor_height_m: float,
+    d_log_share: Array,
+    tracks: int,
+) -> Array:
+    """Scores (tracks, 4) of steps as far as they are on known ground, seen from an anchor (3, 3).
+
+    `weight`, `owner_idx` and `d_log_share` are as in `likelihood_of_tracks`.
+    """
+    scores = np.zeros((tracks, 4))
+    for number in range(weight.size):
+        step = step_on_ground(starts, ends, number, rotation)
+        if not step.valid:
+            continue
+        start, end = landing(starts, number, anchor), landing(ends, number, anchor)
+        x_m, y_m = (start.x + end.x) / 2 * anchor_height_m, (start.y + end.y) / 2 * anchor_height_m
+        counted = weight[number] * (1 - unseen_at(grid, x_m, y_m).value)
+        owner, slot = owner_idx[number], slot_idx[number]
+        direction = math.atan2(step.way_y, step.way_x)
+        look = look_at(grid, slot, step.x * height_m, step.y * height_m, direction)
+        for parameter in range(4):
+            slope = slope_of(step, turns, parameter)
+            score = (
+                height_m * (look.by_x * slope.x + look.by_y * slope.y)
+                + look.by_direction * slope.direction
+                + slope.log_ratio
+            )
+            scores[owner, parameter] += counted * (score - d_log_share[slot, parameter])
+    return scores
