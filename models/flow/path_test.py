@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.flow.likelihood import Walkers
+from models.flow.map.flow_map import DIRECTIONS
 from models.flow.map.placement import place_steps
 from models.flow.map.view import in_view
 from models.flow.registration import Site
@@ -106,7 +107,9 @@ def _expected(site: Site, candidate: Array) -> Array:
     nodes = flow.corner + flow.cell_m * np.indices(size).reshape(2, -1).T
     seen = in_view(site.intrinsics, candidate, nodes, flow.cell_m)
     seen = seen * (flow.unseen.ravel() < 1 - _KNOWN)
-    density = np.exp(flow.log_density)
-    share = (density.sum(axis=3).reshape(flow.slots, -1) * seen).sum(axis=1)
-    mean = ((density * flow.log_density).sum(axis=3).reshape(flow.slots, -1) * seen).sum(axis=1)
+    there = np.flatnonzero(seen)
+    log_density = flow.log_density.reshape(flow.slots, -1, DIRECTIONS)[:, there]
+    density = np.exp(log_density)
+    share = density.sum(axis=2) @ seen[there]
+    mean = np.einsum("snw,snw->sn", density, log_density) @ seen[there]
     return np.asarray(mean / np.maximum(share, 1e-9))

@@ -74,15 +74,39 @@ def tell(
 
 
 @compiled
-def busy_gains(told: Told, weight: Array, typical: float, busy: Array) -> Array:
-    """How much likelier (L,) steps are in all for unseen ground being so busy (L,)."""
-    gains = np.zeros(busy.size)
+def busiest(
+    told: Told,
+    weight: Array,
+    slot_idx: Index,
+    typical: float,
+    seen: Array,
+    beyond: float,
+    busy: Array,
+    log_prior: Array,
+) -> float:
+    """How busy unseen ground is for the tracks to be most likely, of what is tried (L,).
+
+    Args:
+        told: what the steps say.
+        weight: of each step (M,).
+        slot_idx: the part of the day (M,).
+        typical: the density on unseen ground, were it as busy as the known.
+        seen: the share (S,) of people on known ground whom the camera sees.
+        beyond: the share of those on unseen ground, were it as busy.
+        busy: what is tried (L,), against the known ground.
+        log_prior: of what is tried (L,).
+    """
+    likely, share = log_prior.copy(), np.zeros(seen.size)
     for number in range(weight.size):
+        share[slot_idx[number]] += weight[number]
         if told.unseen[number] > 0:
             ratio = told.unseen[number] * typical / math.exp(told.known[number])
             for level in range(busy.size):
-                gains[level] += weight[number] * math.log1p(busy[level] * ratio)
-    return gains
+                likely[level] += weight[number] * math.log1p(busy[level] * ratio)
+    for level in range(busy.size):
+        for slot in range(seen.size):
+            likely[level] -= share[slot] * math.log(seen[slot] + busy[level] * beyond)
+    return float(busy[np.argmax(likely)])
 
 
 @compiled
