@@ -31,7 +31,8 @@ SERVICE_ROOMS = [
     {"cli"},
 ]
 MODEL_ROOMS = [
-    {"errors", "reasons"},
+    {"errors", "reasons", "machine_code"},
+    {"compiled"},
     {"packing", "quantiles"},
     {"geometry"},
     {"trajectory"},
@@ -152,7 +153,7 @@ def test_no_way_through_the_folders_comes_back(top):
 def test_the_http_process_imports_no_torch():
     program = (
         "import sys; import service.commands.serve, service.app, service.process.local_workers; "
-        "print(sorted({'torch', 'cv2', 'matplotlib', 'scipy'} & set(sys.modules)))"
+        "print(sorted({'torch', 'cv2', 'matplotlib', 'scipy', 'numba'} & set(sys.modules)))"
     )
     output = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT

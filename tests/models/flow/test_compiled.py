@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numba.core.dispatcher import Dispatcher
 from numpy.testing import assert_allclose
 
 import models.flow.compiled
+from models.compiled import _Compiled
 from models.estimation.joint.observations import Rows, Steps
 from models.flow.likelihood import Walkers, anchored_scores, likelihood
 from models.flow.map import placement
@@ -254,7 +254,7 @@ def test_one_kind_of_arguments_is_compiled_whoever_calls():
         importlib.import_module(f"models.flow.compiled.{part.name}")
         for part in pkgutil.iter_modules(models.flow.compiled.__path__)
     ]
-    loops = {loop for room in rooms for loop in vars(room).values() if isinstance(loop, Dispatcher)}
+    loops = {loop for room in rooms for loop in vars(room).values() if isinstance(loop, _Compiled)}
     assert len(loops) > 15
     for loop in loops:
         assert len(loop.signatures) <= 1, (loop, loop.signatures)  # none: it came with another

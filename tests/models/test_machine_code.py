@@ -1,0 +1,74 @@
+"""Compiled functions: as Python has them, kept between processes, and outdated by any source."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import models
+from models.compiled import compiled
+
+OUTER = """
+from models.compiled import compiled
+from models.inner import LIMIT, doubled
+
+@compiled
+def total(values: list) -> float:
+    found = 0.0
+    for value in values:
+        found += min(doubled(value), LIMIT)
+    return found
+"""
+INNER = """
+from models.compiled import compiled
+LIMIT = {limit}
+
+@compiled
+def doubled(value: float) -> float:
+    return {factor} * value
+"""
+ASK = """
+import numpy, sys
+import models.outer
+assert "numba" not in sys.modules
+print(models.outer.total(numpy.arange(4.0)))
+stats = models.outer.total.made().stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def ask(tmp_path):
+    package = tmp_path / "models"
+    package.mkdir()
+    for name in ("__init__.py", "compiled.py", "machine_code.py"):
+        shutil.copy(Path(models.__path__[0]) / name, package)
+    (package / "outer.py").write_text(OUTER)
+
+    def ask(**numbers):
+        (package / "inner.py").write_text(INNER.format(**numbers))
+        command = [sys.executable, "-c", ASK]
+        told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        total, cached = told.stdout.splitlines()
+        return float(total), cached
+
+    return ask
+
+
+def test_another_process_finds_the_code_unless_any_source_has_changed(ask):
+    assert ask(factor=2, limit=5) == (2 + 4 + 5, "0 1")
+    assert ask(factor=2, limit=5) == (2 + 4 + 5, "1 0")
+    assert ask(factor=3, limit=5) == (3 + 5 + 5, "0 1")
+    assert ask(factor=3, limit=7) == (3 + 6 + 7, "0 1")
+
+
+def test_what_divides_by_nothing_goes_on_as_numpy_does():
+    @compiled
+    def ratio(first, second):
+        return first / second
+
+    assert ratio(1.0, 0.0) == np.inf
+    assert ratio.__name__ == "ratio"
