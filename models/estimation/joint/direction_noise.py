@@ -13,6 +13,7 @@ noise, is ours.
 import numpy as np
 
 from models.estimation.joint.hierarchy import Spread, Weights
+from models.estimation.joint.loops.sums import information_of_noise
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
@@ -25,10 +26,10 @@ def noise_information(measured: Measured, weights: Weights, spread: Spread) -> A
     Of a track's noise, its own level and trend take a part.
     """
     rows = measured.rows
-    number = np.bincount(rows.owner_idx, measured.valid, rows.owners)
-    left = np.maximum(number - 2, 0) / np.maximum(number, 1)
-    weight = weights.row * left[rows.owner_idx] / spread.within_sd**2
-    return np.asarray((measured.d_direction_noise * weight[:, None]).T @ measured.d_direction_noise)
+    information = information_of_noise(
+        measured.d_direction_noise, weights.row, measured.valid, rows.owner_idx, rows.owners
+    )
+    return information / spread.within_sd**2
 
 
 def corrected_covariance(matrix: Array, noise: Array) -> Array:

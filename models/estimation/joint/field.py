@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.estimation.joint.loops.bumps import exponents_at, features_of, slopes_of
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
 # The squares of Gaussian bumps one length apart sum to pi, wherever one looks.
 _BUMP_SHARE = np.pi
 _MOST_BUMPS = 150
+_NO_WAY, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,37 +56,36 @@ class Field:
 
     def features(self, measured: Measured) -> Array:
         """The rows (M, P) that the coefficients are multiplied by."""
-        columns = [np.ones((len(measured.value), 1))]
-        if self.directional:
-            assert measured.direction is not None
-            x, y = measured.direction.T
-            columns.append(np.stack([x, y, x * x - y * y, 2 * x * y], axis=1))
-        return np.concatenate([*columns, self._bumps(measured.place)], axis=1)
+        exponents, pair = exponents_at(measured.place, self.centres, self.length_m)
+        falls = np.exp(exponents, out=exponents)
+        direction = measured.direction if self.directional else _NO_WAY
+        assert direction is not None
+        return features_of(falls, pair, self.directional, direction)
 
     def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
         """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
         first = 5 if self.directional else 1
-        weighted = features[:, first:] * coefficients[first:]
-        by_place = (
-            weighted @ self.centres - weighted.sum(axis=1, keepdims=True) * measured.place
-        ) / self.length_m**2
-        slopes = np.einsum("mi,mik->mk", by_place, measured.d_place)
+        # Three products with a vector take half as long as one with a matrix of three columns.
+        pulls = np.zeros((3, features.shape[1]))
+        pulls[:2, first:] = coefficients[first:] * self.centres.T
+        pulls[2, first:] = coefficients[first:]
+        direction, d_direction = _NO_WAY, _NO_CHANGE
         if self.directional:
             assert measured.direction is not None
             assert measured.d_direction is not None
-            x, y = measured.direction.T
-            a, b, c, d = coefficients[1:5]
-            by_direction = np.stack([a + 2 * (c * x + d * y), b + 2 * (d * x - c * y)], axis=1)
-            slopes = slopes + np.einsum("mi,mik->mk", by_direction, measured.d_direction)
-        return np.asarray(slopes)
-
-    def _bumps(self, place: Array) -> Array:
-        apart = (
-            (place**2).sum(axis=1)[:, None]
-            + (self.centres**2).sum(axis=1)
-            - 2 * place @ self.centres.T
+            direction, d_direction = measured.direction, measured.d_direction
+        return slopes_of(
+            features @ pulls[0],
+            features @ pulls[1],
+            features @ pulls[2],
+            self.length_m,
+            measured.place,
+            measured.d_place,
+            coefficients,
+            self.directional,
+            direction,
+            d_direction,
         )
-        return np.asarray(np.exp(-apart / (2 * self.length_m**2)))
 
 
 def field_over(measured: Measured, shape: FieldShape) -> Field:

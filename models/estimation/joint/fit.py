@@ -214,8 +214,10 @@ def _linear(
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ mean, 0.0)
     weights = reweigh(residual, measured.value, measured.valid, measured.rows, learned.spread)
-    by_pose = measured.d_value - learned.field.slopes(measured, features, mean)
-    jacobian = np.concatenate([by_pose, -features], axis=1)
+    jacobian = np.empty((residual.size, 3 + mean.size))
+    slopes = learned.field.slopes(measured, features, mean)
+    np.subtract(measured.d_value, slopes, out=jacobian[:, :3])
+    np.negative(features, out=jacobian[:, 3:])
     return measured, jacobian, residual, weights
 
 

@@ -4,12 +4,10 @@ Ours: two tracks are one group where they are within 4 m and 37 deg of one anoth
 shorter; groups are the connected components of such pairs.
 """
 
-from collections import Counter
-from itertools import combinations
-
 import numpy as np
 import numpy.typing as npt
 
+from models.estimation.joint.loops.pairs import pairs_beside
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
@@ -52,20 +50,11 @@ def walking_groups_of(
         owners: how many tracks there are; those without steps are each a walking group.
     """
     bins, positions, ways, owner_idx = _sampled(time_s, owner_idx, place, way)
-    together: Counter[tuple[int, int]] = Counter()
-    lengths = Counter(owner_idx.tolist())
-    firsts = np.flatnonzero(np.diff(bins, prepend=np.nan))
-    for rows in np.split(np.arange(bins.size), firsts[1:]):
-        for i, j in combinations(rows, 2):
-            near = np.hypot(*(positions[i] - positions[j])) < _NEAR_M
-            if near and ways[i] @ ways[j] > _SAME_WAY:
-                together[(owner_idx[i], owner_idx[j])] += 1
-    beside = [
-        pair
-        for pair, count in together.items()
-        if count >= _SHARE * min(lengths[pair[0]], lengths[pair[1]])
-    ]
-    return first_joined(np.array(beside, dtype=np.int64).reshape(-1, 2), owners)
+    together = pairs_beside(bins, owner_idx, positions, ways, _NEAR_M, _SAME_WAY)
+    pair, count = np.unique(together[:, 0] * owners + together[:, 1], return_counts=True)
+    beside = np.stack(np.divmod(pair, owners), axis=1)
+    lengths = np.bincount(owner_idx, minlength=owners)
+    return first_joined(beside[count >= _SHARE * lengths[beside].min(axis=1)], owners)
 
 
 def first_joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
@@ -81,9 +70,13 @@ def first_joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.in
 
 def _sampled(
     time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array
-) -> tuple[Array, Array, Array, npt.NDArray[np.int64]]:
+) -> tuple[npt.NDArray[np.int64], Array, Array, npt.NDArray[np.int64]]:
     """One step for each track and time bin: bins (K,), places, directions (K, 2), owners."""
     since_s = time_s - time_s.min(initial=np.inf)
-    time_bin = np.floor(since_s / _BIN_S + 1e-3)
-    _, first = np.unique(np.stack([time_bin, owner_idx]), axis=1, return_index=True)
+    time_bin = np.floor(since_s / _BIN_S + 1e-3).astype(np.int64)
+    order = np.lexsort((owner_idx, time_bin))
+    fresh = (np.diff(time_bin[order], prepend=-1) != 0) | (
+        np.diff(owner_idx[order], prepend=-1) != 0
+    )
+    first = order[fresh]
     return time_bin[first], place[first], way[first], owner_idx[first]

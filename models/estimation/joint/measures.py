@@ -7,18 +7,21 @@ Ours: with the flow F of ground points under a small change of the pose, a step 
 d log speed = u' (grad F) u.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.estimation.joint.loops.speeds import speeds_of_steps
+from models.estimation.joint.loops.statures import heights_of_tops
 from models.estimation.joint.observations import Rows, Steps, Tops
-from models.geometry.ground import ground_of_rays
-from models.geometry.ground_flow import down_to, ground_flow, rotation_and_turns
-from models.geometry.rotation import Array, Mask
-from models.geometry.upright import stature_ratio
-from models.geometry.vectors import aside_of, dot, norm
+from models.geometry.ground import LOWEST_SINE
+from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.rotation import Array, Mask, rotation_from_angles
 
 _LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
+_LEAST_RATIO = 0.01  # of a person's height to the camera's
+_NO_TURNS = np.empty((0, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,45 +57,28 @@ def measure_speeds(
     of ground points under a turn. Of the very ends it would share their noise: a step that noise
     makes longer would seem to depend more on the pose, and many tracks would agree on a wrong one.
     """
-    height_m = float(np.exp(candidate[2]))
-    rotation, turns = rotation_and_turns(candidate[0], candidate[1], heading_rad)
-    start, start_valid = ground_of_rays(steps.start_rays, rotation, beyond=0.0)
-    end, end_valid = ground_of_rays(steps.end_rays, rotation, beyond=0.0)
-    valid = start_valid & end_valid
-    across = end - start
-    length = norm(across)
-    direction = across / np.maximum(length, 1e-12)[:, None]
-    place = (start + end) / 2
-    count = len(place)
-    d_direction_noise, d_value = np.zeros((count, 3)), np.ones((count, 3))
-    d_place, d_direction = np.zeros((2, count, 2, 3))
-    if sloped:
-        aside = aside_of(direction)
-        noisy_end, noisy_valid = ground_of_rays(steps.noisy_end_rays, rotation, beyond=0.0)
-        off = np.where(noisy_valid, dot(noisy_end - end, aside), 0.0)
-        turned = off / np.maximum(length / 2, 1e-12)
-        toward, beside = dot(direction, place), dot(aside, place)
-        for number, turn in enumerate(turns):
-            d_place[:, :, number], fall = ground_flow(place, turn)
-            along = direction @ turn[:2, 2]
-            d_value[:, number] = fall + toward * along
-            d_direction_noise[:, number] = turned * (
-                beside * along + toward * (aside @ turn[:2, 2])
-            )
-            bent = direction @ turn[:2, :2] + place * along[:, None]
-            d_direction[:, :, number] = bent - dot(bent, direction)[:, None] * direction
-    d_place[:, :, 2] = place
+    height_m = math.exp(candidate[2])
+    rotation, turns = _rotation_and_turns(candidate, heading_rad, sloped)
+    value, place, direction, valid, d_value, d_place, d_direction, d_noise = speeds_of_steps(
+        steps.start_rays,
+        steps.end_rays,
+        steps.noisy_end_rays,
+        steps.seconds,
+        rotation,
+        turns,
+        height_m,
+        LOWEST_SINE,
+        _LEAST_STEP_M,
+    )
     return Measured(
-        value=np.where(
-            valid, np.log(np.hypot(length * height_m, _LEAST_STEP_M) / steps.seconds), 0.0
-        ),
-        place=place * height_m,
+        value=value,
+        place=place,
         direction=direction,
         valid=valid,
-        d_value=np.where(valid[:, None], d_value, 0.0),
-        d_place=d_place * height_m,
+        d_value=d_value,
+        d_place=d_place,
         d_direction=d_direction,
-        d_direction_noise=np.where(valid[:, None], d_direction_noise, 0.0),
+        d_direction_noise=d_noise,
         rows=steps.rows,
     )
 
@@ -104,33 +90,28 @@ def measure_statures(
 
     Unless it is `sloped`, the derivatives are nothing.
     """
-    height_m = float(np.exp(candidate[2]))
-    rotation, turns = rotation_and_turns(candidate[0], candidate[1], heading_rad)
-    place, valid = ground_of_rays(tops.foot_rays, rotation, beyond=0.0)
-    feet = np.where(valid[:, None], tops.foot_rays, (0.0, 1e6, 1.0))
-    ratio, _ = stature_ratio(rotation, feet, tops.top_y)
-    valid = valid & (ratio > 0.01)
-    ratio = np.where(valid, ratio, 1.0)
-    # ratio = n / m, m = down_z - y forward_z, n = (y forward - down) . (p, -1)
-    on_ground = down_to(place)
-    lean = tops.top_y[:, None] * rotation[2] - rotation[1]  # (M, 3)
-    lever = -lean[:, 2]
-    d_value = np.ones((len(ratio), 3))
-    d_place = np.zeros((len(ratio), 2, 3))
-    for number, turn in enumerate(turns if sloped else ()):
-        d_place[:, :, number], _ = ground_flow(place, turn)
-        d_lean = lean @ turn
-        d_top = dot(d_lean, on_ground) + dot(lean[:, :2], d_place[:, :, number])
-        d_value[:, number] = (d_top + ratio * d_lean[:, 2]) / lever / ratio
-    d_place[:, :, 2] = place
+    height_m = math.exp(candidate[2])
+    rotation, turns = _rotation_and_turns(candidate, heading_rad, sloped)
+    value, place, valid, d_value, d_place = heights_of_tops(
+        tops.foot_rays, tops.top_y, rotation, turns, height_m, LOWEST_SINE, _LEAST_RATIO
+    )
     return Measured(
-        value=np.where(valid, np.log(ratio * height_m), 0.0),
-        place=place * height_m,
+        value=value,
+        place=place,
         direction=None,
         valid=valid,
-        d_value=np.where(valid[:, None], d_value, 0.0),
-        d_place=d_place * height_m,
+        d_value=d_value,
+        d_place=d_place,
         d_direction=None,
-        d_direction_noise=np.zeros((len(place), 3)),
+        d_direction_noise=np.zeros((value.size, 3)),
         rows=tops.rows,
     )
+
+
+def _rotation_and_turns(candidate: Array, heading_rad: float, sloped: bool) -> tuple[Array, Array]:
+    """The rotation (3, 3), and how rays turn with tilt and roll (2, 3, 3); (0, 3, 3) unsloped."""
+    tilt_rad, roll_rad = float(candidate[0]), float(candidate[1])
+    if not sloped:
+        return rotation_from_angles(tilt_rad, roll_rad, heading_rad), _NO_TURNS
+    rotation, turns = rotation_and_turns(tilt_rad, roll_rad, heading_rad)
+    return rotation, np.array(turns)

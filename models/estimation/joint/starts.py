@@ -43,18 +43,27 @@ def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array
 def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Array]]:
     measures = [channel.measure(candidate=candidate, sloped=False) for channel in channels]
     speeds = measures[0]
-    if not speeds.valid.size or speeds.valid.mean() < _LEAST_VALID:
+    values = speeds.value[speeds.valid]
+    if not values.size or values.size / speeds.valid.size < _LEAST_VALID:
         return []
     usual = channels[0].learned.usual
     found = []
-    for quantile in np.quantile(speeds.value[speeds.valid], _SPEED_QUANTILES):
-        taller = usual - float(quantile)
+    for quantile in _quantiles(values):
+        taller = usual - quantile
         total = 0.0
         for channel, measured in zip(channels, measures, strict=True):
-            value = measured.value + taller
-            residual = np.where(measured.valid, value - channel.learned.usual, 0.0)
-            spread = channel.learned.spread
-            each = composite_log_likelihoods(residual, value, measured.valid, measured.rows, spread)
+            learned, value = channel.learned, measured.value + taller
+            residual = value - learned.usual
+            each = composite_log_likelihoods(
+                residual, value, measured.valid, measured.rows, learned.spread
+            )
             total += float(each.sum())
         found.append((total, candidate + [0.0, 0.0, taller]))
     return found
+
+
+def _quantiles(values: Array) -> list[float]:
+    """The speeds' quantiles, as numpy's, which takes three times as long for so few."""
+    places = np.array(_SPEED_QUANTILES) * (values.size - 1)
+    found = np.interp(places, np.arange(values.size), np.sort(values))
+    return [float(quantile) for quantile in found]

@@ -1,0 +1,31 @@
+"""Each loop is compiled once: arrays of another kind, read-only ones say, would be waited for."""
+
+import importlib
+import pkgutil
+
+import numpy as np
+
+from models.drift.change_point import find_change
+from models.estimation.joint import loops
+from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.observations import of_tracks
+from models.estimation.joint.reference import learn_speed_reference
+from models.simulation.walkers import WalkConfig
+from models.trajectory import by_end
+from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
+
+
+def test_learning_an_estimate_and_a_change_ask_for_one_kind_of_arrays():
+    known, after = tracks_of(3, (PRIOR, 40), (KNOCKED, 30), boxes=True)
+    reference = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
+    window = seen(by_end(after))
+    joint_estimate(window, PRIOR, reference)
+    find_change(window, PRIOR, reference)
+    joint_estimate(of_tracks(window, np.empty(0, dtype=np.int64)), PRIOR, reference)
+    compiled = {}
+    for module in pkgutil.iter_modules(loops.__path__, f"{loops.__name__}."):
+        for name, function in vars(importlib.import_module(module.name)).items():
+            if hasattr(function, "signatures") and not name.startswith("_"):
+                compiled[name] = len(function.signatures)
+    assert len(compiled) == 11
+    assert set(compiled.values()) == {1}, compiled
