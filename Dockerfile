@@ -18,6 +18,7 @@ COPY --from=build /opt/surefoot /opt/surefoot
 # service/README.md: docker run --rm -v surefoot:/data IMAGE surefoot token add NAME --scope admin
 ENV PATH=/opt/surefoot/bin:$PATH \
     SUREFOOT_DATA_DIR=/data \
+    NUMBA_CACHE_DIR=/data/compiled \
     SUREFOOT_HOST=0.0.0.0 \
     SUREFOOT_PORT=8080
 USER surefoot

@@ -15,9 +15,10 @@ log = logging.getLogger("surefoot.data_dir")
 SERVE_LOCK, MIGRATE_LOCK, KEY_FILE = "serve.lock", "migrate.lock", "secret.key"
 ROUNDS_LOCK = "rounds.lock"  # of the worker that does the upkeep, which has one of its own
 DATABASE, WEIGHTS, COPIES = "surefoot.sqlite", "weights", "copies"
+COMPILED = "compiled"  # in the image: machine code of models/, where no other place can be written
 _OURS = (
     *(DATABASE + end for end in ("", "-wal", "-shm", "-journal")),
-    *(WEIGHTS, COPIES, SERVE_LOCK, MIGRATE_LOCK, ROUNDS_LOCK, "worker-*.lock"),
+    *(WEIGHTS, COPIES, COMPILED, SERVE_LOCK, MIGRATE_LOCK, ROUNDS_LOCK, "worker-*.lock"),
     *(KEY_FILE, KEY_FILE + ".*", "restored", "restoring-*", "replaced-*"),
 )
 

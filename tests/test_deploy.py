@@ -10,6 +10,7 @@ import yaml
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.data_dir import COMPILED
 from service.settings import Settings
 
 ROOT = Path(__file__).parent.parent
@@ -77,6 +78,14 @@ def test_the_unit_restarts_limits_and_hardens():
         "StateDirectory=surefoot",
     } <= lines
     assert any(line.startswith("MemoryMax=") for line in lines)
+
+
+def test_what_is_compiled_has_a_place_that_can_be_written():
+    unit = UNIT.read_text()
+    assert "Environment=NUMBA_CACHE_DIR=/var/cache/surefoot\n" in unit
+    assert "\nCacheDirectory=surefoot\n" in unit  # /var/cache/surefoot
+    image = (ROOT / "Dockerfile").read_text()
+    assert f"NUMBA_CACHE_DIR=/data/{COMPILED} " in image
 
 
 def test_the_container_restarts_limits_and_is_watched():

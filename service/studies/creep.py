@@ -13,6 +13,7 @@ from rich.table import Table
 
 from models.errors import DegenerateGeometryError
 from models.evaluation.alarms.creep_years import NUMBERS, CreepCase, CreepPlan, creep_cases
+from service.studies.outcome_file import code_hash
 from service.studies.runs import process_pool, with_bar, write_results
 
 _TABLE_WIDTH = 120
@@ -23,7 +24,7 @@ def run_creep_study(
 ) -> None:
     """Let simulated cameras creep in each number at each rate, and stand; print, write JSON.
 
-    The JSON grows as sites end; those that it has of the same plan are not run again.
+    The JSON grows as sites end; those that it has by the same plan and code are not run again.
     """
     console = Console(width=max(Console().width, _TABLE_WIDTH))
     started = time.monotonic()
@@ -37,7 +38,8 @@ def run_creep_study(
             found = sorted(
                 (*found, *cases), key=lambda one: (one.site, one.seed, one.number, one.rate_deg)
             )
-            write_results(output, plan=asdict(plan), results=[asdict(each) for each in found])
+            results = [asdict(each) for each in found]
+            write_results(output, code=code_hash(), plan=asdict(plan), results=results)
     if found:
         console.print(creep_table([case for case in found if not case.still]))
         console.print(_still_words([case for case in found if case.still]))
@@ -78,7 +80,7 @@ def _kept(output: Path, plan: CreepPlan) -> list[CreepCase]:
     if not output.exists():
         return []
     kept = json.loads(output.read_text())
-    if kept["plan"] != asdict(plan):
+    if (kept.get("code"), kept["plan"]) != (code_hash(), asdict(plan)):
         return []
     return [CreepCase(**each) for each in kept["results"]]
 

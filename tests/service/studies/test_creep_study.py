@@ -7,7 +7,8 @@ import pytest
 from rich.console import Console
 
 from models.evaluation.alarms.creep_years import CreepCase, CreepPlan, Life, creep_case
-from service.studies.creep import creep_table, run_creep_study
+from service.studies.creep import _kept, creep_table, run_creep_study
+from service.studies.outcome_file import code_hash
 
 PLAN = CreepPlan(tracks_a_day=18.0, reference_tracks=200, alarms_a_year=1.0, days=60, still_days=0)
 CASE = CreepCase(
@@ -24,13 +25,16 @@ def test_a_creep_that_was_never_noticed_is_the_worst():
     assert "1.40, inf, inf (n 3)" in capture.get()
 
 
-def test_cases_of_the_same_plan_are_not_run_again(tmp_path):
+@pytest.mark.parametrize(("code", "kept"), [(code_hash(), 1), ("0" * 12, 0)])
+def test_cases_by_the_same_plan_and_code_are_not_run_again(tmp_path, code, kept):
     output = tmp_path / "creep.json"
     plan = {name: getattr(PLAN, name) for name in PLAN.__slots__}
     case = {name: getattr(CASE, name) for name in CASE.__slots__}
-    output.write_text(json.dumps({"plan": plan, "results": [case]}))
-    run_creep_study(sites=1, seed=0, plan=PLAN, processes=1, output=output)
-    assert json.loads(output.read_text())["results"] == [case]
+    output.write_text(json.dumps({"code": code, "plan": plan, "results": [case]}))
+    assert len(_kept(output, PLAN)) == kept
+    if kept:
+        run_creep_study(sites=1, seed=0, plan=PLAN, processes=1, output=output)
+        assert json.loads(output.read_text())["results"] == [case]
 
 
 @pytest.mark.slow
