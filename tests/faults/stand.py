@@ -5,7 +5,6 @@ import os
 import random
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import threading
@@ -17,6 +16,7 @@ import psutil
 
 from service.settings import Settings
 from tests.conftest import free_port
+from tests.faults.clock import Clock
 
 _RESTART_S = 0.3
 _LIBC = ctypes.CDLL(None)
@@ -61,24 +61,13 @@ class Stand:
         (self.folder / "witness").mkdir()
         path = os.pathsep.join(filter(None, (str(site), os.environ.get("PYTHONPATH"))))
         extras = {"PYTHONPATH": path, "FAULTS_WITNESS": str(self.folder / "witness")}
-        self.clock = self.folder / "clock"
-        self.set_clock(0)
-        library = self.folder / "clock.so"
-        compiler = shutil.which("cc")
-        self.has_clock = (
-            compiler is not None
-            and not subprocess.run(
-                [compiler, "-shared", "-fPIC", "-O1", "-o", library, here / "clock.c"], check=False
-            ).returncode
-        )
-        if self.has_clock:
-            extras |= {"LD_PRELOAD": str(library), "FAULTS_CLOCK": str(self.clock)}
-        return extras
+        self._clock, self.ahead_s = Clock(self.folder), 0
+        self.has_clock = self._clock.environment is not None
+        return extras | (self._clock.environment or {})
 
     def set_clock(self, ahead_s: int) -> None:
         """Have the service's wall clock run so many seconds ahead."""
-        with self.clock.open("r+b" if self.clock.exists() else "w+b") as file:
-            file.write(struct.pack("q", ahead_s))
+        self._clock.set(ahead_s)
         self.ahead_s = ahead_s
 
     def now_s(self) -> float:
