@@ -15,7 +15,6 @@ import numpy as np
 from models.estimation.joint.loops.speeds import speeds_of_steps
 from models.estimation.joint.loops.statures import heights_of_tops
 from models.estimation.joint.observations import Rows, Steps, Tops
-from models.geometry.ground import LOWEST_SINE
 from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, Mask, rotation_from_angles
 
@@ -67,7 +66,6 @@ def measure_speeds(
         rotation,
         turns,
         height_m,
-        LOWEST_SINE,
         _LEAST_STEP_M,
     )
     return Measured(
@@ -93,7 +91,7 @@ def measure_statures(
     height_m = math.exp(candidate[2])
     rotation, turns = _rotation_and_turns(candidate, heading_rad, sloped)
     value, place, valid, d_value, d_place = heights_of_tops(
-        tops.foot_rays, tops.top_y, rotation, turns, height_m, LOWEST_SINE, _LEAST_RATIO
+        tops.foot_rays, tops.top_y, rotation, turns, height_m, _LEAST_RATIO
     )
     return Measured(
         value=value,

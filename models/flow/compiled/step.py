@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from models.compiled import compiled
-from models.geometry.ground import LOWEST_SINE
+from models.geometry.landing import landing
 from models.geometry.rotation import Array
 
 _LEAST_LENGTH = 1e-12
@@ -19,14 +19,6 @@ _LEAST_RAY = 1e-9
 _LEAST_FALL = 1e-6
 _TURNS = 2  # of the parameters, tilt and roll: the rays' directions change by a matrix
 _LOG_HEIGHT = 2
-
-
-class Landing(NamedTuple):
-    """Where a ray hits the ground, `x` and `y`; both are 0 where it is not `valid`."""
-
-    x: float
-    y: float
-    valid: bool
 
 
 class Step(NamedTuple):
@@ -53,19 +45,6 @@ class Slope(NamedTuple):
     y: float
     direction: float
     log_ratio: float
-
-
-@compiled
-def landing(rays: Array, number: int, rotation: Array) -> Landing:
-    """Where one of rays (M, 3) of the camera frame lands; `rotation` (3, 3) `camera_from_world`."""
-    ray_x, ray_y, ray_z = rays[number, 0], rays[number, 1], rays[number, 2]
-    x = ray_x * rotation[0, 0] + ray_y * rotation[1, 0] + ray_z * rotation[2, 0]
-    y = ray_x * rotation[0, 1] + ray_y * rotation[1, 1] + ray_z * rotation[2, 1]
-    down = -(ray_x * rotation[0, 2] + ray_y * rotation[1, 2] + ray_z * rotation[2, 2])
-    if down > LOWEST_SINE * math.sqrt(x * x + y * y + down * down):
-        heights = 1 / down
-        return Landing(x * heights, y * heights, True)
-    return Landing(0.0, 0.0, False)
 
 
 @compiled

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.flow.compiled.place import Grid, look_at, unseen_at
-from models.flow.compiled.step import landing, log_ratio_of, slope_of, step_on_ground
+from models.flow.compiled.step import log_ratio_of, slope_of, step_on_ground
+from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
 _NO_GROUND = -30.0

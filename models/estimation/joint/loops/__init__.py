@@ -1,6 +1,5 @@
 """Loops over the rows of tracks, compiled: arrays and numbers in, arrays out.
 
 All arrays are C-contiguous and writable, of float64, int64 or bool: of any other kind a function
-would be compiled again. None of these calls one of another file, since a change there would not
-be noticed by what is kept compiled.
+would be compiled again.
 """

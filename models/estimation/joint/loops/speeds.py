@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from models.compiled import compiled
+from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
 
@@ -20,7 +21,6 @@ def speeds_of_steps(
     rotation: Array,
     turns: Array,
     height_m: float,
-    lowest_sine: float,
     least_step_m: float,
 ) -> tuple[Array, Array, Array, Mask, Array, Array, Array, Array]:
     """Log speeds (M,), middles (M, 2) in metres, directions (M, 2), and which are on the ground.
@@ -33,7 +33,6 @@ def speeds_of_steps(
         rotation: `camera_from_world` (3, 3).
         turns: how a ray's direction in the world moves (T, 3, 3): for tilt and roll, or for none.
         height_m: of the camera.
-        lowest_sine: of a ray's angle below the horizon, for it to reach the ground.
         least_step_m: keeps the logarithm of no step at all finite.
 
     Returns:
@@ -47,8 +46,8 @@ def speeds_of_steps(
     d_value, d_noise = np.zeros((count, 3)), np.zeros((count, 3))
     d_place, d_direction = np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
     for j in range(count):
-        start_x, start_y, start_valid = _on_ground(start_rays[j], rotation, lowest_sine)
-        end_x, end_y, end_valid = _on_ground(end_rays[j], rotation, lowest_sine)
+        start_x, start_y, start_valid = landing(start_rays, j, rotation)
+        end_x, end_y, end_valid = landing(end_rays, j, rotation)
         x, y = (start_x + end_x) / 2, (start_y + end_y) / 2
         across_x, across_y = end_x - start_x, end_y - start_y
         length = math.sqrt(across_x * across_x + across_y * across_y)
@@ -63,7 +62,7 @@ def speeds_of_steps(
             value[j] = math.log(square_m2 / seconds[j] ** 2) / 2
         if not len(turns):
             continue
-        noisy_x, noisy_y, noisy_valid = _on_ground(noisy_end_rays[j], rotation, lowest_sine)
+        noisy_x, noisy_y, noisy_valid = landing(noisy_end_rays, j, rotation)
         off = (noisy_y - end_y) * way_x - (noisy_x - end_x) * way_y if noisy_valid else 0.0
         turned = off / max(length / 2, 1e-12)
         toward, beside = way_x * x + way_y * y, way_x * y - way_y * x
@@ -84,14 +83,3 @@ def speeds_of_steps(
             d_direction[j, 0, number] = bent_x - same * way_x
             d_direction[j, 1, number] = bent_y - same * way_y
     return value, place, direction, valid, d_value, d_place, d_direction, d_noise
-
-
-@compiled
-def _on_ground(ray: Array, rotation: Array, lowest_sine: float) -> tuple[float, float, bool]:
-    """Where a ray (3,) meets the ground, 0 and 0 where it does not, and whether it does."""
-    x = ray[0] * rotation[0, 0] + ray[1] * rotation[1, 0] + ray[2] * rotation[2, 0]
-    y = ray[0] * rotation[0, 1] + ray[1] * rotation[1, 1] + ray[2] * rotation[2, 1]
-    down = -(ray[0] * rotation[0, 2] + ray[1] * rotation[1, 2] + ray[2] * rotation[2, 2])
-    if down > 0 and down * down > lowest_sine**2 * (x * x + y * y + down * down):
-        return x * (1 / down), y * (1 / down), True
-    return 0.0, 0.0, False

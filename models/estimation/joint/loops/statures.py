@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from models.compiled import compiled
+from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
 
@@ -18,7 +19,6 @@ def heights_of_tops(
     rotation: Array,
     turns: Array,
     height_m: float,
-    lowest_sine: float,
     least_ratio: float,
 ) -> tuple[Array, Array, Mask, Array, Array]:
     """Log heights of people (M,), where they stand (M, 2) in metres, and which are on the ground.
@@ -32,7 +32,6 @@ def heights_of_tops(
         rotation: `camera_from_world` (3, 3).
         turns: how a ray's direction in the world moves (T, 3, 3): for tilt and roll, or for none.
         height_m: of the camera.
-        lowest_sine: of a ray's angle below the horizon, for it to reach the ground.
         least_ratio: of a person's height to the camera's.
 
     Returns:
@@ -43,18 +42,13 @@ def heights_of_tops(
     value, valid = np.zeros(count), np.zeros(count, dtype=np.bool_)
     place, d_value, d_place = np.zeros((count, 2)), np.zeros((count, 3)), np.zeros((count, 2, 3))
     for j in range(count):
-        ray, y = foot_rays[j], top_y[j]
-        world_x = ray[0] * rotation[0, 0] + ray[1] * rotation[1, 0] + ray[2] * rotation[2, 0]
-        world_y = ray[0] * rotation[0, 1] + ray[1] * rotation[1, 1] + ray[2] * rotation[2, 1]
-        down = -(ray[0] * rotation[0, 2] + ray[1] * rotation[1, 2] + ray[2] * rotation[2, 2])
-        sine = down / math.sqrt(world_x * world_x + world_y * world_y + down * down)
-        east, north = 0.0, 0.0
+        y = top_y[j]
+        east, north, on_ground = landing(foot_rays, j, rotation)
         lean_x = y * rotation[2, 0] - rotation[1, 0]
         lean_y = y * rotation[2, 1] - rotation[1, 1]
         lean_z = y * rotation[2, 2] - rotation[1, 2]
         ratio = 1.0
-        if sine > lowest_sine:
-            east, north = world_x / down, world_y / down
+        if on_ground:
             seen = (lean_x * east + lean_y * north - lean_z) / -lean_z
             if seen > least_ratio:
                 ratio, valid[j] = seen, True
