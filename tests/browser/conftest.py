@@ -135,4 +135,5 @@ def too_wide(page: Any) -> int:
 def shoot(page: Any, name: str) -> None:
     """Keep a screenshot, if anybody wants to look at it."""
     if SHOTS:
+        page.wait_for_timeout(800)  # whatever moves has come to rest
         page.screenshot(path=f"{SHOTS}/{name}.png", full_page=True)

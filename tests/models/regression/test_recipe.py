@@ -42,11 +42,12 @@ def test_a_training_without_an_epoch_is_none(lens, pose):
 @pytest.mark.slow
 def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     plan = plan_training(
-        intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0, epochs=3
+        intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0, epochs=1
     )
     network, metrics = train(plan)
     check_held_out(metrics)
-    assert metrics.median_angle_error_deg < 0.6 * metrics.prior_angle_error_deg
+    # 0.73; a network that is not shown the steps between points comes to 0.77.
+    assert metrics.median_angle_error_deg < 0.75 * metrics.prior_angle_error_deg
     # Its own walks, seen from a camera knocked by 6 deg of tilt: the mean says so.
     knocked = replace(pose, tilt_rad=pose.tilt_rad + math.radians(6))
     walks = simulate_walks(
@@ -55,4 +56,4 @@ def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     windows = Windows(uv=walks.uv, lengths=walks.lengths, owner_idx=np.arange(300))
     height, q = predict_windows(network, windows, plan)
     estimate = averaged_estimate(average_windows(height, q, windows.owner_idx)[1], 0)
-    assert 3.5 < math.degrees(estimate.value.tilt_rad - pose.tilt_rad) < 7.5
+    assert 4 < math.degrees(estimate.value.tilt_rad - pose.tilt_rad) < 7.5

@@ -9,26 +9,23 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import httpx
 import psutil
 import pytest
 
 from tests.conftest import free_port, pid_exists, wait_for
+from tests.service.commands import forked
 
 
 def start(command, data_dir, *flags, code=1, **variables):
     """The one line that a command ends with."""
     environment = {**os.environ, "SUREFOOT_DATA_DIR": str(data_dir), "SUREFOOT_PORT": "0"}
-    ended = subprocess.run(
-        [sys.executable, "-m", "service.cli", command, *flags],
-        env={**environment, **variables},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        words = [command, *flags]
+        ended = forked.run(words, {**environment, **variables}, Path(folder), timeout_s=60)
     assert ended.returncode == code, ended.stderr
     lines = ended.stderr.splitlines()
     assert len(lines) == 1, ended.stderr

@@ -39,13 +39,19 @@ def people(count, start_s=None):
     return tracks
 
 
-def test_tracks_in_pose_out_and_a_clean_stop(service):
+def test_tracks_in_a_worker_killed_in_training_one_pose_out_and_a_clean_stop(service):
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
     batch = {"source": "t", "tracks": people(30)}
     receipt = service.http.post("/cameras/corner/tracks", json=batch).json()
     assert receipt["accepted"] == 30
-    wait_for(lambda: states(service) == ["succeeded"])
+    wait_for(lambda: states(service) == ["running"])
+    url = "/cameras/corner/trainings"
+    wait_for(lambda: service.http.get(url).json()["items"][0]["progress"]["step"])
+    killed = service.worker_pid()
+    os.kill(killed, signal.SIGKILL)
+    wait_for(lambda: states(service) == ["succeeded"], timeout_s=120)
+    assert service.worker_pid() != killed
     body = wait_for(
         lambda: (
             "averaged" in (b := service.http.get("/cameras/corner/pose").json())["estimates"] and b
@@ -54,9 +60,15 @@ def test_tracks_in_pose_out_and_a_clean_stop(service):
     assert body["tracks"] == 30
     assert {body["estimates"][name]["tracks"] for name in ("averaged", "joint")} == {30}
     assert body["reason"] == "30 of 200 reference tracks"
-    training = service.http.get("/cameras/corner/trainings").json()["items"][0]
+    time.sleep(3)  # some reconciles
+    assert states(service) == ["succeeded"]  # it trained again, once
+    training = service.http.get(url).json()["items"][0]
     assert training["progress"]["step"] == training["progress"]["steps"] > 0
     assert training["metrics"]["walks"] > 1000
+    assert training["error"] is None
+    assert service.http.get("/cameras/corner").json()["model_id"] is not None
+    assert service.log.read_text().count("training_started") == 2
+    assert service.log.read_text().count("training_ended") == 1
     weights = list(service.settings.weights_dir.iterdir())
     assert len(weights) == 1
     assert weights[0].suffix == ".safetensors"
@@ -79,26 +91,6 @@ def test_the_http_process_holds_no_torch_and_little_memory(service):
     (training,) = wait_for(psutil.Process(service.worker_pid()).children)
     wait_for(lambda: [region for region in training.memory_maps() if "torch" in region.path])
     assert training.nice() == service.settings.training_nice
-
-
-def test_a_worker_killed_in_training_trains_again_and_once(service):
-    wait_for(service.ready)
-    service.http.post("/cameras", json=CAMERA).raise_for_status()
-    wait_for(lambda: states(service) == ["running"])
-    url = "/cameras/corner/trainings"
-    wait_for(lambda: service.http.get(url).json()["items"][0]["progress"]["step"])
-    killed = service.worker_pid()
-    os.kill(killed, signal.SIGKILL)
-    wait_for(lambda: states(service) == ["succeeded"], timeout_s=120)
-    assert service.worker_pid() != killed
-    time.sleep(3)  # some reconciles
-    assert states(service) == ["succeeded"]
-    training = service.http.get("/cameras/corner/trainings").json()["items"][0]
-    assert service.http.get("/cameras/corner").json()["model_id"] is not None
-    assert training["error"] is None
-    attempts = service.log.read_text().count("training_started")
-    assert attempts == 2
-    assert service.log.read_text().count("training_ended") == 1
 
 
 def test_the_api_killed_after_202_has_the_tracks_and_ends_its_workers(service):
