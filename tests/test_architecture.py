@@ -36,6 +36,7 @@ MODEL_ROOMS = [
     {"geometry"},
     {"trajectory"},
     {"simulation"},
+    {"verticals"},
     {"estimation"},
     {"people"},
     {"regression"},
