@@ -92,10 +92,14 @@ def ends_of(
             peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
         ends.append(End(peak=peak, posterior=posterior, score=score))
-    usual = [end for end in ends if abs(end.candidate[2] - joint.values[2]) < _FAR_LOG_HEIGHT]
-    ends = usual or ends
+    ends = not_far_above(ends, float(joint.values[2]))
     kept = distinct([end.peak for end in ends])
     return [next(end for end in ends if end.peak is peak) for peak in kept]
+
+
+def not_far_above(ends: list[End], log_height: float) -> list[End]:
+    """Ends that are not twice or half as high as speeds say; all where there are no others."""
+    return [end for end in ends if abs(end.candidate[2] - log_height) < _FAR_LOG_HEIGHT] or ends
 
 
 def _belief(joint: JointEstimate, prior: CameraPose) -> Belief:
