@@ -25,7 +25,8 @@ class Trajectory:
 
     `time_s` is (N,), strictly increasing, seconds since the Unix epoch; `uv` is (N, 2) in pixels.
     `top_v` (N,) is the upper edge of the person's box in pixels, NaN where none is known; None
-    where there are no boxes at all.
+    where there are no boxes at all. `head_uv` (N, 2) are heads in pixels, seen apart from the feet;
+    NaN where none is known, None where there are none at all.
 
     Raises:
         ShapeError: the arrays do not fit, a number is not finite, or time does not increase.
@@ -34,6 +35,7 @@ class Trajectory:
     time_s: Array
     uv: Array
     top_v: Array | None = None
+    head_uv: Array | None = None
 
     def __post_init__(self) -> None:
         if self.time_s.ndim != 1 or self.uv.shape != (self.time_s.size, 2):
@@ -43,6 +45,10 @@ class Trajectory:
         if self.top_v is not None and self.top_v.shape != self.time_s.shape:
             raise ShapeError(
                 f"top_v: ({self.time_s.size},) is needed beside time_s, got {self.top_v.shape}"
+            )
+        if self.head_uv is not None and self.head_uv.shape != self.uv.shape:
+            raise ShapeError(
+                f"head_uv: {self.uv.shape} is needed beside uv, got {self.head_uv.shape}"
             )
         if not self.time_s.size:
             raise ShapeError("time_s: at least 1 point is needed, got 0")
@@ -59,8 +65,12 @@ class Trajectory:
 
     def part(self, indices: npt.NDArray[np.int64]) -> "Trajectory":
         """The points of some indices, in time order."""
-        top_v = None if self.top_v is None else self.top_v[indices]
-        return Trajectory(time_s=self.time_s[indices], uv=self.uv[indices], top_v=top_v)
+        return Trajectory(
+            time_s=self.time_s[indices],
+            uv=self.uv[indices],
+            top_v=None if self.top_v is None else self.top_v[indices],
+            head_uv=None if self.head_uv is None else self.head_uv[indices],
+        )
 
     @property
     def duration_s(self) -> float:
@@ -90,16 +100,21 @@ def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:
 
 
 def end_to_end(pieces: Sequence[Trajectory]) -> Trajectory:
-    """One trajectory of pieces in time order; boxes are unknown where a piece has none."""
-    top_v = None
+    """One trajectory of pieces in time order; boxes, heads are unknown where a piece has none."""
+    top_v, head_uv = None, None
     if any(piece.top_v is not None for piece in pieces):
         top_v = np.concatenate(
             [np.full(p.time_s.size, np.nan) if p.top_v is None else p.top_v for p in pieces]
+        )
+    if any(piece.head_uv is not None for piece in pieces):
+        head_uv = np.concatenate(
+            [np.full(p.uv.shape, np.nan) if p.head_uv is None else p.head_uv for p in pieces]
         )
     return Trajectory(
         time_s=np.concatenate([piece.time_s for piece in pieces]),
         uv=np.concatenate([piece.uv for piece in pieces]),
         top_v=top_v,
+        head_uv=head_uv,
     )
 
 

@@ -37,6 +37,7 @@ MODEL_ROOMS = [
     {"geometry"},
     {"trajectory"},
     {"simulation"},
+    {"verticals"},
     {"estimation"},
     {"people"},
     {"regression"},

@@ -18,6 +18,7 @@ HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
 REACH_RAD = math.radians(30.0)  # of the headings that are tried, both ways
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _ROUNDS = 2  # in which the speeds are asked again
+_FAR_LOG_HEIGHT = 0.7  # from the speeds': twice as high, everybody walks where nobody was seen
 _UNLIKELY = 12.0  # of the log posterior, for the speeds to be asked no more
 _SHARED = 3  # parameters that speeds and places both determine
 
@@ -85,14 +86,20 @@ def ends_of(
     for start, likely in begin:
         peak, posterior, score = start, first, 0.0
         for _ in range(_ROUNDS if likely else 0):
-            near = joint_near(observations, prior, speed_reference, peak.candidate)
+            near = joint_near(observations, prior, speed_reference, peak.candidate, joint.verticals)
             posterior = replace(first, belief=_belief(near, prior))
             score = near.score - joint.score
             peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
         ends.append(End(peak=peak, posterior=posterior, score=score))
+    ends = not_far_above(ends, float(joint.values[2]))
     kept = distinct([end.peak for end in ends])
     return [next(end for end in ends if end.peak is peak) for peak in kept]
+
+
+def not_far_above(ends: list[End], log_height: float) -> list[End]:
+    """Ends that are not twice or half as high as speeds say; all where there are no others."""
+    return [end for end in ends if abs(end.candidate[2] - log_height) < _FAR_LOG_HEIGHT] or ends
 
 
 def _belief(joint: JointEstimate, prior: CameraPose) -> Belief:

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
-from models.estimation.joint.speed_reference import PLAUSIBLE_OFFSET, SpeedReference
+from models.estimation.joint.speed_reference import SpeedReference
 from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
 from models.flow.ends import (
     HEADING_SD,
@@ -162,13 +162,13 @@ def by_speeds_alone(
     reference's people: how fast these walk where is known no better than at any other site.
     """
     covariance = np.zeros((4, 4))
-    covariance[:3, :3] = joint.covariance
+    values, covariance[:3, :3] = joint.values, joint.covariance
     if reason is not None:
-        covariance[:3, :3] += np.diag(PLAUSIBLE_OFFSET**2)
+        values, covariance[:3, :3] = joint.beside_strangers()
     covariance[3, 3] = HEADING_SD**2
     known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return FusedEstimate(
-        values=np.append(joint.values, prior.heading_rad),
+        values=np.append(values, prior.heading_rad),
         covariance=covariance,
         identifiable=tuple(name for name in joint.identifiable if name in known),
         reason=reason,

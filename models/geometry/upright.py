@@ -3,6 +3,7 @@
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 
 
@@ -52,6 +53,34 @@ def tops_seen(
     uv, valid = intrinsics.project(tops @ rotation.T)
     inside = valid & (uv[:, 1] > 1) & (uv[:, 1] < intrinsics.height - 2)
     return np.where(inside, uv[:, 1], np.nan)
+
+
+def heads_seen(intrinsics: Intrinsics, pose: CameraPose, heads_m: Array) -> Array:
+    """Pixels (N, 2) of heads (N, 3) in the world, in metres; NaN where not in view."""
+    uv, valid = intrinsics.project((heads_m - pose.centre_m) @ pose.rotation.T)
+    return np.where((valid & uncut(intrinsics, uv))[:, None], uv, np.nan)
+
+
+def heads_above(intrinsics: Intrinsics, pose: CameraPose, ground_m: Array, head_uv: Array) -> Array:
+    """World points (N, 3) of heads with pixels (N, 2), each as far away as its foot (N, 2) is.
+
+    That is where a head's ray meets the upright plane through the foot that faces the camera: how
+    far it leans to the side is kept, what it leans along the view is taken for stature. NaN where
+    the pixel is, or where the ray never comes so far.
+    """
+    rays, valid = intrinsics.rays(head_uv)
+    rays = rays @ pose.rotation
+    away = ground_m - pose.centre_m[:2]
+    along = (rays[:, :2] * away).sum(axis=1)
+    valid = valid & (along > 0)
+    share = (away**2).sum(axis=1) / np.where(valid, along, np.nan)
+    return np.asarray(pose.centre_m + rays * share[:, None])
+
+
+def uncut(intrinsics: Intrinsics, uv: Array) -> Mask:
+    """Which pixels (N, 2) are inside the image, and not at its border, where what is cut ends."""
+    u, v = uv.T
+    return np.asarray((u > 1) & (v > 1) & (u < intrinsics.width - 2) & (v < intrinsics.height - 2))
 
 
 def tops_of_boxes(intrinsics: Intrinsics, boxes: Array) -> Array:

@@ -13,6 +13,7 @@ from models.geometry.pose import CameraPose
 from models.people.linking import link_pieces, walks_of
 from models.reasons import Reason, TracksCode
 from models.trajectory import Trajectory, end_to_end
+from models.verticals.uprights import observe_uprights
 
 _MANY = 0.1  # of the tracks: so many pieces are worth a word
 
@@ -21,8 +22,8 @@ _MANY = 0.1  # of the tracks: so many pieces are worth a word
 class Walks:
     """What is read of N tracks, by the order that they were given in.
 
-    `walk_idx` (N,) is the track that each counts with, the last piece of its walk: the steps and
-    boxes of a walk in several pieces are that one's, and the others have none.
+    `walk_idx` (N,) is the track that each counts with, the last piece of its walk: the steps, boxes
+    and heads of a walk in several pieces are that one's, and the others have none.
     """
 
     observations: Observations
@@ -56,15 +57,19 @@ def observe_walks(
         pose: about where it stands, its prior pose.
     """
     walk_idx = _last_pieces(trajectories, link_pieces(trajectories, intrinsics, pose))
-    found = observe_each(_walks(trajectories, walk_idx), intrinsics)
-    ended_s = np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64)
-    return Walks(observations=replace(found, ended_s=ended_s), walk_idx=walk_idx)
+    walks = _walks(trajectories, walk_idx)
+    observations = replace(
+        observe_each(walks, intrinsics),
+        ended_s=np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64),
+        uprights=observe_uprights(walks, intrinsics),
+    )
+    return Walks(observations=observations, walk_idx=walk_idx)
 
 
 def observe(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> Observations:
-    """The steps and boxes of tracks, each walk once: the observations of `observe_walks`."""
+    """The steps, boxes and heads of tracks, each walk once: the observations of `observe_walks`."""
     return observe_walks(trajectories, intrinsics, pose).observations
 
 

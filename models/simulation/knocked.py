@@ -8,7 +8,7 @@ import numpy as np
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.upright import statures, tops_seen
+from models.geometry.upright import heads_above, heads_seen, statures, tops_seen
 from models.trajectory import Trajectory
 
 
@@ -38,7 +38,8 @@ def knock_trajectory(
     """What the camera sees of the same people after a move; the longest run inside the image.
 
     None where fewer than two points stay in the picture. Exact for the feet, which lie on the
-    ground; the boxes' upper edges are those of upright people of the same height.
+    ground; the boxes' upper edges are those of upright people of the same height. Heads lean as
+    they did, to the side.
     """
     ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, trajectory.uv)
     uv, _ = pixel_from_ground(intrinsics, knocked.rotation, knocked.centre_m, ground)
@@ -54,5 +55,9 @@ def knock_trajectory(
         )
         top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
         top_v = top_v[longest]
+    head_uv = None
+    if trajectory.head_uv is not None:
+        heads_m = heads_above(intrinsics, pose, ground, trajectory.head_uv)
+        head_uv = heads_seen(intrinsics, knocked, heads_m)[longest]
     # What is behind the camera now has no pixels.
-    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v)
+    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v, head_uv=head_uv)

@@ -39,10 +39,7 @@ class Quota:
         Raises:
             QuotaError: well more is stored than retention will leave.
         """
-        coming = sum(
-            track.points.nbytes + (0 if track.boxes is None else track.boxes.nbytes)
-            for track in batch.tracks
-        )
+        coming = sum(track.stored_bytes for track in batch.tracks)
         now_s = time.monotonic()
         with self._lock:
             count = self._counts.get(camera_id)

@@ -50,6 +50,7 @@ def receive_tracks(
                 "ended_s": float(track.points[-1, 0]),
                 "points": pack(track.points),
                 "boxes": None if track.boxes is None else pack(track.boxes),
+                "heads": None if track.heads is None else pack(track.heads),
                 "received_at": now,
             }
             for track in batch.tracks

@@ -1,7 +1,7 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,12 +20,22 @@ _YEAR_9999_S = 253_402_300_799.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IncomingTrack:
-    """A track as posted: points (N, 3) are time in s, u and v; boxes (N, 4) x1, y1, x2, y2."""
+    """A track as posted: points (N, 3) are time in s, u and v; boxes (N, 4) x1, y1, x2, y2.
+
+    Heads (N, 2) are u and v, where points carry them.
+    """
 
     source: str
     track_id: str
     points: Array
-    boxes: Array | None
+    boxes: Array | None = None
+    heads: Array | None = None
+
+    @property
+    def stored_bytes(self) -> int:
+        """How much of the store it takes."""
+        arrays = (self.points, self.boxes, self.heads)
+        return sum(array.nbytes for array in arrays if array is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +88,9 @@ class TrackRejectedError(Exception):
         self.detail = detail
 
 
-_FORMS = {"points": 3, "boxes": 5, "frames": 3, "frame_boxes": 5}
+# How many numbers a row has: of a point three, or five with its head.
+_FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
+_FOOT = 3
 
 
 def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
@@ -108,7 +120,30 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
                 "no_clock", f"{form}: frame_rate_hz and started_at are needed beside it"
             )
         rows[:, 0] = clock.started_at_s + rows[:, 0] / clock.frame_rate_hz
-    return check_track(track_name(raw.get("id")), source, rows, limits)
+    name = track_name(raw.get("id"))
+    if form.endswith("boxes") or rows.shape[1] == _FOOT:
+        return check_track(name, source, rows, limits)
+    heads = rows[:, _FOOT:]
+    check_heads(rows, (limits.width, limits.height))
+    return replace(check_track(name, source, rows[:, :_FOOT], limits), heads=heads)
+
+
+def check_heads(rows: Array, size: tuple[int, int]) -> None:
+    """Refuse heads of rows (N, 5), time, u, v, u and v of the head, that nobody carries.
+
+    Raises:
+        TrackRejectedError: a head that is not finite, not above its foot, or far outside.
+    """
+    _check_finite(rows)
+    above = rows[:, 4] < rows[:, 2]
+    if not above.all():
+        at = int(np.argmin(above))
+        raise TrackRejectedError(
+            "malformed",
+            f"points/{at}/4: a head above its foot, v_head below {rows[at, 2]:g}, is needed, "
+            f"got {rows[at, 4]:g}",
+        )
+    _check_inside(rows[:, _FOOT:], size, "heads of points")
 
 
 def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> IncomingTrack:
@@ -121,12 +156,7 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
         raise TrackRejectedError(
             "too_many_points", f"points: at most {MAX_POINTS} a track are taken, got {len(rows)}"
         )
-    finite = np.isfinite(rows).all(axis=1)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise TrackRejectedError(
-            "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
-        )
+    _check_finite(rows)
     time_s = rows[:, 0]
     _check_times(time_s, limits)
     increasing = np.diff(time_s) > 0
@@ -189,17 +219,23 @@ def is_text(value: str) -> bool:
         return False
 
 
-def _numbers(form: str, value: Any, columns: int) -> Array:
+def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
     if not isinstance(value, list):
         raise TrackRejectedError("malformed", f"{form}: a list is needed, got {value!r:.60}")
     if len(value) > MAX_POINTS:
         raise TrackRejectedError(
             "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
         )
+    columns = taken[0]
     for at, row in enumerate(value):
+        if not at and isinstance(row, list) and len(row) in taken:
+            columns = len(row)
         if not isinstance(row, list) or len(row) != columns:
+            needed = str(columns) if at else " or ".join(map(str, taken))
+            if isinstance(row, list) and len(row) in taken:
+                needed += ", as in the first point: all points carry a head or none,"
             raise TrackRejectedError(
-                "malformed", f"{form}/{at}: {columns} numbers are needed, got {row!r:.80}"
+                "malformed", f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}"
             )
         for number in row:
             if isinstance(number, bool) or not isinstance(number, int | float):
@@ -213,6 +249,15 @@ def _numbers(form: str, value: Any, columns: int) -> Array:
                     "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
                 )
     return np.array(value, dtype=np.float64).reshape(-1, columns)
+
+
+def _check_finite(rows: Array) -> None:
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise TrackRejectedError(
+            "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
+        )
 
 
 def _check_times(time_s: Array, limits: Limits) -> None:
@@ -233,14 +278,14 @@ def _check_times(time_s: Array, limits: Limits) -> None:
     raise TrackRejectedError("time_out_of_range", f"points/{at}/0: {needed}, got {got:.3f}")
 
 
-def _check_inside(uv: Array, size: tuple[int, int]) -> None:
+def _check_inside(uv: Array, size: tuple[int, int], what: str = "points") -> None:
     limit = np.array(size) * MAX_OUTSIDE_IMAGES
     inside = ((uv >= -limit) & (uv <= np.array(size) + limit)).all(axis=1)
     if not inside.all():
         at = int(np.argmin(inside))
         raise TrackRejectedError(
             "outside_image",
-            f"points/{at}: u from {-limit[0]:.0f} to {size[0] + limit[0]:.0f} and v from "
+            f"{what}/{at}: u from {-limit[0]:.0f} to {size[0] + limit[0]:.0f} and v from "
             f"{-limit[1]:.0f} to {size[1] + limit[1]:.0f} px are taken, got "
             f"({uv[at, 0]:.1f}, {uv[at, 1]:.1f})",
         )

@@ -9,7 +9,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
-from models.geometry.upright import tops_of_boxes
+from models.geometry.upright import tops_of_boxes, uncut
 from models.trajectory import Trajectory
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tables.tracks import TrackRecord
@@ -32,7 +32,14 @@ def trajectory_of(record: TrackRecord) -> Trajectory:
 
 
 def seen_of(record: TrackRecord, feet: Trajectory, intrinsics: Intrinsics) -> Trajectory:
-    """The feet of a stored track with the upper edges of its boxes, where it has them."""
+    """The feet of a stored track with the upper edges of its boxes or its heads, where it has any.
+
+    Who has a head is as tall as it is high, where the picture's border does not cut it.
+    """
+    if record.heads is not None:
+        heads = unpack(record.heads, 2)
+        tops = np.where(uncut(intrinsics, heads), heads[:, 1], np.nan)
+        return replace(feet, top_v=tops, head_uv=heads)
     if record.boxes is None:
         return feet
     return replace(feet, top_v=tops_of_boxes(intrinsics, unpack(record.boxes, 4)))

@@ -26,7 +26,7 @@ class Unpacked:
         return self._feet[track]
 
     def seen(self, record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
-        """The foot points of a stored track, and the upper edges of its boxes where it has them."""
+        """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
         track = ((record.id, record.received_at), intrinsics)
         if track not in self._seen:
             self._seen[track] = seen_of(record, self.feet(record), intrinsics)

@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from models.errors import ShapeError
-from models.trajectory import Trajectory, choose_step_s, cut_windows
+from models.trajectory import Trajectory, choose_step_s, cut_windows, end_to_end
 
 
 def walk(count, interval_s=0.2, start_s=1000.0, u0=100.0, du=5.0):
@@ -96,3 +98,16 @@ def test_owners_tell_whose_a_window_is(lens):
 def test_a_trajectory_that_cannot_be_is_refused(time_s, uv, message):
     with pytest.raises(ShapeError, match=message):
         Trajectory(time_s=np.array(time_s), uv=np.array(uv))
+
+
+def test_heads_stay_with_their_points():
+    one, other = walk(4), walk(3, start_s=1001.0)
+    headed = replace(one, head_uv=one.uv - (0, 90))
+    assert_allclose(headed.part(np.array([1, 3])).head_uv, one.uv[[1, 3]] - (0, 90))
+    assert one.part(np.array([1])).head_uv is None
+    both = end_to_end([headed, other])
+    assert_allclose(both.head_uv[:4], headed.head_uv)
+    assert np.isnan(both.head_uv[4:]).all()
+    assert end_to_end([one, other]).head_uv is None
+    with pytest.raises(ShapeError, match=r"head_uv: \(4, 2\) is needed beside uv, got \(4,\)"):
+        replace(one, head_uv=np.zeros(4))

@@ -1,7 +1,8 @@
 """The joint estimate: one pose for all tracks, with a covariance, and what it leaves open.
 
 Ours: covariance = variance inflation * H^-1 + spread of other modes + what is not known of the
-offset; the modes are a mixture, weighed by their posterior at their ends.
+offset; the modes are a mixture, weighed by their posterior at their ends. Heads, where they tell
+verticals, are a second Gaussian on tilt and roll.
 """
 
 import math
@@ -13,13 +14,24 @@ import numpy as np
 from models.estimation.joint.fit import Channel, Fit, fit_pose
 from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
+from models.estimation.joint.speed_reference import (
+    PLAUSIBLE_OFFSET,
+    SpeedReference,
+    channels_of,
+    pose_prior,
+)
 from models.estimation.joint.starts import starts
-from models.estimation.parameters import PLANE_PARAMETERS, identifiable_of, plane_parameters_of
+from models.estimation.parameters import (
+    PLANE_PARAMETERS,
+    PlaneEstimate,
+    identifiable_of,
+    plane_parameters_of,
+)
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode, Value
+from models.verticals.estimate import VerticalEstimate, joined, vertical_estimate
 
 _STARTS = 2
 _START_TRACKS = 80
@@ -37,7 +49,8 @@ class JointEstimate:
     tracks determine; `reason` says what is missing, and is None where they determine all. `walkers`
     is the number of tracks that were used, `walking_groups` that of people or groups who walked
     independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other
-    poses (3,) that explain the tracks, if not as well.
+    poses (3,) that explain the tracks, if not as well. `verticals` is what their heads say, which
+    is part of `values`, and `by_speeds` what was said without them; None where they tell nothing.
     """
 
     values: Array
@@ -50,11 +63,23 @@ class JointEstimate:
     identifiable: tuple[str, ...]
     reason: Reason | None
     others: tuple[Array, ...] = ()
+    verticals: VerticalEstimate | None = None
+    by_speeds: PlaneEstimate | None = None
 
     @property
     def raw_parameters(self) -> PoseParameters:
         """What `raw` is, named; it knows no heading."""
         return PoseParameters.of_array(self.raw)
+
+    def beside_strangers(self) -> tuple[Array, Array]:
+        """Values (3,) and covariance (3, 3) of people who are not the reference's.
+
+        How fast they walk where is known no better than at any other site; they stand as upright.
+        """
+        if self.verticals is None or self.by_speeds is None:
+            return self.values, self.covariance + np.diag(PLAUSIBLE_OFFSET**2)
+        wide = self.by_speeds.covariance + np.diag(PLAUSIBLE_OFFSET**2)
+        return joined(self.by_speeds.values, wide, self.verticals)
 
 
 def joint_estimate(
@@ -67,20 +92,26 @@ def joint_estimate(
     begin = starts(few, plane_parameters_of(prior), _STARTS)
     first = _distinct([fit_pose(few, start, hold) for start in begin])
     ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
-    return _said_of(observations, channels, ends, reference)
+    verticals = vertical_estimate(observations.uprights, reference.verticals)
+    return _said_of(observations, channels, ends, reference, verticals)
 
 
 def joint_near(
-    observations: Observations, prior: CameraPose, reference: SpeedReference, candidate: Array
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    candidate: Array,
+    verticals: VerticalEstimate | None = None,
 ) -> JointEstimate:
     """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
 
     How fast people are where, and which way, is another question once a camera has been panned.
+    What their heads say, the joint estimate's `verticals`, is not.
     """
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
     fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior))
-    return _said_of(observations, channels, [fit], reference)
+    return _said_of(observations, channels, [fit], reference, verticals)
 
 
 def _said_of(
@@ -88,8 +119,13 @@ def _said_of(
     channels: Sequence[Channel],
     ends: list[Fit],
     reference: SpeedReference,
+    verticals: VerticalEstimate | None,
 ) -> JointEstimate:
-    """What is said of the ends of fits, the best first."""
+    """What is said of the ends of fits, the best first, and of heads."""
+    if verticals is not None and not verticals.identifiable:
+        verticals = None
+    if verticals is not None:
+        ends = _by_heads(ends, verticals, reference)
     best = ends[0]
     covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
     walking_groups = count_walking_groups(
@@ -97,7 +133,12 @@ def _said_of(
     )
     # One walking group is one draw of pace and pauses, however many tracks it has.
     covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
+    values = best.candidate - reference.offset
     covariance = covariance + reference.offset_covariance
+    by_speeds = None
+    if verticals is not None:
+        by_speeds = PlaneEstimate(values=values, covariance=covariance, tracks=observations.walkers)
+        values, covariance = joined(values, covariance, verticals)
     sd = np.sqrt(np.diag(covariance))
     identifiable = identifiable_of(PLANE_PARAMETERS, sd)
     reason = _reason(identifiable, sd, covariance)
@@ -112,7 +153,7 @@ def _said_of(
             },
         )
     return JointEstimate(
-        values=best.candidate - reference.offset,
+        values=values,
         covariance=covariance,
         raw=best.candidate,
         bound=best.bound,
@@ -126,7 +167,21 @@ def _said_of(
             for end in ends[1:]
             if end.score > best.score - _HOPELESS * reference.pose_variance_inflation
         ),
+        verticals=verticals,
+        by_speeds=by_speeds,
     )
+
+
+def _by_heads(ends: list[Fit], verticals: VerticalEstimate, reference: SpeedReference) -> list[Fit]:
+    """Ends whose scores have in them how likely the heads are there, the best first."""
+    inflation = reference.pose_variance_inflation
+    scored = []
+    for end in ends:
+        values = (end.candidate - reference.offset)[:2]
+        covariance = (end.covariance * inflation + reference.offset_covariance)[:2, :2]
+        likely = verticals.log_density(values, covariance)
+        scored.append(replace(end, score=end.score + inflation * likely))
+    return sorted(scored, key=lambda end: -end.score)
 
 
 def _some(observations: Observations) -> np.ndarray:

@@ -14,6 +14,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.trajectory import Trajectory
+from models.verticals.uprights import Uprights
 
 STEP_S = 1.5  # longer than a stride, shorter than a change of mind
 _KERNEL_S = 0.7  # half the width of the smoothing around a node
@@ -71,12 +72,16 @@ class Tops:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observations:
-    """All that is read of a set of tracks, and when each of them ended (tracks,)."""
+    """All that is read of a set of tracks, and when each of them ended (tracks,).
+
+    `uprights` are of heads; None where nobody looked for any.
+    """
 
     steps: Steps
     tops: Tops
     ended_s: Array
     tracks: int
+    uprights: Uprights | None = None
 
     @property
     def walkers(self) -> int:
@@ -91,13 +96,10 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
     starts, ends, noisy_ends, seconds, feet, tops = [], [], [], [], [], []
-    step_owners: list[int] = []
-    step_runs: list[int] = []
-    step_times: list[Array] = []
-    top_owners: list[int] = []
-    top_runs: list[int] = []
-    top_times: list[Array] = []
-    run = 0
+    step_owners, top_owners = list[int](), list[int]()
+    step_runs, top_runs = list[int](), list[int]()
+    step_times, top_times = list[Array](), list[Array]()
+    run, count = 0, len(trajectories)
     for owner, trajectory in enumerate(trajectories):
         for indices in _runs(trajectory, intrinsics):
             time_s, uv, top_v = _nodes(trajectory, indices)
@@ -119,7 +121,6 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             top_owners += [owner] * int(known.sum())
             top_runs += [run] * int(known.sum())
             top_times.append(time_s[known])
-    count = len(trajectories)
     return Observations(
         steps=Steps(
             start_rays=_joined(starts, (0, 3)),
@@ -171,6 +172,7 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
         ),
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
+        uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
     )
 
 
@@ -220,9 +222,8 @@ def _nodes(trajectory: Trajectory, indices: npt.NDArray[np.int64]) -> tuple[Arra
         tall = uv[:, 1] - trajectory.top_v[indices]
         known = np.isfinite(tall)
         if known.sum() >= 2:
-            weight_known, tall = weight[:, known], tall[known]
-            enough, smooth_tall = _local_lines(ahead[:, known], weight_known, tall[:, None])
-            tops[enough] = feet[enough, 1] - smooth_tall[enough, 0]
+            enough, smooth = _local_lines(ahead[:, known], weight[:, known], tall[known, None])
+            tops[enough] = feet[enough, 1] - smooth[enough, 0]
     return nodes_s, feet, tops
 
 
@@ -286,9 +287,8 @@ def _rows(owners: list[int], runs: list[int], times: list[Array], count: int) ->
 
 
 def _kept(rows: Rows, kept: Mask, renumber: npt.NDArray[np.int64], owners: int) -> Rows:
-    owner_idx = renumber[rows.owner_idx[kept]]
     return Rows(
-        owner_idx=owner_idx,
+        owner_idx=renumber[rows.owner_idx[kept]],
         linked=rows.linked[kept],
         time_s=rows.time_s[kept],
         when=rows.when[kept],

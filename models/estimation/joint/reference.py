@@ -30,6 +30,7 @@ from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
+from models.verticals.reference import learn_verticals
 
 # Fewer who walk for a few seconds make no estimate, and no reference.
 FEWEST_WALKERS = 5
@@ -134,6 +135,7 @@ def learn_speed_reference(
         offset_covariance=covariance,
         pose_variance_inflation=inflation,
         tracks=observations.walkers,
+        verticals=learn_verticals(observations.uprights, plane_parameters_of(prior)[:2]),
     )
     return replace(site, doubt=_doubt(observations, prior, blank, site))
 

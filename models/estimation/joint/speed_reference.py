@@ -16,6 +16,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.packing import stored_as
 from models.reasons import Reason
+from models.verticals.reference import VerticalReference
 
 USUAL_SPEEDS_MPS = (0.7, 2.0)  # medians of sites: 1.05 to 1.43 were seen
 USUAL_STATURES_M = (1.4, 2.2)  # of boxes
@@ -30,7 +31,8 @@ class SpeedReference:
     `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth, with
     `offset_covariance` (3, 3); its variances are to be multiplied by `pose_variance_inflation`.
     `tracks` is 0 where nothing was learned and the speed is assumed. `doubt` is what does not fit
-    the prior pose, `boxes` says why boxes are used or not.
+    the prior pose, `boxes` says why boxes are used or not. `verticals` is how heads stand over
+    feet; None where too few have heads.
     """
 
     speeds: Learned
@@ -41,6 +43,7 @@ class SpeedReference:
     tracks: int
     doubt: Reason | None = None
     boxes: str = ""
+    verticals: VerticalReference | None = None
 
     @property
     def walking_speed_mps(self) -> float:
@@ -62,7 +65,10 @@ class SpeedReference:
         held = np.maximum(PLAUSIBLE_OFFSET, np.abs(self.offset))
         known = np.linalg.inv(self.offset_covariance) - np.diag(held**-2.0)
         sizes, axes = np.linalg.eigh((known + known.T) / 2)
-        return np.asarray((axes * np.maximum(sizes, 0.0)) @ axes.T) / self.tracks
+        told = np.asarray((axes * np.maximum(sizes, 0.0)) @ axes.T) / self.tracks
+        if self.verticals is not None:
+            told[:2, :2] += self.verticals.information_of_a_track
+        return told
 
 
 def channels_of(

@@ -19,9 +19,13 @@ DESCRIBED_TRACK: dict[str, Any] = {
     "required": ["id"],
     "properties": {
         "id": {"type": "string"},
-        "points": _rows("[time_s, u_px, v_px] of the foot", 3),
+        "points": _rows(
+            "[time_s, u_px, v_px] of the foot, or all with their heads: "
+            "[time_s, u_px, v_px, u_head_px, v_head_px]",
+            3,
+        ),
         "boxes": _rows("[time_s, x1, y1, x2, y2] in pixels", 5),
-        "frames": _rows("[frame, u_px, v_px]", 3),
+        "frames": _rows("[frame, u_px, v_px], or all with their heads", 3),
         "frame_boxes": _rows("[frame, x1, y1, x2, y2]", 5),
     },
 }

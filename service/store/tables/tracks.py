@@ -10,7 +10,7 @@ from service.store.tables.record import Record
 
 
 class TrackRecord(Record):
-    """A stored track: points (N, 3) and boxes (N, 4) packed as little-endian float64."""
+    """A stored track: points (N, 3), boxes (N, 4) and heads (N, 2) as little-endian float64."""
 
     __tablename__ = "tracks"
 
@@ -22,6 +22,7 @@ class TrackRecord(Record):
     ended_s: Mapped[float]
     points: Mapped[bytes] = mapped_column(LargeBinary)
     boxes: Mapped[bytes | None] = mapped_column(LargeBinary)
+    heads: Mapped[bytes | None] = mapped_column(LargeBinary)
     received_at: Mapped[datetime]
 
     __table_args__ = (

@@ -10,6 +10,15 @@ from service.store.tables.tracks import TrackRecord
 Spans = tuple[tuple[float, float], ...]  # times, from and to
 
 
+def bytes_of_track() -> ColumnElement[int]:
+    """How many bytes a track's points, boxes and heads have."""
+    return (
+        func.length(TrackRecord.points)
+        + func.coalesce(func.length(TrackRecord.boxes), 0)
+        + func.coalesce(func.length(TrackRecord.heads), 0)
+    )
+
+
 def of_counting_source(camera_id: str | InstrumentedAttribute[str]) -> ColumnElement[bool]:
     """Whether a track is of the source that counts; all are, as long as none does."""
     counting = counting_source(camera_id).scalar_subquery()

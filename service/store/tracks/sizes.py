@@ -4,16 +4,16 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables.tracks import TrackRecord
-from service.store.tracks.counting import of_counting_source
+from service.store.tracks.counting import bytes_of_track, of_counting_source
 
 
 def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int) -> int:
     """Delete up to `limit` tracks of a camera, the first that came, beyond so many bytes; how many.
 
-    Bytes are those of points and boxes, as `tracks.stored_bytes` counts them; the source that
-    counts has as many as all others together.
+    Bytes are those of points, boxes and heads, as `tracks.stored_bytes` counts them; the source
+    that counts has as many as all others together.
     """
-    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    size = bytes_of_track()
     together = (
         func.sum(size)
         .over(partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc())

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import (
+    bytes_of_track,
     counting,
     newest_source_of,
     of_counting_source,
@@ -40,8 +41,8 @@ def count(session: Session, camera_id: str) -> int:
 
 
 def stored_bytes(session: Session, camera_id: str) -> int:
-    """How many bytes the points and boxes of a camera's tracks have."""
-    size = func.length(TrackRecord.points) + func.coalesce(func.length(TrackRecord.boxes), 0)
+    """How many bytes the points, boxes and heads of a camera's tracks have."""
+    size = bytes_of_track()
     return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
 
 
