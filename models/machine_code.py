@@ -1,11 +1,16 @@
 """Machine code of functions of loops, by numba, and where it is kept.
 
-It is kept beside its source, in the directory that NUMBA_CACHE_DIR names, or in the user's cache: a
-process that finds it there does not wait for the compiler. Where nothing can be written, each
-process compiles for itself.
+It is kept in the directory that NUMBA_CACHE_DIR names, in the virtual environment, or in the user's
+cache: a process that finds it there does not wait for the compiler. Where nothing can be written,
+each process compiles for itself. Beside its source, where numba would put it, it would outlive an
+uninstallation, and the folders that are left of a package are a package to Python.
 """
 
+# mypy: disable-error-code="no-untyped-call"
+
 import hashlib
+import os
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -37,8 +42,21 @@ class Given(_OfAllSources, UserProvidedCacheLocator):
     """Where NUMBA_CACHE_DIR says."""
 
 
-class Beside(_OfAllSources, InTreeCacheLocator):
-    """In `__pycache__`, beside the source."""
+class OfEnvironment(_OfAllSources, InTreeCacheLocator):
+    """In the virtual environment, if this is one."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)
+        folder = self.get_suitable_cache_subpath(file)
+        self._cache_path = os.path.join(sys.prefix, "var", "cache", "surefoot", folder)
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> "OfEnvironment | None":
+        """Where a function's code is kept; None where that is another's to say."""
+        if sys.prefix == sys.base_prefix:
+            return None
+        found: OfEnvironment | None = super().from_function(function, file)
+        return found
 
 
 class OfUser(_OfAllSources, UserWideCacheLocator):
@@ -46,8 +64,9 @@ class OfUser(_OfAllSources, UserWideCacheLocator):
 
 
 # As numba reads it out of NUMBA_CACHE_LOCATOR_CLASSES, too.
-_CLASSES = ",".join(f"{each.__module__}.{each.__qualname__}" for each in (Given, Beside, OfUser))
-setattr(numba.config, "CACHE_LOCATOR_CLASSES", _CLASSES)  # noqa: B010 - it has no type
+_CLASSES = (Given, OfEnvironment, OfUser)
+_NAMES = ",".join(f"{each.__module__}.{each.__qualname__}" for each in _CLASSES)
+setattr(numba.config, "CACHE_LOCATOR_CLASSES", _NAMES)  # noqa: B010 - it has no type
 
 
 def machine_code(function: Callable[..., Any]) -> Any:

@@ -1,5 +1,6 @@
 """Compiled functions: as Python has them, kept between processes, and outdated by any source."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -51,7 +52,14 @@ def ask(tmp_path):
     def ask(**numbers):
         (package / "inner.py").write_text(INNER.format(**numbers))
         command = [sys.executable, "-c", ASK]
-        told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        told = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "code")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         total, cached = told.stdout.splitlines()
         return float(total), cached
 
@@ -63,6 +71,12 @@ def test_another_process_finds_the_code_unless_any_source_has_changed(ask):
     assert ask(factor=2, limit=5) == (2 + 4 + 5, "1 0")
     assert ask(factor=3, limit=5) == (3 + 5 + 5, "0 1")
     assert ask(factor=3, limit=7) == (3 + 6 + 7, "0 1")
+
+
+def test_no_code_is_kept_among_sources(ask, tmp_path):
+    ask(factor=2, limit=5)
+    kept = [path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbi")]
+    assert set(kept) == {"code"}
 
 
 def test_what_divides_by_nothing_goes_on_as_numpy_does():
