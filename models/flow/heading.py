@@ -16,7 +16,7 @@ _MOST = 0.5  # of the people must walk where the reference did see
 
 def known_share(walkers: Walkers, site: Site, candidate: Array) -> float:
     """Which share of what people do is on ground that the reference saw, from a candidate (4,)."""
-    placed = place_steps(walkers.steps, candidate, sloped=False)
+    placed = place_steps(walkers.steps, candidate)
     unseen, _ = site.flow.look_unseen(placed.place)
     weight = walkers.weight * placed.valid
     return float((weight * (1 - unseen)).sum() / max(float(walkers.weight.sum()), 1e-12))

@@ -72,7 +72,7 @@ class Likelihood:
 
 def walkers_of(observations: Observations, candidate: Array) -> Walkers:
     """The steps that are walked, seen from a candidate (4,) that is about right."""
-    placed = place_steps(observations.steps, candidate, sloped=False)
+    placed = place_steps(observations.steps, candidate)
     moving = placed.valid & (placed.length_m > _STANDING_MPS * observations.steps.seconds)
     steps = steps_where(observations.steps, moving)
     rows = steps.rows
@@ -173,8 +173,7 @@ def _rays(walkers: Walkers) -> tuple[Array, Array]:
 
 def _rotation(candidate: Array) -> tuple[Array, Array]:
     """That of a candidate (4,), `camera_from_world` (3, 3), and its turns (2, 3, 3)."""
-    rotation, turns = rotation_and_turns(*(float(candidate[number]) for number in (0, 1, 3)))
-    return rotation, np.array(turns)
+    return rotation_and_turns(*(float(candidate[number]) for number in (0, 1, 3)))
 
 
 def _slopes(around: Array) -> Array:

@@ -86,7 +86,7 @@ def loss(walkers: Walkers, site: Site, candidate: Array, other: Array) -> float:
 def _fits(walkers: Walkers, site: Site, candidate: Array) -> Array:
     """The fit (tracks,) of each walking group at its own index; NaN of those on unknown ground."""
     flow = site.flow
-    placed = place_steps(walkers.steps, candidate, sloped=False)
+    placed = place_steps(walkers.steps, candidate)
     rows = walkers.steps.rows
     slot_idx = flow.slot_of(rows.time_s)
     value, _, _ = flow.look(placed.place, placed.direction, slot_idx)

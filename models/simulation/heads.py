@@ -11,6 +11,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.geometry.upright import heads_seen, statures
+from models.geometry.vectors import aside_of, norm
 from models.trajectory import Trajectory
 
 _USUAL_M = 1.7  # of people whose top is not in view: their head is not either
@@ -77,8 +78,7 @@ def _with_heads(
     way = np.gradient(ground, axis=0) if count > 1 else np.zeros((count, 2))
     way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
     away = ground - pose.centre_m[:2]
-    right = np.stack([away[:, 1], -away[:, 0]], axis=1)
-    right = right / np.linalg.norm(right, axis=1, keepdims=True)
+    right = -aside_of(away) / norm(away)[:, None]
     own = rng.normal(0, config.person_sd_rad, 2)
     lean = own + config.forward_rad * way + config.bias_rad * right
     aside = np.tan(lean) + _jitter(count, config, rng)

@@ -35,9 +35,7 @@ class VerticalEstimate:
         off = self.values - values
         wide = self.covariance + covariance
         squared = float(off @ np.linalg.solve(wide, off))
-        density = -0.5 * squared - 0.5 * float(np.linalg.slogdet(wide)[1])
-        nearest = -0.5 * float(np.linalg.slogdet(wide)[1])
-        return max(density, nearest + _LEAST_LOG_DENSITY)
+        return max(-0.5 * squared, _LEAST_LOG_DENSITY) - 0.5 * float(np.linalg.slogdet(wide)[1])
 
 
 def vertical_estimate(

@@ -15,7 +15,7 @@ import numpy as np
 from models.geometry.ground import ground_of_rays
 from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, Mask
-from models.geometry.vectors import dot, norm
+from models.geometry.vectors import aside_of, dot, norm
 from models.verticals.uprights import Uprights
 
 _LEAST_SPAN = 1e-9  # of the product of two rays that are one
@@ -71,6 +71,6 @@ def _sideways(uprights: Uprights, rotation: Array, foot: Array) -> Array:
     end, end_falls = ground_of_rays(uprights.to_rays, rotation, beyond=0.0)
     way = np.where((start_falls & end_falls)[:, None], end - start, 0.0)
     length = norm(way)
-    right = np.stack([foot[:, 1], -foot[:, 0]], axis=1)
+    right = -aside_of(foot)
     across = dot(way, right) / np.maximum(length * norm(right), 1e-12)
     return np.asarray(np.where(length > _LEAST_WAY, across, 0.0))

@@ -111,5 +111,4 @@ def _rotation_and_turns(candidate: Array, heading_rad: float, sloped: bool) -> t
     tilt_rad, roll_rad = float(candidate[0]), float(candidate[1])
     if not sloped:
         return rotation_from_angles(tilt_rad, roll_rad, heading_rad), _NO_TURNS
-    rotation, turns = rotation_and_turns(tilt_rad, roll_rad, heading_rad)
-    return rotation, np.array(turns)
+    return rotation_and_turns(tilt_rad, roll_rad, heading_rad)

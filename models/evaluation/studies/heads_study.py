@@ -26,7 +26,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.recalibration import learn_site, observe
-from models.simulation.heads import HeadConfig, with_heads
+from models.simulation.heads import HeadConfig, with_box_heads, with_heads
 from models.simulation.knocked import Knock
 from models.simulation.site import walk_site
 from models.trajectory import Trajectory, by_end
@@ -111,16 +111,15 @@ def _headed(
     """Tracks without boxes, so that feet and heads alone are compared."""
     rng = np.random.default_rng((case.seed, part))
     seen = with_heads(tracks, case.intrinsics, pose, _HEADS, rng)
-    return [replace(track, top_v=None, head_uv=_by_way(track, way)) for track in seen]
+    if way == "feet":
+        seen = [replace(track, head_uv=None) for track in seen]
+    if way == "columns":
+        seen = with_box_heads([replace(track, top_v=_head_v(track)) for track in seen])
+    return [replace(track, top_v=None) for track in seen]
 
 
-def _by_way(track: Trajectory, way: str) -> Array | None:
-    if way == "feet" or track.head_uv is None:
-        return None
-    if way == "heads":
-        return track.head_uv
-    above = np.stack([track.uv[:, 0], track.head_uv[:, 1]], axis=1)
-    return np.where(np.isfinite(track.head_uv), above, np.nan)
+def _head_v(track: Trajectory) -> Array | None:
+    return None if track.head_uv is None else track.head_uv[:, 1]
 
 
 def _told(outcomes: Sequence[HeadOutcome]) -> Iterator[str]:

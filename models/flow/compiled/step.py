@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from models.compiled import compiled
+from models.geometry.ground_flow import ground_flow
 from models.geometry.landing import landing
 from models.geometry.rotation import Array
 
@@ -96,16 +97,16 @@ def slope_of(step: Step, turns: Array, parameter: int) -> Slope:
     if parameter < _TURNS:
         turn = turns[parameter]
         x, y = step.x, step.y
-        fall = x * turn[0, 2] + y * turn[1, 2] - turn[2, 2]
+        flow = ground_flow(x, y, turn)
         along = step.way_x * turn[0, 2] + step.way_y * turn[1, 2]
         bent_x = step.way_x * turn[0, 0] + step.way_y * turn[1, 0] + x * along
         bent_y = step.way_x * turn[0, 1] + step.way_y * turn[1, 1] + y * along
         toward = step.way_x * x + step.way_y * y
         return Slope(
-            x * turn[0, 0] + y * turn[1, 0] - turn[2, 0] + x * fall,
-            x * turn[0, 1] + y * turn[1, 1] - turn[2, 1] + y * fall,
+            flow.x,
+            flow.y,
             bent_y * step.way_x - bent_x * step.way_y,
-            4 * fall - 2 * toward * along,
+            4 * flow.fall - 2 * toward * along,
         )
     if parameter == _LOG_HEIGHT:
         return Slope(step.x, step.y, 0.0, 2.0)

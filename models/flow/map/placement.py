@@ -1,4 +1,4 @@
-"""Steps on the ground as a camera at a candidate pose sees them, with derivatives.
+"""Steps on the ground as a camera at a candidate pose sees them.
 
 A candidate is (tilt, roll, log height, heading). Places are relative to the camera's foot point, in
 metres, axes as the world's; directions are angles from +X towards +Y.
@@ -11,9 +11,8 @@ import numpy as np
 
 from models.compiled import compiled
 from models.estimation.joint.observations import Steps
-from models.flow.compiled.step import log_ratio_of, slope_of, step_on_ground
-from models.geometry.ground_flow import rotation_and_turns
-from models.geometry.rotation import Array, Mask
+from models.flow.compiled.step import log_ratio_of, step_on_ground
+from models.geometry.rotation import Array, Mask, rotation_from_angles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +20,7 @@ class Placement:
     """M steps: `place` (M, 2), `direction` (M,), `length_m` (M,), `valid` (M,) below the horizon.
 
     A density over place and direction times exp(`log_ratio`) (M,) is one over the place and
-    direction of a step in the image. `d_...` are derivatives by the candidate: (M, 2, 4), (M, 4).
+    direction of a step in the image.
     """
 
     place: Array
@@ -29,18 +28,12 @@ class Placement:
     length_m: Array
     valid: Mask
     log_ratio: Array
-    d_place: Array
-    d_direction: Array
-    d_log_ratio: Array
 
 
-def place_steps(steps: Steps, candidate: Array, *, sloped: bool = True) -> Placement:
-    """Where steps are on the ground and which way they go, seen from a candidate (4,).
-
-    Unless it is `sloped`, the derivatives are nothing, and it takes half of the time.
-    """
+def place_steps(steps: Steps, candidate: Array) -> Placement:
+    """Where steps are on the ground and which way they go, seen from a candidate (4,)."""
     tilt, roll, log_height, heading = (float(number) for number in candidate)
-    rotation, turns = rotation_and_turns(tilt, roll, heading)
+    rotation = rotation_from_angles(tilt, roll, heading)
     count = len(steps.start_rays)
     placed = Placement(
         place=np.empty((count, 2)),
@@ -48,9 +41,6 @@ def place_steps(steps: Steps, candidate: Array, *, sloped: bool = True) -> Place
         length_m=np.empty(count),
         valid=np.empty(count, dtype=bool),
         log_ratio=np.empty(count),
-        d_place=np.zeros((count, 2, 4)),
-        d_direction=np.zeros((count, 4)),
-        d_log_ratio=np.zeros((count, 4)),
     )
     _place(
         np.ascontiguousarray(steps.start_rays),
@@ -63,17 +53,6 @@ def place_steps(steps: Steps, candidate: Array, *, sloped: bool = True) -> Place
         placed.valid,
         placed.log_ratio,
     )
-    if sloped:
-        _slope(
-            np.ascontiguousarray(steps.start_rays),
-            np.ascontiguousarray(steps.end_rays),
-            rotation,
-            np.array(turns),
-            math.exp(log_height),
-            placed.d_place,
-            placed.d_direction,
-            placed.d_log_ratio,
-        )
     return placed
 
 
@@ -97,25 +76,3 @@ def _place(
         direction[number] = math.atan2(step.way_y, step.way_x)
         length_m[number] = step.length * height_m
         valid[number], log_ratio[number] = step.valid, log_ratio_of(step, log_height)
-
-
-@compiled
-def _slope(
-    starts: Array,
-    ends: Array,
-    rotation: Array,
-    turns: Array,
-    height_m: float,
-    d_place: Array,
-    d_direction: Array,
-    d_log_ratio: Array,
-) -> None:
-    """Write how the steps between rays (M, 3) move into the last three."""
-    for number in range(len(starts)):
-        step = step_on_ground(starts, ends, number, rotation)
-        for parameter in range(4):
-            slope = slope_of(step, turns, parameter)
-            d_place[number, 0, parameter] = slope.x * height_m
-            d_place[number, 1, parameter] = slope.y * height_m
-            d_direction[number, parameter] = slope.direction
-            d_log_ratio[number, parameter] = slope.log_ratio if step.valid else 0.0

@@ -245,7 +245,7 @@ def test_one_kind_of_arguments_is_compiled_whoever_calls():
             coverage = coverage_of(some)
             for scored in (True, False):
                 likelihood(asked, some, coverage, LENS, AHEAD, scored=scored)
-                place_steps(asked.steps, AHEAD, sloped=scored)
+            place_steps(asked.steps, AHEAD)
             anchored_scores(asked, some, coverage, LENS, AHEAD, DOWN)
             in_view(LENS, np.array([AHEAD, DOWN]), coverage.places, 1)
             some.look(np.zeros((2, 2)).T, np.zeros(4)[::2], np.zeros(2, np.int64))

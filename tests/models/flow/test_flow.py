@@ -10,11 +10,13 @@ from numpy.testing import assert_allclose
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Steps
 from models.estimation.joint.reference import learn_speed_reference
+from models.flow.compiled.step import slope_of, step_on_ground
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import likelihood, walkers_of
 from models.flow.map.flow_map import DIRECTIONS
 from models.flow.map.placement import place_steps
 from models.flow.reference import candidate_of, learn_flow
+from models.geometry.ground_flow import rotation_and_turns
 from models.simulation.site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
@@ -45,14 +47,21 @@ def step_between(start: np.ndarray, end: np.ndarray) -> Steps:
 def test_derivatives_are_those_of_differences(site, number):
     at = candidate_of(TURNED)
     step = 1e-6 * np.eye(4)[number]
-    said = place_steps(site[2].steps, at)
-    after, before = (place_steps(site[2].steps, at + sign * step) for sign in (1, -1))
+    steps = site[2].steps
+    rotation, turns = rotation_and_turns(at[0], at[1], at[3])
+    said = [
+        slope_of(step_on_ground(steps.start_rays, steps.end_rays, one, rotation), turns, number)
+        for one in range(len(steps.seconds))
+    ]
+    after, before = (place_steps(steps, at + sign * step) for sign in (1, -1))
     place = (after.place - before.place) / 2e-6
-    assert_allclose(said.d_place[:, :, number], place, atol=1e-2 * max(np.abs(place).max(), 1))
+    d_place = math.exp(at[2]) * np.array([(slope.x, slope.y) for slope in said])
+    assert_allclose(d_place, place, atol=1e-2 * max(np.abs(place).max(), 1))
     turned = np.angle(np.exp(1j * (after.direction - before.direction))) / 2e-6
-    assert_allclose(said.d_direction[:, number], turned, atol=1e-4)
+    assert_allclose([slope.direction for slope in said], turned, atol=1e-4)
     ratio = (after.log_ratio - before.log_ratio) / 2e-6
-    assert_allclose(said.d_log_ratio[:, number], ratio, atol=1e-2 * max(np.abs(ratio).max(), 1))
+    d_log_ratio = [slope.log_ratio for slope in said]
+    assert_allclose(d_log_ratio, ratio, atol=1e-2 * max(np.abs(ratio).max(), 1))
 
 
 def test_the_change_of_measure_is_the_jacobian_written_out():

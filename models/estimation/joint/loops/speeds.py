@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from models.compiled import compiled
+from models.geometry.ground_flow import ground_flow
 from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
@@ -68,14 +69,12 @@ def speeds_of_steps(
         toward, beside = way_x * x + way_y * y, way_x * y - way_y * x
         for number in range(len(turns)):
             turn = turns[number]
-            fall = x * turn[0, 2] + y * turn[1, 2] - turn[2, 2]
-            flow_x = x * turn[0, 0] + y * turn[1, 0] - turn[2, 0] + x * fall
-            flow_y = x * turn[0, 1] + y * turn[1, 1] - turn[2, 1] + y * fall
-            d_place[j, 0, number], d_place[j, 1, number] = flow_x * height_m, flow_y * height_m
+            flow = ground_flow(x, y, turn)
+            d_place[j, 0, number], d_place[j, 1, number] = flow.x * height_m, flow.y * height_m
             along = way_x * turn[0, 2] + way_y * turn[1, 2]
             aside = way_x * turn[1, 2] - way_y * turn[0, 2]
             if valid[j]:
-                d_value[j, number] = fall + toward * along
+                d_value[j, number] = flow.fall + toward * along
                 d_noise[j, number] = turned * (beside * along + toward * aside)
             bent_x = way_x * turn[0, 0] + way_y * turn[1, 0] + x * along
             bent_y = way_x * turn[0, 1] + way_y * turn[1, 1] + y * along

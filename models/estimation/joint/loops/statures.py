@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from models.compiled import compiled
+from models.geometry.ground_flow import ground_flow
 from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
@@ -56,15 +57,13 @@ def heights_of_tops(
         place[j, 0], place[j, 1] = east * height_m, north * height_m
         for number in range(len(turns)):
             turn = turns[number]
-            fall = east * turn[0, 2] + north * turn[1, 2] - turn[2, 2]
-            flow_x = east * turn[0, 0] + north * turn[1, 0] - turn[2, 0] + east * fall
-            flow_y = east * turn[0, 1] + north * turn[1, 1] - turn[2, 1] + north * fall
-            d_place[j, 0, number], d_place[j, 1, number] = flow_x * height_m, flow_y * height_m
+            flow = ground_flow(east, north, turn)
+            d_place[j, 0, number], d_place[j, 1, number] = flow.x * height_m, flow.y * height_m
             if valid[j]:
                 bent_x = lean_x * turn[0, 0] + lean_y * turn[1, 0] + lean_z * turn[2, 0]
                 bent_y = lean_x * turn[0, 1] + lean_y * turn[1, 1] + lean_z * turn[2, 1]
                 bent_z = lean_x * turn[0, 2] + lean_y * turn[1, 2] + lean_z * turn[2, 2]
-                top = bent_x * east + bent_y * north - bent_z + lean_x * flow_x + lean_y * flow_y
+                top = bent_x * east + bent_y * north - bent_z + lean_x * flow.x + lean_y * flow.y
                 d_value[j, number] = (top + ratio * bent_z) / -lean_z / ratio
         d_place[j, 0, 2], d_place[j, 1, 2] = place[j]
         d_value[j, 2] = 1.0 if valid[j] else 0.0
