@@ -190,7 +190,7 @@ def main() -> int:
             data_dir=Path(folder) / "data", port=free_port(), workers=wanted.workers, epochs=1
         )
         migrate(settings)
-        service = RunningService(settings)
+        service = RunningService(settings, forked=False)
         service.start()
         try:
             report = _run(service, wanted)

@@ -31,7 +31,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory(prefix="surefoot-refresh-") as folder:
             settings = Settings(data_dir=Path(folder) / "data", port=free_port(), epochs=1)
             migrate(settings)
-            service = RunningService(settings)
+            service = RunningService(settings, forked=False)
             service.start()
             try:
                 took_s = _refreshes(service, form)

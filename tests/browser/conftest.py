@@ -2,55 +2,24 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import httpx
 import pytest
 
 from service.settings import Settings
-from tests.conftest import free_port, wait_for
+from tests.conftest import RunningService, free_port
 
 CHROMIUM = os.environ.get("SUREFOOT_TEST_CHROMIUM") or shutil.which("chromium")
 # Where screenshots of the tests go, if anybody wants to look at them.
 SHOTS = os.environ.get("SUREFOOT_TEST_SHOTS")
 
 
-class Server:
+class Server(RunningService):
     """`surefoot serve --workers 0` over a folder of its own; a test may write into its store."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.url = f"http://{settings.host}:{settings.port}"
-        self.log = settings.data_dir.parent / "serve.log"
-        self.http = httpx.Client(base_url=self.url, timeout=30)
-
-    def start(self) -> None:
-        with self.log.open("a") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "service.cli", "serve"],
-                env=self.settings.as_environment(),
-                stdout=log,
-                stderr=log,
-            )
-        wait_for(self.answers)
-
-    def answers(self) -> bool:
-        assert self.process.poll() is None, self.log.read_text()
-        try:
-            return self.http.get("/healthz").status_code == 200
-        except httpx.TransportError:
-            return False
-
-    def stop(self) -> None:
-        self.http.close()
-        self.process.terminate()
-        self.process.wait(20)
 
 
 def served(folder: Path, migrated: Path) -> Iterator[Server]:

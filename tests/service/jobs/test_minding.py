@@ -33,7 +33,7 @@ def start(settings, monkeypatch):
 
     def start_one(environment=None, **changes):
         changed = settings.model_copy(update={"port": free_port(), "trainings": "off", **changes})
-        service = RunningService(changed)
+        service = RunningService(changed, forked=False)
         running.append(service)
         with monkeypatch.context() as patch:
             for name, value in (environment or {}).items():
