@@ -14,9 +14,15 @@ PAGE = Template(
 const target = $target, posts = $posts, gets = $gets;
 window.loot = []; window.tried = 0; window.done = false;
 const frames = [];
+const LONGEST_MS = 15000; // that anything is waited for which ends by itself
 function frame(name) {
   const made = document.createElement("iframe");
   made.name = name;
+  made.answered = new Promise((resolve) => {
+    let loads = 0; // the first is of the empty frame
+    made.onload = () => { loads += 1; if (loads === 2) resolve(); };
+    setTimeout(resolve, LONGEST_MS);
+  });
   document.body.append(made);
   frames.push(made);
   return made;
@@ -64,6 +70,13 @@ function follow(path) {
     setTimeout(() => { source.close(); resolve(); }, 3000);
   });
 }
+const answeredBeacons = () =>
+  performance.getEntriesByType("resource").filter((entry) => entry.initiatorType === "beacon");
+async function beaconsAnswered() {
+  const end = performance.now() + LONGEST_MS;
+  while (answeredBeacons().length < posts.length && performance.now() < end)
+    await new Promise((resolve) => setTimeout(resolve, 20));
+}
 (async () => {
   for (const [path, fields] of posts) {
     for (const type of ["text/plain", "multipart/form-data", "application/x-www-form-urlencoded"])
@@ -79,7 +92,7 @@ function follow(path) {
   }
   await Promise.all([load("img", $image), load("script", "/cameras"), load("link", "/"),
     follow("/events?after=0")]);
-  await new Promise((resolve) => setTimeout(resolve, 1500));
+  await Promise.all([beaconsAnswered(), ...frames.map((made) => made.answered)]);
   for (const made of frames) {
     try {
       const text = made.contentDocument?.body?.textContent;

@@ -1,15 +1,18 @@
 """The page of a camera in a real browser: what it says, what it does, and that it stays live."""
 
+import contextlib
 import math
 import re
 import shutil
+import sqlite3
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from PIL import Image
 
+from service.data_dir import DATABASE
 from service.settings import Settings
-from tests.browser.conftest import Server, axe, shoot, too_wide
+from tests.browser.conftest import Server, axe, served, shoot, too_wide, watched
 from tests.conftest import CAMERA, free_port
 from tests.service.bench import PRIOR, Bench, moved
 from tests.service.street import KNOCKED, Street
@@ -19,17 +22,86 @@ pytestmark = pytest.mark.slow
 URL = "/ui/cameras/corner"
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, migrated):
+    yield from served(tmp_path_factory.mktemp("camera"), migrated)
+
+
+@pytest.fixture(scope="module")
+def tab(browser, server):
+    with watched(browser, server) as made:
+        yield made
+
+
 @pytest.fixture
-def bench(server):
+def page(tab, server):
+    """The one tab of this file, as if it was new: each new one would read the charts' code anew.
+
+    That takes 2 s, more than most of these tests.
+    """
+    made, wrong = tab
+    made.goto("/healthz")
+    made.evaluate("localStorage.clear(); sessionStorage.clear()")
+    made.emulate_media(color_scheme="light")
+    made.set_viewport_size({"width": 1280, "height": 800})
+    yield made
+    made.goto("about:blank")
+    said = wrong.copy()
+    wrong.clear()
+    assert said == []
+
+
+@pytest.fixture(scope="module")
+def databases(server, tmp_path_factory):
+    """Where databases lie that the service can be put back to, by name."""
+    folder = tmp_path_factory.mktemp("databases")
+    copy_database(server.settings.data_dir / DATABASE, folder / "empty")
+    return folder
+
+
+def copy_database(source, target):
+    """Make one database the same as another, which a service may have open."""
+    with (
+        contextlib.closing(sqlite3.connect(source)) as given,
+        contextlib.closing(sqlite3.connect(target)) as made,
+    ):
+        given.backup(made)
+
+
+@pytest.fixture
+def empty(server, databases):
+    """The service as if it was new, whatever tests before this one did there.
+
+    To delete the camera would leave the log of what was done to it, which is for good.
+    """
+    copy_database(databases / "empty", server.settings.data_dir / DATABASE)
+
+
+def new_bench(server):
     server.http.post("/cameras", json=CAMERA).raise_for_status()
     return Bench(server.http, server.settings.model_copy(update={"window_tracks": 20}))
 
 
 @pytest.fixture
-def knocked(bench):
+def bench(server, empty):
+    return new_bench(server)
+
+
+@pytest.fixture(scope="module")
+def once_knocked(server, databases):
+    """A camera that was knocked, and its database: how it came to that is the same every time."""
+    copy_database(databases / "empty", server.settings.data_dir / DATABASE)
+    bench = new_bench(server)
     for tilt_deg in (0.0, 0.1, 5.0, 5.0, 5.0):
         bench.see(moved(tilt_deg=tilt_deg, heading_deg=-0.6 * tilt_deg), paths=True)
+    copy_database(server.settings.data_dir / DATABASE, databases / "knocked")
     return bench
+
+
+@pytest.fixture
+def knocked(server, databases, once_knocked):
+    copy_database(databases / "knocked", server.settings.data_dir / DATABASE)
+    return once_knocked
 
 
 @pytest.fixture
@@ -247,11 +319,12 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
         page.get_by_role("button", name="Remove it").click()
         expect(page.locator(".picture image")).to_have_count(0)
         assert server.http.get("/cameras/corner/snapshot").status_code == 404
+        page.context.close()  # a service that stops waits 3 s for streams of events
     finally:
         server.stop()
 
 
-def test_a_knocked_street_is_seen_to_be_knocked(page, server):
+def test_a_knocked_street_is_seen_to_be_knocked(page, server, empty):
     """The whole way, with the real estimator: the two grids part, the page says how far."""
     expect = pytest.importorskip("playwright.sync_api").expect
     server.http.post("/cameras", json={**CAMERA, "reference_tracks": 150}).raise_for_status()
