@@ -19,6 +19,7 @@ from typing import Any
 import numba
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 
+_ROOT = Path(__file__).parent.parent
 _SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 
 
@@ -26,7 +27,7 @@ _SETTINGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 def _sources() -> bytes:
     """A digest of all of models/: code holds what it calls, and constants, of other files, too."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted((_ROOT / "models").rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.digest()
 
@@ -43,11 +44,11 @@ class Given(_OfAllSources, UserProvidedCacheLocator):
 
 
 class OfEnvironment(_OfAllSources, InTreeCacheLocator):
-    """In the virtual environment, if this is one."""
+    """In the virtual environment, if this is one: the same for a checkout and what is installed."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
-        folder = self.get_suitable_cache_subpath(file)
+        folder = Path(file).parent.relative_to(_ROOT)
         self._cache_path = os.path.join(sys.prefix, "var", "cache", "surefoot", folder)
 
     @classmethod

@@ -21,21 +21,17 @@ SHOTS = os.environ.get("SUREFOOT_TEST_SHOTS")
 NAMES = "--host-resolver-rules=MAP *.test 127.0.0.1"
 
 
-class Server(RunningService):
-    """`surefoot serve --workers 0` over a folder of its own; a test may write into its store."""
-
-
-def served(folder: Path, migrated: Path) -> Iterator[Server]:
+def served(folder: Path, migrated: Path) -> Iterator[RunningService]:
     """A server over an empty data directory, as long as the iteration lasts."""
     shutil.copytree(migrated, folder / "data")
-    running = Server(Settings(data_dir=folder / "data", workers=0, port=free_port()))
+    running = RunningService(Settings(data_dir=folder / "data", workers=0, port=free_port()))
     running.start()
     yield running
     running.stop()
 
 
 @pytest.fixture
-def server(tmp_path: Path, migrated: Path) -> Iterator[Server]:
+def server(tmp_path: Path, migrated: Path) -> Iterator[RunningService]:
     """A server of one test; files whose tests leave nothing behind have one of their own."""
     yield from served(tmp_path, migrated)
 
@@ -54,7 +50,7 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def page(browser: Any, server: Server) -> Iterator[Any]:
+def page(browser: Any, server: RunningService) -> Iterator[Any]:
     """A page of 1280 x 800; the test fails where it asked another host or a script failed."""
     with watched(browser, server) as (made, wrong):
         yield made
@@ -62,7 +58,7 @@ def page(browser: Any, server: Server) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def watched(browser: Any, server: Server) -> Iterator[tuple[Any, list[str]]]:
+def watched(browser: Any, server: RunningService) -> Iterator[tuple[Any, list[str]]]:
     """A page of 1280 x 800, and the list into which goes what must not happen on it."""
     context = browser.new_context(base_url=server.url, viewport={"width": 1280, "height": 800})
     made = context.new_page()

@@ -11,9 +11,9 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.settings import Settings
 from service.store.sqlite.database import Store
-from tests.browser.conftest import Server, axe, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide
 from tests.browser.hostile import hostile_page
-from tests.conftest import CAMERA, free_port
+from tests.conftest import CAMERA, RunningService, free_port
 
 pytestmark = pytest.mark.slow
 
@@ -34,7 +34,7 @@ def started(folder, migrated, **changes):
         **changes,
     )
     shutil.copytree(migrated, made.data_dir)
-    return Server(made)
+    return RunningService(made)
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,13 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from PIL import Image
 
+from service.access.activity import note
 from service.data_dir import DATABASE
+from service.kinds import Activity
 from service.settings import Settings
-from tests.browser.conftest import Server, axe, served, shoot, too_wide, watched
-from tests.conftest import CAMERA, free_port
+from service.store.sqlite.database import Store
+from tests.browser.conftest import axe, served, shoot, too_wide, watched
+from tests.conftest import CAMERA, RunningService, free_port
 from tests.service.bench import PRIOR, Bench, moved
 from tests.service.street import KNOCKED, Street
 from tests.service.street import PRIOR as STREET_PRIOR
@@ -277,7 +280,10 @@ def test_the_charts_have_points_and_zoom_by_buttons(seen):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_page_is_sound(page, knocked, scheme):
+def test_the_page_is_sound(page, knocked, server, scheme):
+    with contextlib.closing(Store(server.settings)) as store, store.write() as session:
+        for _ in range(40):  # a log that is longer than its place
+            note(session, Activity.CAMERA_CHANGED, by="Ada", camera_id="corner")
     page.emulate_media(color_scheme=scheme)
     page.goto(URL)
     page.wait_for_selector("#charts[data-points]")
@@ -300,7 +306,7 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
     shutil.copytree(migrated, settings.data_dir)
     Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
     Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
-    server = Server(settings)
+    server = RunningService(settings)
     server.start()
     try:
         server.http.post("/cameras", json=CAMERA).raise_for_status()
