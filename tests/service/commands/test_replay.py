@@ -27,7 +27,7 @@ def surefoot(*arguments: str) -> str:
         [sys.executable, "-m", "service.cli", *arguments],
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=400,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
@@ -54,12 +54,13 @@ def offline(once):
     return once("centred", make)
 
 
+@pytest.mark.timeout(900)  # two trainings, beside other tests
 def test_a_replay_through_http_is_the_offline_evaluation(training_service, offline):
     service = training_service
     service.start_again(epochs=2)  # after one the held-out walks are not told well enough
     output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
     assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
-    served = wait_for(lambda: averaged_of(service), timeout_s=180)
+    served = wait_for(lambda: averaged_of(service), timeout_s=400)
     (run,) = json.loads((offline / "out.json").read_text())["runs"]
     assert served["tracks"] == run["tracks"]
     assert served["height_m"] == pytest.approx(run["height_m"], abs=1e-4)
