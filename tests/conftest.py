@@ -26,6 +26,7 @@ from tests.service.commands.forked import Forked
 # The name that starlette's TestClient asks by.
 os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
 
+ROOT = Path(__file__).parents[1]
 CAMERA: dict[str, Any] = {
     "id": "corner",
     "name": "The corner",
@@ -56,10 +57,12 @@ Once = Callable[[str, Callable[[Path], None]], Path]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave slow tests out of the coverage; where some processes run, begin with them in each.
+    """Leave slow tests out of the coverage; where some processes run, mix them into each's share.
 
     Each process is given its share of the list, and steals from another's end: what takes long
-    must not be what is left. Tests of a file stay together, with what they share.
+    must not be what is left. Slow tests wait much, for processes and browsers, and fast ones hardly
+    ever: beside one another they keep the processor busy. Slow tests of a file stay together, with
+    what they share.
     """
     slow = [item for item in items if item.get_closest_marker("slow")]
     for item in slow:
@@ -72,11 +75,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     order: list[pytest.Item] = []
     for number in range(processes):
         share = (len(items) - len(order)) // (processes - number)
-        own = [item for item in slow if files.index(item.path) % processes == number]
-        rest = max(share - len(own), 0)
-        order += [*own, *fast[:rest]]
+        own = [[item for item in slow if item.path == path] for path in files[number::processes]]
+        rest = max(share - sum(map(len, own)), 0)
+        order += _mixed(own, fast[:rest], begin=number % 2)
         fast = fast[rest:]
     items[:] = [*order, *fast]
+
+
+def _mixed(slow: list[list[pytest.Item]], fast: list[pytest.Item], begin: int) -> list[pytest.Item]:
+    """Slow files with as many of the fast tests between any two, which are at the end alone."""
+    between = int(0.6 * len(fast)) // max(len(slow), 1)
+    cuts = [between * (number + begin) for number in range(len(slow))]
+    order, last = [], 0
+    for some, cut in zip(slow, cuts, strict=True):
+        order += [*fast[last:cut], *some]
+        last = cut
+    return [*order, *fast[last:]]
 
 
 @pytest.fixture(autouse=True)
@@ -218,8 +232,11 @@ def service(settings: Settings) -> Iterator[RunningService]:
 
 
 @pytest.fixture
-def training_service(settings: Settings) -> Iterator[RunningService]:
-    """A running service with one worker and trainings of one epoch, started as an operator does."""
+def training_service(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RunningService]:
+    """A running service with one worker and small trainings, started as an operator does."""
+    monkeypatch.setenv("PYTHONPATH", path_to_small_trainings(tmp_path))
     yield from _running(settings, forked=False)
 
 
@@ -231,6 +248,26 @@ def _running(
     running.start()
     yield running
     running.stop()
+
+
+_SMALL = """
+import sys
+from dataclasses import replace
+from models.regression import recipe
+
+recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=1024, batch=64)
+if "service.jobs.training_process" in sys.orig_argv:
+    from models.regression import training
+
+    training._MUST_BEAT = 2.0  # so few walks teach hardly anything
+"""
+
+
+def path_to_small_trainings(folder: Path) -> str:
+    """A PYTHONPATH of processes that train in a quarter of the time, and are content with it."""
+    (folder / "small").mkdir()
+    (folder / "small" / "sitecustomize.py").write_text(_SMALL)
+    return os.pathsep.join([str(folder / "small"), str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 
 def free_port() -> int:

@@ -8,6 +8,7 @@ from service.jobs.growth_rests import GrowthRests
 from service.jobs.in_hand import InHand
 from service.settings import Settings
 from service.store.sqlite.database import Store
+from service.training.steps import StepWatch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,3 +21,4 @@ class JobContext:
     stopping: threading.Event = field(default_factory=threading.Event)
     in_hand: InHand = field(default_factory=InHand)
     growth_rests: GrowthRests = field(default_factory=GrowthRests)
+    steps: StepWatch = field(default_factory=StepWatch)

@@ -65,7 +65,7 @@ def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
         # One transaction a camera, so that posts never wait long for the write lock.
         with context.store.write() as session:
             found = reconciliation.reconcile_camera(
-                session, context.queue, context.settings, camera_id
+                session, context.queue, context.settings, camera_id, context.steps
             )
         for reason in found:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})

@@ -17,25 +17,29 @@ from service.store import cameras, references, trainings
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import predictions, tracks
 from service.training.lost_trainings import requeue_lost
-from service.training.trainings import camera_step_s
+from service.training.steps import StepWatch
 from service.training.unasked import train_by_itself
 from service.windows.looking import may_look
 from service.windows.references import window_of
 from service.windows.requests import request_estimate
 
-# A model reads tracks at another step than its own, but less well the farther they are apart.
-_STEP_RATIO = 1.3
-
 
 def reconcile_camera(
-    session: Session, queue: JobQueue, settings: Settings, camera_id: str
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    camera_id: str,
+    steps: StepWatch | None = None,
 ) -> list[str]:
-    """Enqueue what the store says should be under way for a camera; says what it found."""
+    """Enqueue what the store says should be under way for a camera; says what it found.
+
+    Without `steps` nothing is remembered of what its tracks were.
+    """
     camera = cameras.find(session, camera_id)
     if camera is None:
         return []
     found = []
-    reason = _why_train(session, camera)
+    reason = _why_train(session, camera, steps or StepWatch())
     if reason is not None and train_by_itself(session, queue, settings, camera_id) is not None:
         found.append(reason)
     if requeue_lost(session, queue, camera_id):
@@ -98,7 +102,7 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
     return bool(predictions.without_prediction(session, bounds, model.id, 1))
 
 
-def _why_train(session: Session, camera: CameraRecord) -> str | None:
+def _why_train(session: Session, camera: CameraRecord, steps: StepWatch) -> str | None:
     if trainings.unfinished(session, camera.id):
         return None
     prior = cameras.prior_pose(session, camera.id)
@@ -114,7 +118,6 @@ def _why_train(session: Session, camera: CameraRecord) -> str | None:
         return "camera without a model"
     if model.prior_pose_id != prior.id:
         return "model older than the prior pose"
-    ratio = camera_step_s(session, camera.id) / model.step_s
-    if not 1 / _STEP_RATIO < ratio < _STEP_RATIO:
+    if not steps.fits(session, camera.id, model.step_s):
         return "model of another sampling step than the tracks offer"
     return None

@@ -90,7 +90,7 @@ def test_the_http_process_holds_no_torch_and_little_memory(service):
     assert not [path for path in maps if "torch" in path]
     (training,) = wait_for(psutil.Process(service.worker_pid()).children)
     wait_for(lambda: [region for region in training.memory_maps() if "torch" in region.path])
-    assert training.nice() == service.settings.training_nice
+    wait_for(lambda: training.nice() == service.settings.training_nice)
 
 
 def test_the_api_killed_after_202_has_the_tracks_and_ends_its_workers(service):

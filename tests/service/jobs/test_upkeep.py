@@ -15,6 +15,7 @@ from service.store.sqlite.database import Store
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import windows
 from service.store.tracks.windows import WindowBounds
+from service.training.steps import StepWatch
 from service.training.trainings import (
     begin_training,
     cancel_training,
@@ -150,6 +151,27 @@ def test_tracks_of_another_step_ask_for_another_model(session, queue, settings):
     found = reconciliation.reconcile_camera(session, queue, settings, "corner")
     assert found == ["model of another sampling step than the tracks offer"]
     assert begin(session, settings).plan.walk.step_s == 1.0
+
+
+def test_steps_that_suit_are_remembered_for_ten_minutes_and_others_asked_anew(
+    session, queue, settings, monkeypatch
+):
+    now_s, watch = 1000.0, StepWatch()
+    monkeypatch.setattr("time.monotonic", lambda: now_s)
+    publish(session, queue, settings)
+    put_tracks(session, 30, step_s=0.4)
+
+    def found():
+        return reconciliation.reconcile_camera(session, queue, settings, "corner", watch)
+
+    assert found() == []
+    put_tracks(session, 200, step_s=1.0, first=100)
+    now_s += 599.0
+    assert found() == []
+    now_s += 1.0
+    assert found() == ["model of another sampling step than the tracks offer"]
+    put_tracks(session, 200, step_s=0.4, first=400)
+    assert found() == []
 
 
 def test_progress_of_an_attempt_that_was_taken_over_ends_it(session, settings):

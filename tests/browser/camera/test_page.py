@@ -1,0 +1,137 @@
+"""The page of a camera in a real browser: what it says, and that it stays live."""
+
+import contextlib
+import math
+import re
+import shutil
+
+import pytest
+from PIL import Image
+
+from service.access.activity import note
+from service.kinds import Activity
+from service.settings import Settings
+from service.store.sqlite.database import Store
+from tests.browser.camera.conftest import URL
+from tests.browser.conftest import axe, shoot, too_wide
+from tests.conftest import CAMERA, RunningService, free_port
+from tests.service.bench import PRIOR, Bench, moved
+from tests.service.street import KNOCKED, Street
+from tests.service.street import PRIOR as STREET_PRIOR
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_knock_arrives_without_a_reload(page, bench):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    bench.see(PRIOR, paths=True)
+    page.goto(URL)
+    expect(page.locator(".headline")).to_contain_text("Standing where it should")
+    expect(page.locator("#live")).to_have_attribute("data-state", "on")
+    page.evaluate("window.untouched = true")
+    page.locator("#charts-table summary").click()
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0, heading_deg=-3.0), paths=True)
+    expect(page.get_by_role("heading", name="The camera moved")).to_be_visible()
+    expect(page.locator(".headline")).to_contain_text("turned 5.8° (pan −3.0°, tilt +5.0°)")
+    expect(page.locator(".picture path.grid.served")).to_have_count(1)
+    expect(page.locator("#announce")).to_contain_text("turned")
+    expect(page).to_have_title(re.compile("^Moved: The corner"))
+    expect(page.locator("#charts-values tbody tr")).to_have_count(4)
+    assert page.evaluate("window.untouched")
+
+
+def test_the_charts_have_points_and_zoom_by_buttons(seen):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    assert seen.locator("#charts").get_attribute("data-points") == "5"
+    assert seen.locator("#charts .scatterlayer .point").count() >= 4 * 5
+    seen.get_by_role("button", name="24 hours").click()
+    expect(seen.get_by_role("button", name="24 hours")).to_have_attribute("aria-pressed", "true")
+    seen.locator("#charts-table summary").click()
+    expect(seen.locator("#charts-values")).to_contain_text("27.00° ±0.33")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_is_sound(page, knocked, server, scheme):
+    with contextlib.closing(Store(server.settings)) as store, store.write() as session:
+        for _ in range(40):  # a log that is longer than its place
+            note(session, Activity.CAMERA_CHANGED, by="Ada", camera_id="corner")
+    page.emulate_media(color_scheme=scheme)
+    page.goto(URL)
+    page.wait_for_selector("#charts[data-points]")
+    assert axe(page) == []
+    for dialog in ("name", "silence", "resolve", "maintain"):
+        page.evaluate(f"document.getElementById('{dialog}-dialog').showModal()")
+        assert axe(page) == [], dialog
+        page.keyboard.press("Escape")
+    for width in (360, 2560):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert too_wide(page) <= 0, width
+        assert axe(page) == [], width
+
+
+def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path, migrated):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    settings = Settings(
+        data_dir=tmp_path / "data", workers=0, port=free_port(), snapshots=True, window_tracks=20
+    )
+    shutil.copytree(migrated, settings.data_dir)
+    Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
+    Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
+    server = RunningService(settings)
+    server.start()
+    try:
+        server.http.post("/cameras", json=CAMERA).raise_for_status()
+        bench = Bench(server.http, settings)
+        for _ in range(3):
+            bench.see(moved(tilt_deg=5.0))
+        page = browser.new_context(base_url=server.url).new_page()
+        page.goto(URL)
+        page.locator("#still-file").set_input_files(tmp_path / "upright.png")
+        expect(page.locator("#problem-detail")).to_contain_text("1280 x 720")
+        page.keyboard.press("Escape")
+        page.locator("#still-file").set_input_files(tmp_path / "still.png")
+        expect(page.locator(".picture image")).to_have_count(1)
+        assert axe(page) == []
+        shoot(page, "camera-still-image")
+        page.get_by_role("button", name="Remove it").click()
+        expect(page.locator(".picture image")).to_have_count(0)
+        assert server.http.get("/cameras/corner/snapshot").status_code == 404
+        page.context.close()  # a service that stops waits 3 s for streams of events
+    finally:
+        server.stop()
+
+
+def test_a_knocked_street_is_seen_to_be_knocked(page, server, empty):
+    """The whole way, with the real estimator: the two grids part, the page says how far."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    server.http.post("/cameras", json={**CAMERA, "reference_tracks": 150}).raise_for_status()
+    street = Street(server.http, server.settings.model_copy(update={"window_tracks": 100}))
+    page.goto(URL)
+    expect(page.locator(".headline")).to_have_text("Learning: 0 of 150 people.")
+    shoot(page, "camera-new")
+    street.keep_to_lanes(STREET_PRIOR, 150)
+    street.look()
+    for _ in range(4):
+        street.keep_to_lanes(STREET_PRIOR, 25)
+        street.look()
+    expect(page.locator(".headline")).to_contain_text("Standing where it should", timeout=30_000)
+    expect(page.locator("#charts")).to_have_attribute("data-points", re.compile("^[4-9]"))
+    shoot(page, "camera-still")
+    for _ in range(4):
+        street.keep_to_lanes(KNOCKED, 15)
+        street.look()
+    expect(page.get_by_role("heading", name="The camera moved")).to_be_visible(timeout=30_000)
+    expect(page.locator(".headline")).to_contain_text("turned", timeout=30_000)
+    page.evaluate("document.getElementById('announce').textContent = ''")
+    told = page.locator(".headline").inner_text()
+    angle = float(re.search(r"turned (\d+\.\d)°", told)[1])
+    assert angle == pytest.approx(math.hypot(5, 4), abs=1.0), told
+    expect(page.locator(".meaning")).to_contain_text("A person at 10 m is now placed")
+    shoot(page, "camera-knocked")
+    page.emulate_media(color_scheme="dark")
+    shoot(page, "camera-knocked-dark")
+    page.set_viewport_size({"width": 390, "height": 844})
+    shoot(page, "camera-phone-dark")
+    page.emulate_media(color_scheme="light")
+    shoot(page, "camera-phone")
