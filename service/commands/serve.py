@@ -1,7 +1,6 @@
 """`surefoot serve`: the API and its local workers, one command."""
 
 import contextlib
-import gc
 import logging
 import os
 import signal
@@ -19,6 +18,7 @@ from service.data_dir import StartError, held_alone, make_private
 from service.http.connections import ConnectionGuard, protocol_factory
 from service.http.reach import auth_on, is_loopback
 from service.process import exits
+from service.process.collector import settle_collector
 from service.process.listener import listen
 from service.process.local_workers import local_workers
 from service.process.memory import settle_allocator
@@ -67,10 +67,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         with local_workers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
-            # What was imported stays: to look through it for garbage again and again takes 0.1 s
-            # each time, in which nobody is answered.
-            gc.collect()
-            gc.freeze()
+            settle_collector()
             # So long waits each step of the loop for threads that compute.
             sys.setswitchinterval(_SWITCH_S)
             # uvicorn raises the signal that ended it once more; by then there is nothing to kill.

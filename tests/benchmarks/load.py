@@ -15,8 +15,6 @@ import threading
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable
-from multiprocessing.connection import Connection as Pipe
-from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,7 @@ import psutil
 
 from service.commands.migrate import migrate
 from service.settings import Settings
+from tests.benchmarks.health_probe import answer_at_once, probe_health
 from tests.benchmarks.http_client import Answer, Connection
 from tests.conftest import CAMERA, RunningService, free_port
 
@@ -92,23 +91,6 @@ class Load:
         points = [[start_s + 0.4 * n, 300.0 + 12 * n, v + 5 * n] for n in range(20)]
         track = {"id": str(self._number), "points": points}
         return json.dumps({"source": "load", "tracks": [track]}).encode()
-
-
-def probe_health(port: int, stop: Event, pipe: Pipe) -> None:
-    """Ask for /healthz ten times a second, from a process of its own."""
-
-    async def probe() -> list[tuple[float, float]]:
-        taken, connection = [], Connection("127.0.0.1", port)
-        first = time.perf_counter()
-        while not stop.is_set():
-            begun = time.perf_counter()
-            answer = await connection.ask("GET", "/healthz")
-            seconds = time.perf_counter() - begun if answer.status == 200 else 60.0
-            taken.append((begun - first, seconds))
-            await asyncio.sleep(0.1)
-        return taken
-
-    pipe.send(asyncio.run(probe()))
 
 
 class Watch(threading.Thread):
@@ -211,17 +193,21 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     watch = Watch(service.process.pid, service.settings)
     context = multiprocessing.get_context("spawn")
     stop, (mine, theirs) = context.Event(), context.Pipe()
-    prober = context.Process(target=probe_health, args=(port, stop, theirs))
+    idle_port = free_port()
+    idle = context.Process(target=answer_at_once, args=(idle_port,), daemon=True)
+    prober = context.Process(target=probe_health, args=(port, idle_port, stop, theirs))
     watch.start()
+    idle.start()
     prober.start()
     lasts_s = 60 * wanted.minutes
     asyncio.run(load.run(wanted.clients, wanted.rate, wanted.reads, time.monotonic() + lasts_s))
     after = _seconds_until(lambda: service.http.get("/readyz").json()["store_writable"])
     stop.set()
     probes = mine.recv()
-    health = [seconds for _, seconds in probes]
-    slowest = sorted(probes, key=lambda probe: probe[1])[-8:]
+    health = [probe.health_s for probe in probes]
+    slowest = sorted(probes, key=lambda probe: probe.health_s)[-8:]
     prober.join()
+    idle.terminate()
     watch.stop()
     warm_s = min(_WARM_S, lasts_s / 2)
     memory = {name: growth(samples, warm_s) for name, samples in watch.rss.items()}
@@ -247,7 +233,12 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
         "counts": {kind: dict(found) for kind, found in load.counts.items()},
         "latency": {kind: quantiles(found) for kind, found in load.seconds.items()},
         "health": quantiles(health),
-        "health_slowest": [f"{1000 * took:.0f} ms at {at:.0f} s" for at, took in slowest],
+        "health_slowest": [
+            f"{1000 * probe.health_s:.0f} ms at {probe.at_s:.0f} s, "
+            f"{1000 * probe.idle_s:.0f} ms of the idle server"
+            for probe in slowest
+        ],
+        "idle_server": quantiles([probe.idle_s for probe in probes]),
         "well_again_after_s": round(after, 2),
         "memory": memory,
         "largest_wal_mb": round(watch.largest_wal_mb, 1),

@@ -1,0 +1,37 @@
+"""Python's garbage collector, for a process that must not stop to look for garbage.
+
+A full collection looks at every object that may be part of a cycle, and nobody is answered
+meanwhile: 0.2 s for what a service imports, 30 ms for what it keeps after its first requests, and
+more where others want the processor.
+"""
+
+import gc
+from typing import Any
+
+_MANY = 5_000
+_MOST_TIMES = 10
+
+
+class _Survivors:
+    """Has what survives full collections looked at no more, the first times that it is much.
+
+    Not each time: a request that happens to be under way stays, too, if it is part of a cycle.
+    """
+
+    def __init__(self) -> None:
+        self._left = _MOST_TIMES
+
+    def __call__(self, phase: str, info: dict[str, Any]) -> None:
+        if phase != "stop" or info["generation"] != 2 or len(gc.get_objects(2)) < _MANY:
+            return
+        gc.freeze()
+        self._left -= 1
+        if not self._left:
+            gc.callbacks.remove(self)
+
+
+def settle_collector() -> None:
+    """Look no more at what is there by now, nor at what the first requests add for good."""
+    gc.collect()
+    gc.freeze()
+    gc.callbacks.append(_Survivors())

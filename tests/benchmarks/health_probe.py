@@ -1,0 +1,54 @@
+"""How long /healthz takes, beside a server on the same machine that has nothing to do."""
+
+import asyncio
+import contextlib
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection as Pipe
+from multiprocessing.synchronize import Event
+
+from tests.benchmarks.http_client import Connection
+
+
+def answer_at_once(port: int) -> None:
+    """A server that has nothing else to do: what it takes is the machine's doing."""
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(asyncio.IncompleteReadError):
+            while await reader.readuntil(b"\r\n\r\n"):
+                writer.write(b"HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n")
+
+    async def serve() -> None:
+        await (await asyncio.start_server(answer, "127.0.0.1", port)).serve_forever()
+
+    asyncio.run(serve())
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """When it was, and how long /healthz took, and the server that has nothing to do just after."""
+
+    at_s: float
+    health_s: float
+    idle_s: float
+
+
+def probe_health(port: int, idle_port: int, stop: Event, pipe: Pipe) -> None:
+    """Ask for /healthz ten times a second, from a process of its own."""
+
+    async def seconds(connection: Connection) -> float:
+        begun = time.perf_counter()
+        answer = await connection.ask("GET", "/healthz")
+        return time.perf_counter() - begun if answer.status == 200 else 60.0
+
+    async def probe() -> list[Probe]:
+        taken, health = [], Connection("127.0.0.1", port)
+        idle = Connection("127.0.0.1", idle_port)
+        first = time.perf_counter()
+        while not stop.is_set():
+            at_s = time.perf_counter() - first
+            taken.append(Probe(at_s, await seconds(health), await seconds(idle)))
+            await asyncio.sleep(0.1)
+        return taken
+
+    pipe.send(asyncio.run(probe()))

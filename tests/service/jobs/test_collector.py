@@ -1,0 +1,33 @@
+"""What stays is looked through for garbage once, and not again and again."""
+
+import subprocess
+import sys
+
+ASKED = """
+import gc
+from service.process.collector import settle_collector
+
+gc.disable()
+settle_collector()
+kept = []
+
+def after_a_collection(more):
+    frozen = gc.get_freeze_count()
+    kept.append([[] for _ in range(more)])
+    gc.collect()
+    return gc.get_freeze_count() - frozen
+
+print(after_a_collection(1_000) > 0, *(after_a_collection(9_000) >= 9_000 for _ in range(11)))
+first, second = [], []
+first.append(second), second.append(first)
+del first, second
+print(gc.collect())
+"""
+
+
+def test_what_survives_is_frozen_ten_times_where_it_is_much():
+    told = subprocess.run(
+        [sys.executable, "-c", ASKED], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert told[0].split() == ["False", *["True"] * 10, "False"]
+    assert told[1] == "2"  # garbage that comes later is still found
