@@ -54,7 +54,7 @@ class OfEnvironment(_OfAllSources, InTreeCacheLocator):
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "OfEnvironment | None":
         """Where a function's code is kept; None where that is another's to say."""
-        if sys.prefix == sys.base_prefix:
+        if sys.prefix == sys.base_prefix or not Path(file).is_relative_to(_ROOT):
             return None
         found: OfEnvironment | None = super().from_function(function, file)
         return found

@@ -265,9 +265,14 @@ if "service.jobs.training_process" in sys.orig_argv:
 
 def path_to_small_trainings(folder: Path) -> str:
     """A PYTHONPATH of processes that train in a quarter of the time, and are content with it."""
-    (folder / "small").mkdir()
-    (folder / "small" / "sitecustomize.py").write_text(_SMALL)
-    return os.pathsep.join([str(folder / "small"), str(ROOT), os.environ.get("PYTHONPATH", "")])
+    return path_to_changed(folder, _SMALL)
+
+
+def path_to_changed(folder: Path, code: str) -> str:
+    """A PYTHONPATH of processes that run some code before anything else; it is kept in a folder."""
+    (folder / "changed").mkdir()
+    (folder / "changed" / "sitecustomize.py").write_text(code)
+    return os.pathsep.join([str(folder / "changed"), str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 
 def free_port() -> int:

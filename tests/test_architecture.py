@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests.conftest import ROOT
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests.conftest import ROOT
+
 # What we write ourselves; other endings are of data, of other programs or of the service's answers.
 _FILE = re.compile(
     r"(?<![\w/:.*{-])((?:[\w.-]+/)*[\w-]+\.(?:py|md|js|css|html|svg|mako))(?![\w(*{])"

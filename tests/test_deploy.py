@@ -3,7 +3,6 @@
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 import yaml
@@ -12,8 +11,8 @@ from typer.testing import CliRunner
 from service.cli import app
 from service.data_dir import COMPILED
 from service.settings import Settings
+from tests.conftest import ROOT
 
-ROOT = Path(__file__).parent.parent
 UNIT = ROOT / ".deploy" / "surefoot.service"
 COMPOSE = ROOT / ".deploy" / "compose.yaml"
 PAGE = ROOT / "service" / "README.md"

@@ -4,12 +4,10 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx
 import pytest
 from packaging.requirements import Requirement
 from typer.testing import CliRunner
@@ -17,10 +15,9 @@ from typer.testing import CliRunner
 from service.cli import app
 from service.schemas.alerts import AlertOut
 from service.settings import Settings
-from tests.conftest import free_port, wait_for
+from tests.conftest import ROOT, RunningService, free_port
 from tests.settings_table import settings_table, written_table
 
-ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
@@ -40,28 +37,11 @@ def samples() -> list[dict]:
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[str]:
     """The address of a real `surefoot serve`."""
-    port = free_port()
-    settings = Settings(data_dir=tmp_path / "data", workers=0, port=port)
-    with (tmp_path / "serve.log").open("w") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "serve"],
-            env=settings.as_environment(), stdout=log, stderr=log, cwd=ROOT,
-        )  # fmt: skip
-    url = f"http://127.0.0.1:{port}"
-
-    def answers() -> bool:
-        assert process.poll() is None, (tmp_path / "serve.log").read_text()
-        try:
-            return httpx.get(f"{url}/healthz").status_code == 200
-        except httpx.TransportError:
-            return False
-
-    try:
-        wait_for(answers)
-        yield url
-    finally:
-        process.terminate()
-        process.wait(20)
+    settings = Settings(data_dir=tmp_path / "data", workers=0, port=free_port())
+    running = RunningService(settings, forked=False)
+    running.start()
+    yield running.url
+    running.stop()
 
 
 def curl(command: str, url: str) -> str:

@@ -1,9 +1,9 @@
 """Radians inside; degrees where people read, and nowhere else: read from the code."""
 
 import ast
-from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from tests.conftest import ROOT
+
 # Who may turn radians into degrees by themselves.
 EDGES = (
     "service/schemas/",

@@ -44,6 +44,8 @@ def probe_health(port: int, idle_port: int, stop: Event, pipe: Pipe) -> None:
     async def probe() -> list[Probe]:
         taken, health = [], Connection("127.0.0.1", port)
         idle = Connection("127.0.0.1", idle_port)
+        while (await idle.ask("GET", "/")).status != 200:  # it is being started
+            await asyncio.sleep(0.05)
         first = time.perf_counter()
         while not stop.is_set():
             at_s = time.perf_counter() - first

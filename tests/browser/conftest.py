@@ -21,19 +21,24 @@ SHOTS = os.environ.get("SUREFOOT_TEST_SHOTS")
 NAMES = "--host-resolver-rules=MAP *.test 127.0.0.1"
 
 
-def served(folder: Path, migrated: Path) -> Iterator[RunningService]:
-    """A server over an empty data directory, as long as the iteration lasts."""
+@contextlib.contextmanager
+def served(folder: Path, migrated: Path, **changes: Any) -> Iterator[RunningService]:
+    """A server over an empty data directory, as long as the block lasts."""
     shutil.copytree(migrated, folder / "data")
-    running = RunningService(Settings(data_dir=folder / "data", workers=0, port=free_port()))
+    made = Settings(data_dir=folder / "data", workers=0, port=free_port(), **changes)
+    running = RunningService(made)
     running.start()
-    yield running
-    running.stop()
+    try:
+        yield running
+    finally:
+        running.stop()
 
 
 @pytest.fixture
 def server(tmp_path: Path, migrated: Path) -> Iterator[RunningService]:
     """A server of one test; files whose tests leave nothing behind have one of their own."""
-    yield from served(tmp_path, migrated)
+    with served(tmp_path, migrated) as running:
+        yield running
 
 
 @pytest.fixture(scope="package")

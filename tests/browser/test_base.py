@@ -9,7 +9,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory, migrated):
-    yield from served(tmp_path_factory.mktemp("base"), migrated)
+    with served(tmp_path_factory.mktemp("base"), migrated) as running:
+        yield running
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -13,7 +13,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory, migrated):
-    yield from served(tmp_path_factory.mktemp("fleet"), migrated)
+    with served(tmp_path_factory.mktemp("fleet"), migrated) as running:
+        yield running
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory, migrated):
-    yield from served(tmp_path_factory.mktemp("registration"), migrated)
+    with served(tmp_path_factory.mktemp("registration"), migrated) as running:
+        yield running
 
 
 def fill(page, **fields):

@@ -94,3 +94,18 @@ def test_what_divides_by_nothing_goes_on_as_numpy_does():
 
     assert ratio(1.0, 0.0) == np.inf
     assert ratio.__name__ == "ratio"
+
+
+def test_what_is_not_of_this_project_is_compiled_too(tmp_path):
+    text = "from models.compiled import compiled\n\n\n@compiled\ndef twice(x):\n    return 2 * x\n"
+    (tmp_path / "elsewhere.py").write_text(f"{text}\n\nprint(twice(3.0))\n")
+    path = str(Path(models.__path__[0]).parent)
+    usual = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    told = subprocess.run(
+        [sys.executable, str(tmp_path / "elsewhere.py")],
+        env={**usual, "PYTHONPATH": path, "XDG_CACHE_HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert float(told.stdout) == 6.0

@@ -15,7 +15,8 @@ URL = "/ui/cameras/corner"
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory, migrated):
-    yield from served(tmp_path_factory.mktemp("camera"), migrated)
+    with served(tmp_path_factory.mktemp("camera"), migrated) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def tab(browser, server):
 
 @pytest.fixture
 def page(tab, server):
-    """The one tab of this file, as if it was new: each new one would read the charts' code anew.
+    """The one tab of a file, as if it was new: each new one would read the charts' code anew.
 
     That takes 2 s, more than most of these tests.
     """

@@ -3,18 +3,16 @@
 import contextlib
 import math
 import re
-import shutil
 
 import pytest
 from PIL import Image
 
 from service.access.activity import note
 from service.kinds import Activity
-from service.settings import Settings
 from service.store.sqlite.database import Store
 from tests.browser.camera.conftest import URL
-from tests.browser.conftest import axe, shoot, too_wide
-from tests.conftest import CAMERA, RunningService, free_port
+from tests.browser.conftest import axe, served, shoot, too_wide
+from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, Bench, moved
 from tests.service.street import KNOCKED, Street
 from tests.service.street import PRIOR as STREET_PRIOR
@@ -72,17 +70,11 @@ def test_the_page_is_sound(page, knocked, server, scheme):
 
 def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path, migrated):
     expect = pytest.importorskip("playwright.sync_api").expect
-    settings = Settings(
-        data_dir=tmp_path / "data", workers=0, port=free_port(), snapshots=True, window_tracks=20
-    )
-    shutil.copytree(migrated, settings.data_dir)
     Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
     Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
-    server = RunningService(settings)
-    server.start()
-    try:
+    with served(tmp_path, migrated, snapshots=True, window_tracks=20) as server:
         server.http.post("/cameras", json=CAMERA).raise_for_status()
-        bench = Bench(server.http, settings)
+        bench = Bench(server.http, server.settings)
         for _ in range(3):
             bench.see(moved(tilt_deg=5.0))
         page = browser.new_context(base_url=server.url).new_page()
@@ -98,8 +90,6 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
         expect(page.locator(".picture image")).to_have_count(0)
         assert server.http.get("/cameras/corner/snapshot").status_code == 404
         page.context.close()  # a service that stops waits 3 s for streams of events
-    finally:
-        server.stop()
 
 
 def test_a_knocked_street_is_seen_to_be_knocked(page, server, empty):

@@ -81,6 +81,7 @@ def run(
         status = command.wait(timeout_s)
     except subprocess.TimeoutExpired:
         command.kill()
+        command.wait(timeout_s)
         status = None
     return Ended(status, *(path.read_text() for path in printed))
 

@@ -4,14 +4,21 @@ import fcntl
 import os
 import signal
 import time
-from pathlib import Path
 
 import httpx
 import psutil
 import pytest
 
 from service.process import exits
-from tests.conftest import CAMERA, RunningService, free_port, pid_exists, track, wait_for
+from tests.conftest import (
+    CAMERA,
+    RunningService,
+    free_port,
+    path_to_changed,
+    pid_exists,
+    track,
+    wait_for,
+)
 from tests.faults.clock import Clock
 
 pytestmark = pytest.mark.slow
@@ -68,8 +75,7 @@ looking.begin_look = lambda *_: threading.Event().wait()
 
 
 def test_a_look_that_never_ends_ends_its_worker_and_leaves_others_their_turn(start, tmp_path):
-    (tmp_path / "sitecustomize.py").write_text(HANGS)  # no look ever comes to its end
-    path = os.pathsep.join([str(tmp_path), str(Path.cwd()), os.environ.get("PYTHONPATH", "")])
+    path = path_to_changed(tmp_path, HANGS)  # no look ever comes to its end
     service = start({"PYTHONPATH": path}, estimate_limit_s=1.01, stale_failures=2)
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
