@@ -5,7 +5,6 @@ from contextlib import asynccontextmanager
 from typing import TypedDict
 
 import anyio
-import anyio.to_thread
 from fastapi import FastAPI
 
 from service.cameras.quota import Quota
@@ -18,6 +17,7 @@ from service.http.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_
 from service.http.origins import OriginMiddleware
 from service.http.problems import ProblemMiddleware, add_problem_handlers
 from service.http.rates import RateMiddleware
+from service.http.threads import start_threads
 from service.job_queue import JobQueue
 from service.routes import (
     activity,
@@ -56,7 +56,7 @@ def create_app(settings: Settings) -> FastAPI:
     async def lifespan(_: FastAPI) -> AsyncIterator[LifespanState]:
         at_once = sessions_at_once(settings)
         # A request is in one thread at a time; some are left for what needs no turn.
-        anyio.to_thread.current_default_thread_limiter().total_tokens = at_once + _SPARE_THREADS
+        await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
         state = AppState(
             settings=settings,
@@ -98,7 +98,6 @@ def create_app(settings: Settings) -> FastAPI:
         login,
         camera_page,
         registration,
-        login,
         tokens,
     ):
         app.include_router(module.router)

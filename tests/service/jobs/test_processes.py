@@ -133,13 +133,15 @@ def test_a_running_training_is_cancelled_and_a_queued_one_too(service):
 
 def test_events_arrive_as_they_happen_and_resume(service):
     wait_for(service.ready)
-    seen = []
+    seen, connected = [], threading.Event()
 
     def listen(headers):
         url = f"{service.url}/events"
         with httpx.stream("GET", url, headers=headers, timeout=60) as stream:
             event = {}
             for line in stream.iter_lines():
+                if line == ": connected":
+                    connected.set()
                 name, _, value = line.partition(": ")
                 if not line and "data" in event:
                     seen.append((int(event["id"]), event["event"], json.loads(event["data"])))
@@ -151,7 +153,7 @@ def test_events_arrive_as_they_happen_and_resume(service):
 
     listener = threading.Thread(target=listen, args=({},), daemon=True)
     listener.start()
-    time.sleep(1)
+    assert connected.wait(30)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
     training = service.http.get("/cameras/corner/trainings").json()["items"][0]
     service.http.delete(f"/trainings/{training['id']}").raise_for_status()

@@ -2,6 +2,7 @@
 
 import time
 from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
 
@@ -78,11 +79,14 @@ def test_who_dies_again_and_again_is_started_ever_more_rarely(deaths, seconds):
     assert pause_s(deaths) == seconds
 
 
-def test_a_task_beyond_its_limit_is_overdue():
-    in_hand = InHand(limits_s={"estimate": 0.1})
+def test_a_task_beyond_its_limit_is_overdue(monkeypatch):
+    clock = iter([0.0, 0.0, 60.0, 60.1])
+    standing = SimpleNamespace(monotonic=lambda: next(clock))
+    monkeypatch.setattr("service.jobs.in_hand.time", standing)
+    in_hand = InHand(limits_s={"estimate": 60.0})
     with in_hand.task("train", "a"), in_hand.task("estimate", "corner"):
         assert in_hand.overdue() is None
-        time.sleep(0.2)
         assert in_hand.overdue().about == ("corner",)
         assert in_hand.of_kind("train") == 1
+    monkeypatch.undo()
     assert in_hand.overdue() is None
