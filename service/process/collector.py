@@ -3,6 +3,9 @@
 A full collection looks at every object that may be part of a cycle, and nobody is answered
 meanwhile: 0.1 s for what a service imports, 10 ms for what it keeps after its first requests, and
 several times as long where others want the processor.
+
+Python looks again once what is new is a quarter of what it found the last time. Of all that a
+service has imported that is 50,000 objects: under load it came after 20 minutes, and took 0.2 s.
 """
 
 import gc
@@ -34,4 +37,5 @@ def settle_collector() -> None:
     """Look no more at what is there by now, nor at what the first requests add for good."""
     gc.collect()
     gc.freeze()
+    gc.collect()  # which finds next to nothing: the next ones come soon, and are short
     gc.callbacks.append(_Survivors())

@@ -31,3 +31,20 @@ def test_what_survives_is_frozen_ten_times_where_it_is_much():
     ).stdout.splitlines()
     assert told[0].split() == ["False", *["True"] * 10, "False"]
     assert told[1] == "2"  # garbage that comes later is still found
+
+
+SOON = """
+import gc
+from service.process.collector import settle_collector
+
+imported = [[] for _ in range(800_000)]
+settle_collector()
+before = gc.get_stats()[2]["collections"]
+new = [[] for _ in range(180_000)]
+print(gc.get_stats()[2]["collections"] - before)
+"""
+
+
+def test_what_was_imported_does_not_put_off_the_next_collection_until_much_is_new():
+    told = subprocess.run([sys.executable, "-c", SOON], capture_output=True, text=True, check=True)
+    assert int(told.stdout) > 0
