@@ -6,23 +6,17 @@ import math
 import os
 import shutil
 import signal
-import socket
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import httpx
-import psutil
 import pytest
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.service.commands.forked import Forked
+from tests.running import RunningService, free_port
 
 # The name that starlette's TestClient asks by.
 os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
@@ -160,79 +154,6 @@ def track(track_id: str, start_s: float = 1_700_000_000.0, count: int = 20) -> d
     return {"id": track_id, "points": points}
 
 
-def wait_for(what: Callable[[], Any], timeout_s: float = 90.0, every_s: float = 0.2) -> Any:
-    """The first true answer; fails loudly when none comes."""
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        answer = what()
-        if answer:
-            return answer
-        time.sleep(every_s)
-    raise AssertionError(f"nothing true within {timeout_s} s")
-
-
-class RunningService:
-    """A real `surefoot serve`, which a test may kill and start again over the same data.
-
-    Unless it is said otherwise, it is `forked` off a process that has imported it: each start
-    takes 2 s of computing less.
-    """
-
-    def __init__(self, settings: Settings, *, forked: bool = True) -> None:
-        self.settings = settings
-        self._forked = forked
-        self.url = f"http://{settings.host}:{settings.port}"
-        self.http = httpx.Client(base_url=self.url, timeout=30)
-        self.log = settings.data_dir.parent / "serve.log"
-        self.process: Forked | subprocess.Popen[bytes]
-
-    def start(self) -> None:
-        environment = self.settings.as_environment()
-        if self._forked:
-            self.process = Forked(["serve"], environment, self.log, self.log)
-        else:
-            with self.log.open("a") as log:
-                command = [sys.executable, "-m", "service.cli", "serve"]
-                self.process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-        wait_for(self.answers)
-
-    def start_again(self, **changes: Any) -> None:
-        """Stop, and start with some settings changed."""
-        self.stop()
-        self.settings = self.settings.model_copy(update=changes)
-        self.http = httpx.Client(base_url=self.url, timeout=30)
-        self.start()
-        if self.settings.workers:
-            wait_for(self.ready)
-
-    def answers(self) -> bool:
-        assert self.process.poll() is None, self.log.read_text()
-        try:
-            return self.http.get("/healthz").status_code == 200
-        except httpx.TransportError:
-            return False
-
-    def ready(self) -> bool:
-        return self.http.get("/readyz").status_code == 200
-
-    def kill(self) -> None:
-        """`kill -9` of the API; its workers end by themselves."""
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait(10)
-
-    def worker_pid(self) -> int:
-        """The pid of the local worker."""
-        (worker,) = psutil.Process(self.process.pid).children()
-        return worker.pid
-
-    def stop(self) -> int:
-        if self.process.poll() is None:
-            self.process.terminate()
-        code = self.process.wait(20)
-        self.http.close()
-        return code
-
-
 @pytest.fixture
 def service(settings: Settings) -> Iterator[RunningService]:
     """A running service with one worker, which trains nothing that is not asked for."""
@@ -281,19 +202,3 @@ def path_to_changed(folder: Path, code: str) -> str:
     (folder / "changed").mkdir()
     (folder / "changed" / "sitecustomize.py").write_text(code)
     return os.pathsep.join([str(folder / "changed"), str(ROOT), os.environ.get("PYTHONPATH", "")])
-
-
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-def pid_exists(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True

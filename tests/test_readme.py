@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 from service.cli import app
 from service.schemas.alerts import AlertOut
 from service.settings import Settings
-from tests.conftest import ROOT, RunningService, free_port
+from tests.conftest import ROOT
+from tests.running import RunningService, free_port
 from tests.settings_table import settings_table, written_table
 
 README = (ROOT / "README.md").read_text()

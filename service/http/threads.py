@@ -1,7 +1,7 @@
 """The threads that requests are answered in: made before the first of them, and kept.
 
-The event loop waits for a thread that it starts to run: 2 to 16 ms where 64 clients keep both cores
-busy, and several are started at once after a quiet spell. Nobody is answered meanwhile.
+The event loop waits for a thread that it starts to run: up to 16 ms where 64 clients keep both
+cores busy, and several are started at once after a quiet spell. Nobody is answered meanwhile.
 """
 
 import math

@@ -18,7 +18,7 @@ from playwright.sync_api import Page, sync_playwright
 from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.browser.conftest import Server
-from tests.conftest import free_port
+from tests.running import free_port
 from tests.service.fleet_bench import Fleet, afternoon
 
 _TIMES = 7

@@ -25,7 +25,8 @@ from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.benchmarks.health_probe import answer_at_once, probe_health
 from tests.benchmarks.http_client import Answer, Connection
-from tests.conftest import CAMERA, RunningService, free_port
+from tests.conftest import CAMERA
+from tests.running import RunningService, free_port
 
 _AT_ONCE = 8  # requests of a client that wait for an answer; beyond, an arrival is not sent
 _READS = ("/cameras/load-{}/pose", "/cameras/load-{}", "/alerts", "/cameras", "/")

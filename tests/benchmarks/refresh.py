@@ -17,7 +17,8 @@ from rich.console import Console
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.conftest import CAMERA, RunningService, free_port, wait_for
+from tests.conftest import CAMERA
+from tests.running import RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street
 
 REFERENCE, WINDOW, NEW, REFRESHES = 200, 400, 10, 10

@@ -11,27 +11,13 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.settings import Settings
-from tests.conftest import RunningService, free_port
+from tests.running import RunningService, served
 
 CHROMIUM = os.environ.get("SUREFOOT_TEST_CHROMIUM") or shutil.which("chromium")
 # Where screenshots of the tests go, if anybody wants to look at them.
 SHOTS = os.environ.get("SUREFOOT_TEST_SHOTS")
 # Names that lead to this machine: as in a plain network, where browsers send no Sec-Fetch headers.
 NAMES = "--host-resolver-rules=MAP *.test 127.0.0.1"
-
-
-@contextlib.contextmanager
-def served(folder: Path, migrated: Path, **changes: Any) -> Iterator[RunningService]:
-    """A server over an empty data directory, as long as the block lasts."""
-    shutil.copytree(migrated, folder / "data")
-    made = Settings(data_dir=folder / "data", workers=0, port=free_port(), **changes)
-    running = RunningService(made)
-    running.start()
-    try:
-        yield running
-    finally:
-        running.stop()
 
 
 @pytest.fixture

@@ -13,7 +13,8 @@ from service.settings import Settings
 from service.store.sqlite.database import Store
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.browser.hostile import hostile_page
-from tests.conftest import CAMERA, RunningService, free_port
+from tests.conftest import CAMERA
+from tests.running import RunningService, free_port
 
 pytestmark = pytest.mark.slow
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.browser.conftest import axe, served, too_wide
+from tests.browser.conftest import axe, too_wide
+from tests.running import served
 
 pytestmark = pytest.mark.slow
 

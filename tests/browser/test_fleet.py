@@ -5,7 +5,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.web.wording.words import ago
-from tests.browser.conftest import axe, served, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide
+from tests.running import served
 from tests.service.fleet_bench import Fleet, afternoon
 
 pytestmark = pytest.mark.slow

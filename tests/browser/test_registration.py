@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.browser.conftest import axe, served, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide
+from tests.running import served
 from tests.service.cameras.test_registration import ANGLES, LENS, POSE, walks
 
 pytestmark = pytest.mark.slow

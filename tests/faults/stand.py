@@ -15,8 +15,8 @@ import httpx
 import psutil
 
 from service.settings import Settings
-from tests.conftest import free_port
 from tests.faults.clock import Clock
+from tests.running import free_port
 
 _RESTART_S = 0.3
 _LIBC = ctypes.CDLL(None)

@@ -6,8 +6,9 @@ import sqlite3
 import pytest
 
 from service.data_dir import DATABASE
-from tests.browser.conftest import served, watched
+from tests.browser.conftest import watched
 from tests.conftest import CAMERA
+from tests.running import served
 from tests.service.bench import Bench, moved
 
 URL = "/ui/cameras/corner"

@@ -11,8 +11,9 @@ from service.access.activity import note
 from service.kinds import Activity
 from service.store.sqlite.database import Store
 from tests.browser.camera.conftest import URL
-from tests.browser.conftest import axe, served, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide
 from tests.conftest import CAMERA
+from tests.running import served
 from tests.service.bench import PRIOR, Bench, moved
 from tests.service.street import KNOCKED, Street
 from tests.service.street import PRIOR as STREET_PRIOR

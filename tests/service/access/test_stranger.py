@@ -20,7 +20,8 @@ from service.data_dir import StartError
 from service.http.scopes import NEEDS
 from service.settings import Settings
 from service.store.sqlite.database import Store
-from tests.conftest import CAMERA, RunningService, free_port
+from tests.conftest import CAMERA
+from tests.running import RunningService, free_port
 from tests.service.access.test_access import bearer, filled, routes_of
 
 pytestmark = pytest.mark.slow

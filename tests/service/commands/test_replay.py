@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from models.evaluation.scenes import load_scene
 from service.cli import app
-from tests.conftest import path_to_small_trainings, wait_for
+from tests.conftest import path_to_small_trainings
+from tests.running import wait_for
 
 SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 

@@ -16,7 +16,7 @@ import httpx
 import psutil
 import pytest
 
-from tests.conftest import free_port, pid_exists, wait_for
+from tests.running import free_port, pid_exists, wait_for
 from tests.service.commands import forked
 
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import httpx
 import pytest
 
-from tests.conftest import free_port, wait_for
+from tests.running import free_port, wait_for
 
 PROGRAM = (
     os.environ.get("SUREFOOT_TEST_ALERTMANAGER")

@@ -8,7 +8,8 @@ import pytest
 from service.alerting import alerts
 from service.reasons import as_said
 from service.store.sqlite.database import Store
-from tests.conftest import CAMERA, RunningService, free_port, wait_for
+from tests.conftest import CAMERA
+from tests.running import RunningService, free_port, wait_for
 from tests.service.delivery.receiver import receiver
 
 pytestmark = pytest.mark.slow

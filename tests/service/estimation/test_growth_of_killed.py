@@ -7,7 +7,8 @@ import pytest
 from sqlalchemy import select
 
 from service.store.tables.references import FlowMapRecord
-from tests.conftest import CAMERA, wait_for
+from tests.conftest import CAMERA
+from tests.running import wait_for
 from tests.service.estimation.test_growth import WANTED, make_street, map_of
 from tests.service.street import PRIOR
 

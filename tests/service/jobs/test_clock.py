@@ -9,7 +9,7 @@ from service.process.workforce import register_worker
 from service.store import webhooks
 from service.store.operation import workers
 from service.windows.waiting import lies_ahead
-from tests.conftest import free_port
+from tests.running import free_port
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ import httpx
 import psutil
 import pytest
 
-from tests.conftest import CAMERA, track, wait_for
+from tests.conftest import CAMERA, track
+from tests.running import wait_for
 
 pytestmark = pytest.mark.slow
 

@@ -10,16 +10,9 @@ import psutil
 import pytest
 
 from service.process import exits
-from tests.conftest import (
-    CAMERA,
-    RunningService,
-    free_port,
-    path_to_changed,
-    pid_exists,
-    track,
-    wait_for,
-)
+from tests.conftest import CAMERA, path_to_changed, track
 from tests.faults.clock import Clock
+from tests.running import RunningService, free_port, pid_exists, wait_for
 
 pytestmark = pytest.mark.slow
 

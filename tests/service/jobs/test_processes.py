@@ -13,7 +13,8 @@ import psutil
 import pytest
 
 from service.process import exits
-from tests.conftest import CAMERA, pid_exists, track, wait_for
+from tests.conftest import CAMERA, track
+from tests.running import pid_exists, wait_for
 
 pytestmark = pytest.mark.slow
 

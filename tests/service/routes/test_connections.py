@@ -1,7 +1,6 @@
 """Clients that only keep their place, against a real server."""
 
 import contextlib
-import shutil
 import socket
 import threading
 import time
@@ -13,42 +12,26 @@ import uvicorn
 from service.app import create_app
 from service.http.connections import ConnectionGuard, GuardedProtocol
 from service.process.listener import listen
-from service.settings import Settings
-from tests.conftest import RunningService, free_port, wait_for
+from tests.running import served, wait_for
 
 
-@contextlib.contextmanager
-def running_api(migrated, tmp_path_factory, patience_s):
-    """A running API without workers and with few connections."""
-    folder = tmp_path_factory.mktemp("api") / "data"
-    shutil.copytree(migrated, folder)
-    running = RunningService(
-        Settings(
-            data_dir=folder,
-            port=free_port(),
-            workers=0,
-            max_connections=40,
-            connections_per_address=0,
-            head_timeout_s=patience_s,
-            stall_timeout_s=patience_s,
-        )
-    )
-    running.start()
-    yield running
-    running.stop()
+def patience_of(seconds):
+    """The settings of an API that has few connections, and cuts who is silent for so long."""
+    few = {"max_connections": 40, "connections_per_address": 0}
+    return {**few, "head_timeout_s": seconds, "stall_timeout_s": seconds}
 
 
 @pytest.fixture(scope="module")
 def api(migrated, tmp_path_factory):
     """One that loses patience soon."""
-    with running_api(migrated, tmp_path_factory, 2.0) as running:
+    with served(tmp_path_factory.mktemp("api"), migrated, **patience_of(2.0)) as running:
         yield running
 
 
 @pytest.fixture
-def patient_api(migrated, tmp_path_factory):
+def patient_api(migrated, tmp_path):
     """One that cuts nobody for silence within a test."""
-    with running_api(migrated, tmp_path_factory, 300.0) as running:
+    with served(tmp_path, migrated, **patience_of(300.0)) as running:
         yield running
 
 

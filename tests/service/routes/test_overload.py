@@ -16,7 +16,8 @@ from service.errors import OverloadedError
 from service.http.lanes import Lane
 from service.store.sqlite.database import Store
 from service.store.sqlite.turns import Turns
-from tests.conftest import CAMERA, RunningService, free_port, track, wait_for
+from tests.conftest import CAMERA, track
+from tests.running import RunningService, free_port, wait_for
 from tests.service.conftest import problem
 
 

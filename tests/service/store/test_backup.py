@@ -29,7 +29,8 @@ from service.delivery.keys import secret_of
 from service.store import webhooks
 from service.store.sqlite.database import Store
 from service.store.sqlite.revisions import known_revisions
-from tests.conftest import CAMERA, track, wait_for
+from tests.conftest import CAMERA, track
+from tests.running import wait_for
 from tests.service.delivery.test_sealing import hook
 from tests.test_migrations import put
 

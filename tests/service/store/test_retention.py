@@ -13,7 +13,7 @@ from service.jobs.context import JobContext
 from service.jobs.upkeep.limits import BITE
 from service.jobs.upkeep.retention import run_retention
 from service.store.sqlite.database import Store
-from tests.conftest import wait_for
+from tests.running import wait_for
 from tests.test_migrations import put
 
 DAY = timedelta(days=1)
