@@ -1,7 +1,11 @@
-"""What routes are given: the application's state, sessions and bodies."""
+"""What routes are given: the application's state, sessions and bodies.
+
+Coroutines, where nothing waits: anything else is given a thread, which costs more than most of them
+do.
+"""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -38,7 +42,7 @@ class AppState:
 
 
 async def get_state(request: Request) -> AppState:
-    """The application's state; a coroutine, since anything else would be given a thread."""
+    """The application's state."""
     state: AppState = request.state.app
     return state
 
@@ -46,13 +50,13 @@ async def get_state(request: Request) -> AppState:
 StateDep = Annotated[AppState, Depends(get_state)]
 
 
-def read_session(state: StateDep) -> Iterator[Session]:
-    """A session that only reads."""
+async def read_session(state: StateDep) -> AsyncIterator[Session]:
+    """A session that only reads; it connects with its first statement, in the route's thread."""
     with state.store.read() as session:
         yield session
 
 
-def get_caller(request: Request) -> Caller | None:
+async def get_caller(request: Request) -> Caller | None:
     """Who asks; None where access is off."""
     caller: Caller | None = getattr(request.state, "caller", None)
     return caller
@@ -61,7 +65,7 @@ def get_caller(request: Request) -> Caller | None:
 CallerDep = Annotated[Caller | None, Depends(get_caller)]
 
 
-def get_actor(caller: CallerDep) -> Actor | None:
+async def get_actor(caller: CallerDep) -> Actor | None:
     """In whose name an activity is kept, whatever name its body says."""
     return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
 

@@ -1,6 +1,7 @@
 """`POST /cameras/{id}/tracks` in all its forms."""
 
 import time
+from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request
@@ -11,7 +12,7 @@ from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
 from service.formats.track import Batch, Clock, Limits
-from service.http.dependencies import BodyDep, StateDep
+from service.http.dependencies import AppState, BodyDep, StateDep
 from service.schemas.cameras.tracks import DESCRIBED_TRACK, ReceiptOut
 
 router = APIRouter(tags=["tracks"])
@@ -41,16 +42,38 @@ _DESCRIBED_BODY = {
 }
 
 
-def read_batch(
-    camera_id: str,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posted:
+    """A request as it came, unread."""
+
+    body: bytes
+    media_type: str
+    source: str
+    frame_rate_hz: float | None
+    started_at: str | None
+    classes: str | None
+
+
+async def posted(
     request: Request,
     body: BodyDep,
-    state: StateDep,
     source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
     frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
     started_at: str | None = None,
     classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
-) -> Batch:
+) -> Posted:
+    """What is to be read, in the route's own thread."""
+    return Posted(
+        body=body,
+        media_type=request.headers.get("content-type", "").split(";")[0].strip().lower(),
+        source=source,
+        frame_rate_hz=frame_rate_hz,
+        started_at=started_at,
+        classes=classes,
+    )
+
+
+def read_batch(state: AppState, camera_id: str, came: Posted) -> Batch:
     """The tracks of a request, read while no session is open.
 
     Raises:
@@ -58,8 +81,8 @@ def read_batch(
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
         OverloadedError: other large bodies are being read all the time.
     """
-    source = formats.read_source(source, "/source")
-    people = None if classes is None else read_classes(classes)
+    source = formats.read_source(came.source, "/source")
+    people = None if came.classes is None else read_classes(came.classes)
     with state.store.read() as session:
         camera = cameras.require_camera(session, camera_id)
     limits = Limits(
@@ -68,15 +91,16 @@ def read_batch(
         now_s=time.time(),
         max_ahead_s=state.settings.max_ahead_s,
     )
+    started_at_s = None
+    if came.started_at is not None:
+        started_at_s = formats.read_time(came.started_at, "/started_at")
     clock = Clock(
-        frame_rate_hz=frame_rate_hz or camera.frame_rate_hz,
-        started_at_s=None if started_at is None else formats.read_time(started_at, "/started_at"),
+        frame_rate_hz=came.frame_rate_hz or camera.frame_rate_hz, started_at_s=started_at_s
     )
-    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
-    if len(body) > _LARGE:
+    if len(came.body) > _LARGE:
         with state.large_bodies.turn(state.settings.http_wait_s):
-            return _read(media_type, body, source, clock, limits, people)
-    return _read(media_type, body, source, clock, limits, people)
+            return _read(came.media_type, came.body, source, clock, limits, people)
+    return _read(came.media_type, came.body, source, clock, limits, people)
 
 
 def _read(
@@ -106,12 +130,13 @@ def _read(
     response_model_exclude_defaults=True,
 )
 def post_tracks(
-    camera_id: str, batch: Annotated[Batch, Depends(read_batch)], state: StateDep
+    camera_id: str, came: Annotated[Posted, Depends(posted)], state: StateDep
 ) -> ReceiptOut:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk.
 
     422 where there were tracks and none of them could be taken.
     """
+    batch = read_batch(state, camera_id, came)
     with state.store.read() as session:
         state.quota.check(session, camera_id, batch)
     with state.store.write() as session:

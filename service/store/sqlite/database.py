@@ -78,9 +78,10 @@ def engine_for(
     url: str, patience_s: float = _PATIENCE_S, connections: int = _CONNECTIONS
 ) -> Engine:
     """A SQLAlchemy engine; SQLite in WAL mode with foreign keys on and writers that wait."""
-    kept = min(connections, 5)
+    # All are kept once they were needed: to open one takes six statements, and to close one more.
+    # The one that was given back last goes out first, so that few have pages in their caches.
     engine = create_engine(
-        url, pool_size=kept, max_overflow=connections - kept, pool_timeout=patience_s
+        url, pool_size=connections, max_overflow=0, pool_timeout=patience_s, pool_use_lifo=True
     )
     if engine.dialect.name == "sqlite":
 
