@@ -17,8 +17,7 @@ from playwright.sync_api import Page, sync_playwright
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.browser.conftest import Server
-from tests.running import free_port
+from tests.running import RunningService, free_port
 from tests.service.fleet_bench import Fleet, afternoon
 
 _TIMES = 7
@@ -80,7 +79,7 @@ def main() -> None:
         migrate(settings)
         fleet = Fleet(settings)
         afternoon(fleet, given.cameras)
-        server = Server(settings)
+        server = RunningService(settings, forked=False)
         server.start()
         try:
             with sync_playwright() as playwright:

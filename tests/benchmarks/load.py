@@ -6,6 +6,7 @@ Requests come when they come, whether or not those before are answered. Exits wi
 
 import argparse
 import asyncio
+import gc
 import json
 import multiprocessing
 import random
@@ -201,6 +202,7 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     idle.start()
     prober.start()
     lasts_s = 60 * wanted.minutes
+    gc.freeze()  # nor is what the clients wait for themselves the server's delay
     asyncio.run(load.run(wanted.clients, wanted.rate, wanted.reads, time.monotonic() + lasts_s))
     after = _seconds_until(lambda: service.http.get("/readyz").json()["store_writable"])
     stop.set()
