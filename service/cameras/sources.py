@@ -54,19 +54,14 @@ def note_source(session: Session, camera_id: str, name: str, stored: int, max_so
         TooManySourcesError: it is new, and the camera has as many as it may have.
     """
     now = datetime.now(UTC)
-    record = sources.find(session, camera_id, name)
-    if record is None:
+    if not sources.note_seen(session, camera_id, name, stored, now):
         _make_room(session, camera_id, name, max_sources)
         record = SourceRecord(
-            camera_id=camera_id, name=name, tracks=0, first_seen_at=now, last_seen_at=now
+            camera_id=camera_id, name=name, tracks=stored, first_seen_at=now, last_seen_at=now
         )
         session.add(record)
-    record.tracks += stored
-    record.last_seen_at = now
-    reference = references.newest_if_any(session, camera_id)
-    if reference is not None and reference.source is None:
-        reference.source = name
-    session.flush()
+        session.flush()
+    references.be_of_source(session, camera_id, name)
 
 
 def list_sources(session: Session, settings: Settings, camera_id: str) -> list[SourceView]:

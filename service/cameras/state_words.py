@@ -22,9 +22,10 @@ def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reas
     """Why a camera's state is what it is: what is missing, what was told, who is there."""
     now = datetime.now(UTC)
     found: list[Reason] = []
-    window = maintenance.under_way(session, standing.camera_id, now)
-    if window is not None:
-        found.append(_window(window))
+    if standing.attended.under_way(now):
+        window = maintenance.under_way(session, standing.camera_id, now)
+        if window is not None:
+            found.append(_window(window))
     estimate = standing.estimate
     if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
         found += estimate.reasons

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from service.cameras.cameras import require_camera
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection
@@ -33,9 +34,11 @@ def receive_tracks(
     counts as taken.
 
     Raises:
+        NotFoundError: there is no such camera.
         NothingTakenError: there were tracks, and none of them could be taken.
         TooManySourcesError: the source is new, and the camera has as many as it may have.
     """
+    camera = require_camera(session, camera_id)  # held, since a session forgets what nobody holds
     if batch.rejections and not batch.tracks:
         raise _nothing_taken(batch)
     now = datetime.now(UTC)
@@ -60,7 +63,7 @@ def receive_tracks(
         stored = added if source == batch.tracks[0].source else 0
         note_source(session, camera_id, source, stored, max_sources)
     if added:
-        request_estimate(session, queue, camera_id)
+        request_estimate(session, queue, camera.id)
     return Receipt(
         accepted=added,
         duplicates=len(batch.tracks) - added,

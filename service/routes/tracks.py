@@ -140,7 +140,6 @@ def post_tracks(
     with state.store.read() as session:
         state.quota.check(session, camera_id, batch)
     with state.store.write() as session:
-        cameras.require_camera(session, camera_id)
         receipt = tracks.receive_tracks(
             session, state.queue, camera_id, batch, max_sources=state.settings.max_sources
         )

@@ -2,13 +2,21 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import bindparam, delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.trainings import ModelRecord, TrainingRecord
+
+# Built once: each request for a pose asks for it.
+_PRIOR_POSE = (
+    select(PriorPoseRecord)
+    .where(PriorPoseRecord.camera_id == bindparam("camera"))
+    .order_by(PriorPoseRecord.id.desc())
+    .limit(1)
+)
 
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:
@@ -34,12 +42,7 @@ def count(session: Session) -> int:
 
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
     """The pose that a camera is trusted to have had last."""
-    return session.scalars(
-        select(PriorPoseRecord)
-        .where(PriorPoseRecord.camera_id == camera_id)
-        .order_by(PriorPoseRecord.id.desc())
-        .limit(1)
-    ).one()
+    return session.scalars(_PRIOR_POSE, {"camera": camera_id}).one()
 
 
 def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:

@@ -3,11 +3,13 @@
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from sqlalchemy import (
     ColumnElement,
     Float,
+    Select,
     String,
     case,
     column,
@@ -20,7 +22,7 @@ from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
-from service.store.metrics import Ids, among, newest_of
+from service.store.metrics import Ids, among, among_given, given, newest_of
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
 from service.store.tables.cameras import CameraRecord
@@ -108,10 +110,7 @@ def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) ->
 
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
     """The alerts of cameras that fire, those about one camera."""
-    query = select(AlertRecord).where(
-        AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_not(None)
-    )
-    return session.scalars(query.where(among(AlertRecord.camera_id, ids))).all()
+    return session.scalars(_firing(some=ids is not None), given(ids)).all()
 
 
 def firing_groups(session: Session) -> Sequence[AlertRecord]:
@@ -135,23 +134,36 @@ def unfinished_trainings(session: Session, ids: Ids) -> dict[str, TrainingRecord
 
 def maintenance_windows(session: Session, ids: Ids) -> dict[str, list[MaintenanceRecord]]:
     """The windows of each camera in the order of their beginnings."""
-    query = (
-        select(MaintenanceRecord)
-        .where(among(MaintenanceRecord.camera_id, ids))
-        .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
-    )
     found: dict[str, list[MaintenanceRecord]] = defaultdict(list)
-    for record in session.scalars(query):
+    for record in session.scalars(_maintenance_windows(some=ids is not None), given(ids)):
         found[record.camera_id].append(record)
     return found
 
 
 def rhythm_profiles(session: Session, ids: Ids) -> dict[str, dict[str, Any]]:
     """The rhythm of each camera that has one."""
-    query = select(RhythmRecord.camera_id, RhythmRecord.profile).where(
-        among(RhythmRecord.camera_id, ids)
+    rows = session.execute(_rhythm_profiles(some=ids is not None), given(ids))
+    return {camera_id: profile for camera_id, profile in rows if profile}
+
+
+@cache
+def _firing(*, some: bool) -> Select[AlertRecord]:
+    query = select(AlertRecord).where(
+        AlertRecord.state == AlertState.FIRING, AlertRecord.camera_id.is_not(None)
     )
-    return {camera_id: profile for camera_id, profile in session.execute(query) if profile}
+    return query.where(among_given(AlertRecord.camera_id, some=some))
+
+
+@cache
+def _maintenance_windows(*, some: bool) -> Select[MaintenanceRecord]:
+    query = select(MaintenanceRecord).where(among_given(MaintenanceRecord.camera_id, some=some))
+    return query.order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
+
+
+@cache
+def _rhythm_profiles(*, some: bool) -> Select[str, dict[str, Any]]:
+    query = select(RhythmRecord.camera_id, RhythmRecord.profile)
+    return query.where(among_given(RhythmRecord.camera_id, some=some))
 
 
 def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:

@@ -1,11 +1,15 @@
-"""Statements that look at everything at once, for metrics: a lookup a camera, never a scan."""
+"""Statements that look at everything at once, for metrics: a lookup a camera, never a scan.
+
+Those that each request for a pose asks are built once: building takes longer than asking.
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, String, func, select, true, type_coerce
+from sqlalchemy import ColumnElement, Select, String, bindparam, func, select, true, type_coerce
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.kinds import AlertState, DeliveryState, TrainingState
@@ -22,6 +26,8 @@ from service.store.tracks.counting import of_counting_source
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None
 
+_IDS = "ids"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backlog:
@@ -33,31 +39,20 @@ class Backlog:
 
 def last_tracks_s(session: Session, ids: Ids = None) -> dict[str, float | None]:
     """When the newest track of each camera ended, of those that count."""
-    newest = (
-        select(func.max(TrackRecord.ended_s))
-        .where(TrackRecord.camera_id == CameraRecord.id, of_counting_source(CameraRecord.id))
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )
-    query = select(CameraRecord.id, newest).where(among(CameraRecord.id, ids))
-    rows = session.execute(query.order_by(CameraRecord.id))
+    rows = session.execute(_last_tracks_s(some=ids is not None), given(ids))
     return {camera_id: ended_s for camera_id, ended_s in rows}
 
 
 def newest_references(session: Session, ids: Ids = None) -> dict[str, SiteReferenceRecord]:
     """The reference of each camera that counts, without the site itself."""
-    newest = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
-    query = select(SiteReferenceRecord).join(CameraRecord, SiteReferenceRecord.id == newest)
-    query = query.where(among(CameraRecord.id, ids)).options(defer(SiteReferenceRecord.data))
-    return {record.camera_id: record for record in session.scalars(query)}
+    query = _newest_references(some=ids is not None)
+    return {record.camera_id: record for record in session.scalars(query, given(ids))}
 
 
 def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRecord]:
-    """The newest estimate of each camera, without what is behind it."""
-    newest = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
-    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
-    query = query.where(among(CameraRecord.id, ids)).options(defer(EstimateRecord.raw))
-    return {record.camera_id: record for record in session.scalars(query)}
+    """The newest estimate of each camera; of several, without what is behind it."""
+    query = _newest_estimates(some=ids is not None, whole=ids is not None and len(ids) == 1)
+    return {record.camera_id: record for record in session.scalars(query, given(ids))}
 
 
 def newest_identifiable_estimates(
@@ -109,9 +104,47 @@ def backlogs(session: Session) -> dict[str, Backlog]:
     return {name: Backlog(count=count, oldest_at=oldest) for name, count, oldest in rows}
 
 
+@cache
+def _last_tracks_s(*, some: bool) -> Select[str, float | None]:
+    newest = (
+        select(func.max(TrackRecord.ended_s))
+        .where(TrackRecord.camera_id == CameraRecord.id, of_counting_source(CameraRecord.id))
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    query = select(CameraRecord.id, newest).where(among_given(CameraRecord.id, some=some))
+    return query.order_by(CameraRecord.id)
+
+
+@cache
+def _newest_references(*, some: bool) -> Select[SiteReferenceRecord]:
+    newest = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
+    query = select(SiteReferenceRecord).join(CameraRecord, SiteReferenceRecord.id == newest)
+    query = query.where(among_given(CameraRecord.id, some=some))
+    return query.options(defer(SiteReferenceRecord.data))
+
+
+@cache
+def _newest_estimates(*, some: bool, whole: bool) -> Select[EstimateRecord]:
+    newest = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
+    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
+    query = query.where(among_given(CameraRecord.id, some=some))
+    return query if whole else query.options(defer(EstimateRecord.raw))
+
+
 def among(column: InstrumentedAttribute[Any], ids: Ids) -> ColumnElement[bool]:
     """Whether a column names one of the cameras that are asked about."""
     return true() if ids is None else column.in_(ids)
+
+
+def among_given(column: InstrumentedAttribute[Any], *, some: bool) -> ColumnElement[bool]:
+    """The same in a statement that is built once: the cameras are `given` with each execution."""
+    return column.in_(bindparam(_IDS, expanding=True)) if some else true()
+
+
+def given(ids: Ids) -> dict[str, list[str]]:
+    """What such a statement is executed with."""
+    return {} if ids is None else {_IDS: list(ids)}
 
 
 def newest_of(

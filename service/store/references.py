@@ -2,11 +2,27 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import Select, delete, exists, select
-from sqlalchemy.orm import Session, defer
+from sqlalchemy import Select, bindparam, delete, exists, func, select, update
+from sqlalchemy.orm import Session, aliased, defer
 
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
+
+_earlier = aliased(SiteReferenceRecord)
+_NEWEST_OF_ONE = select(func.max(_earlier.id)).where(_earlier.camera_id == bindparam("camera"))
+_OF_SOURCE = (
+    update(SiteReferenceRecord.__table__)  # type: ignore[arg-type]
+    .where(
+        SiteReferenceRecord.id == _NEWEST_OF_ONE.scalar_subquery(),
+        SiteReferenceRecord.source.is_(None),
+    )
+    .values(source=bindparam("name"))
+)
+
+
+def be_of_source(session: Session, camera_id: str, name: str) -> None:
+    """Have the reference that counts be of a source, if it is of none yet."""
+    session.connection().execute(_OF_SOURCE, {"camera": camera_id, "name": name})
 
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:

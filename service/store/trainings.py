@@ -2,13 +2,21 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import delete, select
+from sqlalchemy import bindparam, delete, select
 from sqlalchemy.orm import Session
 
 from service.kinds import TrainingState
 from service.store.tables.trainings import ModelRecord, TrainingRecord
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
+
+# Built once: each request for a pose asks for it.
+_NEWEST_MODEL = (
+    select(ModelRecord)
+    .where(ModelRecord.camera_id == bindparam("camera"))
+    .order_by(ModelRecord.created_at.desc())
+    .limit(1)
+)
 
 
 def find(session: Session, training_id: str) -> TrainingRecord | None:
@@ -37,12 +45,7 @@ def unfinished(session: Session, camera_id: str) -> Sequence[TrainingRecord]:
 
 def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
     """The model in use of a camera, or None."""
-    return session.scalars(
-        select(ModelRecord)
-        .where(ModelRecord.camera_id == camera_id)
-        .order_by(ModelRecord.created_at.desc())
-        .limit(1)
-    ).first()
+    return session.scalars(_NEWEST_MODEL, {"camera": camera_id}).first()
 
 
 def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:

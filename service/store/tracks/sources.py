@@ -1,12 +1,25 @@
 """Statements on the sources of a camera's tracks."""
 
 from collections.abc import Sequence
+from datetime import datetime
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import bindparam, delete, func, select, update
 from sqlalchemy.orm import Session
 
 from service.store.tables.tracks import SourceRecord, TrackRecord
 from service.store.tracks.counting import Spans, outside
+
+_SEEN = (
+    update(SourceRecord.__table__)  # type: ignore[arg-type]
+    .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("source"))
+    .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
+)
+
+
+def note_seen(session: Session, camera_id: str, name: str, stored: int, now: datetime) -> bool:
+    """Count what a source has posted; whether it is known."""
+    said = {"camera": camera_id, "source": name, "stored": stored, "now": now}
+    return bool(session.connection().execute(_SEEN, said).rowcount)
 
 
 def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:
