@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, exists, func, or_, select, update
+from sqlalchemy import ColumnElement, delete, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertState, DeliveryState
@@ -78,7 +78,7 @@ def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord
         .where(
             DeliveryRecord.webhook_id == webhook_id,
             DeliveryRecord.state == DeliveryState.PENDING,
-            DeliveryRecord.next_attempt_at <= now,
+            _has_come(now),
             ~waits,
         )
         .order_by(DeliveryRecord.number)
@@ -91,9 +91,7 @@ def due(session: Session, now: datetime) -> set[str]:
     return set(
         session.scalars(
             select(DeliveryRecord.webhook_id)
-            .where(
-                DeliveryRecord.state == DeliveryState.PENDING, DeliveryRecord.next_attempt_at <= now
-            )
+            .where(DeliveryRecord.state == DeliveryState.PENDING, _has_come(now))
             .distinct()
         )
     )
@@ -167,3 +165,8 @@ def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Seq
     if kinds is not None:
         query = query.where(AlertRecord.kind.in_(kinds))
     return session.scalars(query.order_by(AlertRecord.opened_at)).all()
+
+
+def _has_come(now: datetime) -> ColumnElement[bool]:
+    """Whether it is time for a delivery. For one that was never tried it is, by any clock."""
+    return or_(DeliveryRecord.next_attempt_at <= now, DeliveryRecord.tries == 0)

@@ -25,10 +25,11 @@ class ClockWatch:
     def look(self, context: JobContext) -> None:
         """Compare the clock with the monotonic one, that nobody sets."""
         ahead_s = time.time() - time.monotonic()
-        back_s, self._ahead_s = self._ahead_s - ahead_s, ahead_s
+        back_s = self._ahead_s - ahead_s
         if back_s >= _JUMP_S:
             with context.store.write() as session:
                 _follow(session, timedelta(seconds=back_s))
+        self._ahead_s = ahead_s  # not before: where nothing could be written, it is seen again
 
 
 def follow_clock_since_last_run(context: JobContext) -> None:

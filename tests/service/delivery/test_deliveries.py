@@ -86,6 +86,18 @@ def test_messages_of_an_alert_keep_their_order_and_others_do_not_wait(post_room,
     assert told == [("alert.opened", "drift"), ("alert.resolved", "drift")]
 
 
+def test_what_was_never_tried_is_due_though_it_was_made_by_a_clock_that_is_ahead(post_room, inbox):
+    hook = post_room.hook(inbox.url)
+    post_room.open()
+    with post_room.store.write() as session:
+        session.connection().exec_driver_sql(
+            "UPDATE deliveries SET next_attempt_at = '2099-01-01 00:00:00.000000'"
+        )
+    assert post_room.awaited() == [hook["id"]]
+    post_room.send(hook)
+    assert [m.json["type"] for m in inbox.received] == ["alert.opened"]
+
+
 def test_an_endpoint_that_is_down_rests_and_is_told_all_when_it_is_back(post_room, inbox):
     hook = post_room.hook(inbox.url)
     inbox.answer(503, 204)

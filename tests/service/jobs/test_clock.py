@@ -1,13 +1,16 @@
 """A clock that was set back keeps nothing waiting that waits for a time."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from service.jobs.upkeep.housekeeping import ClockWatch, follow_clock_since_last_run
 from service.process.workforce import register_worker
 from service.store import webhooks
 from service.store.operation import workers
+from service.store.sqlite.database import Store
 from service.windows.waiting import lies_ahead
 from tests.running import free_port
 
@@ -26,16 +29,26 @@ def test_what_waits_to_be_delivered_follows_the_clock(post_room):
     post_room.open()
     post_room.send(hook)
     clock = ClockWatch()
-    with post_room.store.write() as session:  # an hour passes, and is taken back
-        for record in (*webhooks.waiting(session, datetime.now(UTC)), *webhooks.every(session)):
-            for name in ("next_attempt_at", "held_until"):
-                if hasattr(record, name):
-                    setattr(record, name, getattr(record, name) + timedelta(hours=1))
+    an_hour_later(post_room)
     clock.look(post_room.context)
     assert next_in_s(post_room) > 3600
     clock._ahead_s += 3600
     clock.look(post_room.context)
     assert 0 < next_in_s(post_room) < 60
+    clock.look(post_room.context)
+    assert 0 < next_in_s(post_room) < 60
+
+
+def test_a_clock_that_was_set_back_while_nothing_could_be_written_is_seen_later(post_room):
+    hook = post_room.hook(f"http://127.0.0.1:{free_port()}/")
+    post_room.open()
+    post_room.send(hook)
+    clock = ClockWatch()
+    an_hour_later(post_room)
+    clock._ahead_s += 3600
+    with post_room.store.write(), pytest.raises(OperationalError):
+        clock.look(replace(post_room.context, store=Store(post_room.settings, patience_s=0.05)))
+    assert next_in_s(post_room) > 3600
     clock.look(post_room.context)
     assert 0 < next_in_s(post_room) < 60
 
@@ -58,6 +71,15 @@ def test_a_clock_that_was_set_back_while_no_worker_watched_is_seen_by_the_next(p
     assert 0 < next_in_s(post_room) < 60
     follow_clock_since_last_run(post_room.context)
     assert 0 < next_in_s(post_room) < 60
+
+
+def an_hour_later(post_room):
+    """An hour passes, to be taken back."""
+    with post_room.store.write() as session:
+        for record in (*webhooks.waiting(session, datetime.now(UTC)), *webhooks.every(session)):
+            for name in ("next_attempt_at", "held_until"):
+                if hasattr(record, name):
+                    setattr(record, name, getattr(record, name) + timedelta(hours=1))
 
 
 def next_in_s(post_room):
