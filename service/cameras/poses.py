@@ -74,7 +74,9 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     session.flush()
     standing = standings(session, settings, (camera_id,))[camera_id]
     model = trainings.newest_model(session, camera_id)
-    reasons = reasons_of(session, settings, standing)
+    record = standing.reference
+    so_far = tracks_so_far(session, settings, record, standing.attended)
+    reasons = reasons_of(session, settings, standing, so_far)
     pose = pose_of_prior(cameras.prior_pose(session, camera_id))
     estimate = standing.estimate
     if estimate is not None:
@@ -85,10 +87,9 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
             roll_rad=estimate.pose.roll_rad,
             heading_rad=estimate.pose.heading_rad,
         )
-    record = standing.reference
     reference = ReferenceView(
         ready=record.ready_at is not None,
-        tracks=tracks_so_far(session, settings, record),
+        tracks=so_far,
         wanted=record.wanted,
         walking_speed_mps=record.walking_speed_mps,
     )

@@ -15,11 +15,14 @@ from service.settings import Settings
 from service.store import maintenance
 from service.store.tables.attendance import MaintenanceRecord
 from service.store.tracks import windows
-from service.windows.references import tracks_so_far, wanted_tracks, window_beside
+from service.windows.references import wanted_tracks, window_beside
 
 
-def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reasons:
-    """Why a camera's state is what it is: what is missing, what was told, who is there."""
+def reasons_of(session: Session, settings: Settings, standing: Standing, so_far: int) -> Reasons:
+    """Why a camera's state is what it is: what is missing, what was told, who is there.
+
+    `so_far` is how many tracks its reference has.
+    """
     now = datetime.now(UTC)
     found: list[Reason] = []
     if standing.attended.under_way(now):
@@ -35,7 +38,7 @@ def reasons_of(session: Session, settings: Settings, standing: Standing) -> Reas
         else:
             found += _of_alerts(standing)
     if not standing.judged:
-        found += _missing(session, settings, standing)
+        found += _missing(session, settings, standing, so_far)
     silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
     if silence is not None and standing.state in (PoseState.NO_DATA, *MOVED):
         found += silence.reasons
@@ -51,11 +54,10 @@ def _of_alerts(standing: Standing) -> list[Reason]:
     return [reason for reasons in different for reason in reasons]
 
 
-def _missing(session: Session, settings: Settings, standing: Standing) -> list[Reason]:
+def _missing(session: Session, settings: Settings, standing: Standing, so_far: int) -> list[Reason]:
     """How much is missing until the camera is judged anew."""
     reference = standing.reference
     if reference.ready_at is None:
-        so_far = tracks_so_far(session, settings, reference)
         values = {"tracks": so_far, "wanted": wanted_tracks(reference, settings)}
         return [Reason(code=ServiceCode.REFERENCE_TRACKS, values=values)]
     bounds = window_beside(standing.attended, reference, settings)

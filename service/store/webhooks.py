@@ -10,6 +10,8 @@ from service.kinds import AlertState, DeliveryState
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
+_Earlier = aliased(DeliveryRecord)
+
 
 def find(session: Session, webhook_id: str) -> WebhookRecord | None:
     """The webhook, or None."""
@@ -66,12 +68,11 @@ def attempts_of(session: Session, numbers: Sequence[int]) -> dict[int, list[Deli
 
 def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord | None:
     """The oldest delivery that is due, and does not wait for an earlier one of its alert."""
-    earlier = aliased(DeliveryRecord)
     waits = exists().where(
-        earlier.webhook_id == webhook_id,
-        earlier.state == DeliveryState.PENDING,
-        earlier.alert_id == DeliveryRecord.alert_id,
-        earlier.number < DeliveryRecord.number,
+        _Earlier.webhook_id == webhook_id,
+        _Earlier.state == DeliveryState.PENDING,
+        _Earlier.alert_id == DeliveryRecord.alert_id,
+        _Earlier.number < DeliveryRecord.number,
     )
     return session.scalars(
         select(DeliveryRecord)

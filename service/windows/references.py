@@ -135,11 +135,12 @@ def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
     return min(reference.wanted, settings.keep_tracks)
 
 
-def tracks_so_far(session: Session, settings: Settings, reference: SiteReferenceRecord) -> int:
+def tracks_so_far(
+    session: Session, settings: Settings, reference: SiteReferenceRecord, attended: Attendance
+) -> int:
     """How many of the wanted tracks there are."""
     if reference.ready_at is not None:
         return reference.tracks
-    attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
     stored = windows.count_from(
         session, reference.camera_id, reference.from_s, without=attended.spans
     )
