@@ -193,7 +193,9 @@ class Settings(BaseSettings):
         64.0, ge=0, description="MiB of free disk below which /readyz is not ready; 0: any"
     )
 
-    reconcile_s: int = Field(5, ge=1, le=59, description="seconds between reconciles")
+    reconcile_s: int = Field(
+        5, ge=1, le=59, description="seconds between reconciles, of ten cameras a second at most"
+    )
     estimate_rest: float = Field(
         1.0, ge=0, le=60, description="a camera rests so many times as long as its last look took"
     )

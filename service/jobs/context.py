@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from service.job_queue import JobQueue
 from service.jobs.growth_rests import GrowthRests
 from service.jobs.in_hand import InHand
+from service.jobs.rota import Rota
 from service.settings import Settings
 from service.store.sqlite.database import Store
 from service.training.steps import StepWatch
@@ -22,3 +23,4 @@ class JobContext:
     in_hand: InHand = field(default_factory=InHand)
     growth_rests: GrowthRests = field(default_factory=GrowthRests)
     steps: StepWatch = field(default_factory=StepWatch)
+    reconciled: Rota = field(default_factory=Rota)

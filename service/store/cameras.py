@@ -35,6 +35,11 @@ def every(session: Session) -> Sequence[CameraRecord]:
     return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
 
 
+def ids(session: Session) -> Sequence[str]:
+    """The ids of all cameras, in order."""
+    return session.scalars(select(CameraRecord.id).order_by(CameraRecord.id)).all()
+
+
 def count(session: Session) -> int:
     """How many cameras there are."""
     return session.scalar(select(func.count()).select_from(CameraRecord)) or 0

@@ -84,8 +84,8 @@ def reconcile_alerts(session: Session) -> None:
 
 
 def camera_ids(session: Session) -> Sequence[str]:
-    """The ids of all cameras."""
-    return [camera.id for camera in cameras.every(session)]
+    """The ids of all cameras, in order."""
+    return cameras.ids(session)
 
 
 def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:
