@@ -11,14 +11,14 @@ from service.store.tracks.counting import Spans, outside
 
 _SEEN = (
     update(SourceRecord.__table__)  # type: ignore[arg-type]
-    .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("source"))
+    .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("posted"))
     .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
 )
 
 
 def note_seen(session: Session, camera_id: str, name: str, stored: int, now: datetime) -> bool:
     """Count what a source has posted; whether it is known."""
-    said = {"camera": camera_id, "source": name, "stored": stored, "now": now}
+    said = {"camera": camera_id, "posted": name, "stored": stored, "now": now}
     return bool(session.connection().execute(_SEEN, said).rowcount)
 
 
