@@ -8,8 +8,8 @@ from sqlalchemy.orm import Session, aliased, defer
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 
-_earlier = aliased(SiteReferenceRecord)
-_NEWEST_OF_ONE = select(func.max(_earlier.id)).where(_earlier.camera_id == bindparam("camera"))
+_Reference = aliased(SiteReferenceRecord)
+_NEWEST_OF_ONE = select(func.max(_Reference.id)).where(_Reference.camera_id == bindparam("camera"))
 _OF_SOURCE = (
     update(SiteReferenceRecord.__table__)  # type: ignore[arg-type]
     .where(

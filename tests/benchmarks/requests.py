@@ -25,7 +25,7 @@ from rich.table import Table
 from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.benchmarks.http_client import Connection
-from tests.conftest import CAMERA
+from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
 
 _CLIENTS = 16
@@ -68,10 +68,7 @@ def posts(tracks: int) -> Callable[[], Bodies]:
     def asks() -> Bodies:
         for n in count():
             start_s = time.time() - 10
-            some = []
-            for each in range(tracks):
-                points = [[start_s + 0.4 * k, 300.0 + 12 * k, 400.0 + 5 * k] for k in range(20)]
-                some.append({"id": f"{start_s}-{n}-{each}", "points": points})
+            some = [track(f"{start_s}-{n}-{each}", start_s) for each in range(tracks)]
             body = json.dumps({"source": "cost", "tracks": some}).encode()
             yield f"/cameras/cost-{n % _CAMERAS}/tracks", body
 
