@@ -81,7 +81,7 @@ def seed(settings: Settings, cameras: int) -> list[list[Trajectory]]:
             service.http.post(path, json={"source": "a", "tracks": part}).raise_for_status()
     wait_for(lambda: all(_is_full(service, site) for site in range(_SITES)), timeout_s=300)
     # Their maps have grown by then, too: what it takes to get there is another benchmark's.
-    wait_for(lambda: _is_idle(settings) and not time.sleep(3) and _is_idle(settings))
+    wait_for(lambda: _is_idle(settings), every_s=5)
     service.stop()
     ids = [f"copy-{n}" for n in range(cameras - _SITES)]
     clone(settings.database_path, [f"site-{site}" for site in range(_SITES)], ids)
