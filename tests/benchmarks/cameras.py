@@ -24,22 +24,14 @@ from typing import Any
 import numpy as np
 import psutil
 
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import Trajectory, by_end
-from service.commands.migrate import migrate
+from models.trajectory import Trajectory
 from service.settings import Settings
 from service.store.sqlite.files import connected
-from tests.benchmarks.cloned import clone
+from tests.benchmarks.cloned import APART_S, QUEUED, as_posted, camera_at, seed
 from tests.benchmarks.http_client import Connection
 from tests.benchmarks.load import quantiles
-from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
-from tests.service.street import LENS, PRIOR
 
-_SITES = 4
-_REFERENCE, _WINDOW = 200, 400
-_POSTED = 700  # of which some are pieces of others' walks
-_APART_S = 5.0
 _READS_HZ, _PAGES_HZ = 10.0, 0.1
 _OLDEST_S, _POSTS_P99_MS, _READS_P99_MS, _PAGE_S, _MEMORY_MB = 60.0, 150.0, 25.0, 2.0, 800.0
 _SAMPLES_S = 10.0
@@ -47,62 +39,6 @@ _AGES = (
     "SELECT c.id, (SELECT created_at FROM estimates e WHERE e.camera_id = c.id "
     "ORDER BY e.id DESC LIMIT 1) FROM cameras c"
 )
-_QUEUED = "SELECT count(*) FROM workflow_status WHERE status IN ('ENQUEUED', 'PENDING')"
-
-
-def people(site: int, count: int) -> list[Trajectory]:
-    """Walks at one of the simulated streets, from the same lanes every time."""
-    rng, config = np.random.default_rng(site), SiteConfig()
-    lanes = draw_lanes(LENS, PRIOR, config, rng)
-    return by_end(walk_site(LENS, PRIOR, lanes, config, count, rng))
-
-
-def as_posted(walk: Trajectory, track_id: str, ended_s: float) -> dict[str, Any]:
-    """A walk as a track that ended at a time."""
-    rows = np.column_stack([walk.time_s - walk.time_s[-1] + ended_s, walk.uv])
-    return {"id": track_id, "points": rows.round(3).tolist()}
-
-
-def seed(settings: Settings, cameras: int) -> list[list[Trajectory]]:
-    """Fill a store; returns the people who walk at each street from now on."""
-    migrate(settings)
-    walks = [people(site, _POSTED) for site in range(_SITES)]
-    service = RunningService(settings, forked=False)
-    service.start()
-    first_s = time.time() - _APART_S * _POSTED
-    for site, some in enumerate(walks):
-        body = {**CAMERA, "id": f"site-{site}", "reference_tracks": _REFERENCE}
-        service.http.post("/cameras", json=body).raise_for_status()
-        tracks = [
-            as_posted(walk, str(n), first_s + _APART_S * (n + 1)) for n, walk in enumerate(some)
-        ]
-        for part in (tracks[:_REFERENCE], tracks[_REFERENCE:]):
-            path = f"/cameras/site-{site}/tracks"
-            service.http.post(path, json={"source": "a", "tracks": part}).raise_for_status()
-    wait_for(lambda: all(_is_full(service, site) for site in range(_SITES)), timeout_s=300)
-    # Their maps have grown by then, too: what it takes to get there is another benchmark's.
-    wait_for(lambda: _is_idle(settings), every_s=5)
-    service.stop()
-    ids = [f"copy-{n}" for n in range(cameras - _SITES)]
-    clone(settings.database_path, [f"site-{site}" for site in range(_SITES)], ids)
-    return walks
-
-
-def _is_full(service: RunningService, site: int) -> bool:
-    pose = service.http.get(f"/cameras/site-{site}/pose").json()
-    return bool(pose["reference"]["state"] == "ready" and pose["tracks"] >= _WINDOW)
-
-
-def _is_idle(settings: Settings) -> bool:
-    with connected(settings.database_path) as connection:
-        return bool(connection.execute(_QUEUED).fetchone()[0] == 0)
-
-
-def camera_at(number: int) -> tuple[str, int]:
-    """The id of a camera, and its street."""
-    if number < _SITES:
-        return f"site-{number}", number
-    return f"copy-{number - _SITES}", (number - _SITES + 1) % _SITES
 
 
 class Clients:
@@ -125,14 +61,14 @@ class Clients:
     async def _tracker(self, number: int, until: float) -> None:
         connection = Connection("127.0.0.1", self._port)
         camera_id, site = camera_at(number)
-        due = time.monotonic() + _APART_S * self._random.random()
+        due = time.monotonic() + APART_S * self._random.random()
         while due < until:
             await asyncio.sleep(max(0.0, due - time.monotonic()))
             walk = self._random.choice(self._walks[site])
             posted = as_posted(walk, f"{due:.3f}", time.time())
             body = json.dumps({"source": "a", "tracks": [posted]}).encode()
             await self._ask("posts", connection, f"/cameras/{camera_id}/tracks", due, body)
-            due += _APART_S
+            due += APART_S
         connection.close()
 
     async def _reader(self, kind: str, often_hz: float, until: float) -> None:
@@ -179,7 +115,7 @@ class Watch(threading.Thread):
         while not self._stop_now.wait(_SAMPLES_S):
             with connected(self._database) as connection:
                 made = [row[1] for row in connection.execute(_AGES)]
-                self.queued.append(connection.execute(_QUEUED).fetchone()[0])
+                self.queued.append(connection.execute(QUEUED).fetchone()[0])
             now = datetime.now(UTC)
             then = [datetime.fromisoformat(each).replace(tzinfo=UTC) for each in made]
             self.ages_s.append(np.array([(now - each).total_seconds() for each in then]))

@@ -1,15 +1,31 @@
-"""Cameras that are copies of others in a store, with all that is known of them.
+"""Hundreds of cameras with their references learned and their windows full, within a minute.
 
-So hundreds stand there with their references learned and their windows full, within a minute.
+A few at simulated streets learn as any; the others are copies of them in the store.
 """
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from sqlalchemy import Column, Table
 
+from models.simulation.site import SiteConfig, draw_lanes, walk_site
+from models.trajectory import Trajectory, by_end
+from service.commands.migrate import migrate
+from service.settings import Settings
 from service.store.sqlite.files import connected
 from service.store.tables.record import Record
+from tests.conftest import CAMERA
+from tests.running import RunningService, wait_for
+from tests.service.street import LENS, PRIOR
+
+APART_S = 5.0  # from one person at a camera to the next
+QUEUED = "SELECT count(*) FROM workflow_status WHERE status IN ('ENQUEUED', 'PENDING')"
+_SITES = 4
+_REFERENCE, _WINDOW = 200, 400
+_POSTED = 700  # of which some are pieces of others' walks
 
 # In the order in which one names rows of another.
 _TABLES = (
@@ -24,6 +40,67 @@ _TABLES = (
     "estimates",
 )
 _TRACK_IDS = ("looked_at_pk", "newest_track_pk")  # they name tracks without a foreign key
+
+
+def people(site: int, count: int) -> list[Trajectory]:
+    """Walks at one of the simulated streets, from the same lanes every time."""
+    rng, config = np.random.default_rng(site), SiteConfig()
+    lanes = draw_lanes(LENS, PRIOR, config, rng)
+    return by_end(walk_site(LENS, PRIOR, lanes, config, count, rng))
+
+
+def as_posted(walk: Trajectory, track_id: str, ended_s: float) -> dict[str, Any]:
+    """A walk as a track that ended at a time."""
+    rows = np.column_stack([walk.time_s - walk.time_s[-1] + ended_s, walk.uv])
+    return {"id": track_id, "points": rows.round(3).tolist()}
+
+
+def seed(settings: Settings, cameras: int) -> list[list[Trajectory]]:
+    """Fill a store; returns the people who walk at each street from now on."""
+    migrate(settings)
+    walks = [people(site, _POSTED) for site in range(_SITES)]
+    service = RunningService(settings, forked=False)
+    service.start()
+    try:
+        learn_streets(service, walks)
+    finally:
+        service.stop()
+    ids = [f"copy-{n}" for n in range(cameras - _SITES)]
+    clone(settings.database_path, [f"site-{site}" for site in range(_SITES)], ids)
+    return walks
+
+
+def learn_streets(service: RunningService, walks: list[list[Trajectory]]) -> None:
+    """A camera at each street, until its window is full and its map has grown by it."""
+    first_s = time.time() - APART_S * _POSTED
+    for site, some in enumerate(walks):
+        body = {**CAMERA, "id": f"site-{site}", "reference_tracks": _REFERENCE}
+        service.http.post("/cameras", json=body).raise_for_status()
+        tracks = [
+            as_posted(walk, str(n), first_s + APART_S * (n + 1)) for n, walk in enumerate(some)
+        ]
+        for part in (tracks[:_REFERENCE], tracks[_REFERENCE:]):
+            path = f"/cameras/site-{site}/tracks"
+            service.http.post(path, json={"source": "a", "tracks": part}).raise_for_status()
+    wait_for(lambda: all(_is_full(service, site) for site in range(_SITES)), timeout_s=300)
+    wait_for(lambda: _is_idle(service.settings), every_s=5)
+
+
+def _is_full(service: RunningService, site: int) -> bool:
+    pose = service.http.get(f"/cameras/site-{site}/pose").json()
+    return bool(pose["reference"]["state"] == "ready" and pose["tracks"] >= _WINDOW)
+
+
+def _is_idle(settings: Settings) -> bool:
+    with connected(settings.database_path) as connection:
+        return bool(connection.execute(QUEUED).fetchone()[0] == 0)
+
+
+def camera_at(number: int) -> tuple[str, int]:
+    """The id of a camera, and its street."""
+    if number < _SITES:
+        return f"site-{number}", number
+    return f"copy-{number - _SITES}", (number - _SITES + 1) % _SITES
 
 
 def clone(database: Path, prototypes: Sequence[str], ids: Sequence[str]) -> None:
