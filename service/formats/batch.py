@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
+from service.formats.people import NoPersonError
 from service.formats.track import (
     MAX_ID_LENGTH,
     MAX_TRACKS,
@@ -135,6 +136,8 @@ def collect(
     for index, raw, read in items:
         try:
             tracks.append(read())
+        except NoPersonError:
+            left_out += 1
         except TrackRejectedError as refused:
             name = raw.get("id") if isinstance(raw, dict) else None
             known = isinstance(name, str | int) and not isinstance(name, bool)

@@ -8,6 +8,7 @@ import numpy as np
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.batch import check_count, collect, malformed, refuse
+from service.formats.people import COCO_PEOPLE
 from service.formats.track import (
     MAX_ID_LENGTH,
     Batch,
@@ -25,8 +26,6 @@ _WITH_CLASS = (8, 9)  # lines of ten have a place in the world there
 _NONE_GIVEN = -1.0
 # Of ground truth, which has a visibility in column 9: pedestrians and people who stand.
 _TRUTH_PEOPLE = frozenset((1.0, 7.0))
-# Of detectors trained on COCO, BoxMOT's among them.
-_COCO_PEOPLE = frozenset((0.0,))
 _MOST_NAMED = 12  # class numbers in a message
 
 
@@ -137,7 +136,7 @@ def _people(rows: list[list[float]], classes: frozenset[int] | None) -> frozense
     if classes is not None:
         return frozenset(float(number) for number in classes)
     truth = any(len(row) == max(_WITH_CLASS) and 0 <= row[_VISIBILITY] <= 1 for row in rows)
-    return _TRUTH_PEOPLE if truth else _COCO_PEOPLE
+    return _TRUTH_PEOPLE if truth else COCO_PEOPLE
 
 
 def _class_of(row: list[float], *, given: bool) -> float:

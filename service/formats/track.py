@@ -9,6 +9,7 @@ import numpy as np
 from models.geometry.rotation import Array
 from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
+from service.formats.people import check_person
 
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
@@ -50,7 +51,7 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What could be read of a request; `left_out` lines of it were of no person."""
+    """What could be read of a request; `left_out` lines or tracks of it were of no person."""
 
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
@@ -94,10 +95,11 @@ _FOOT = 3
 
 
 def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
-    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes"}`.
+    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
 
     Raises:
         TrackRejectedError: with a code, the field, the limit and the value received.
+        NoPersonError: its class is none of a person; null is none at all.
     """
     if isinstance(raw, OversizedTrack):
         raise TrackRejectedError(
@@ -106,6 +108,10 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
         )
     if not isinstance(raw, dict):
         raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
+    try:
+        check_person(raw.get("class"))
+    except ValueError as error:
+        raise TrackRejectedError("malformed", str(error)) from error
     given = [name for name in _FORMS if name in raw]
     if len(given) != 1:
         raise TrackRejectedError(

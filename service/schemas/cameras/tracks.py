@@ -27,6 +27,10 @@ DESCRIBED_TRACK: dict[str, Any] = {
         "boxes": _rows("[time_s, x1, y1, x2, y2] in pixels", 5),
         "frames": _rows("[frame, u_px, v_px], or all with their heads", 3),
         "frame_boxes": _rows("[frame, x1, y1, x2, y2]", 5),
+        "class": {
+            "type": ["string", "number", "null"],
+            "description": "what it is of, by name or COCO's number: no person is left out",
+        },
     },
 }
 
@@ -46,7 +50,7 @@ class RejectionOut(BaseModel):
 
 
 class ReceiptOut(BaseModel):
-    """What became of the posted tracks; where it stands, `left_out` lines were of no person."""
+    """What became of the posted tracks; where it stands, `left_out` of them were of no person."""
 
     accepted: int
     duplicates: int
