@@ -94,6 +94,37 @@ class Windows:
         return int(self.lengths.size)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """All points of N trajectories, one after the other.
+
+    `time_s` (T,), `uv` (T, 2) and `top_v` (T,), NaN where no box is known, are as of a trajectory;
+    that of number n begins at `bounds[n]` and ends before `bounds[n + 1]` (N + 1,).
+    """
+
+    time_s: Array
+    uv: Array
+    top_v: Array
+    bounds: npt.NDArray[np.int64]
+
+
+def points_of(trajectories: Sequence[Trajectory]) -> Points:
+    """The points of trajectories as arrays that loops over all of them take."""
+    sizes = [trajectory.time_s.size for trajectory in trajectories]
+    bounds = np.zeros(len(sizes) + 1, dtype=np.int64)
+    np.cumsum(sizes, out=bounds[1:])
+    top_v = np.full(int(bounds[-1]), np.nan)
+    for trajectory, first in zip(trajectories, bounds.tolist(), strict=False):
+        if trajectory.top_v is not None:
+            top_v[first : first + trajectory.top_v.size] = trajectory.top_v
+    return Points(
+        time_s=np.concatenate([np.empty(0), *(trajectory.time_s for trajectory in trajectories)]),
+        uv=np.concatenate([np.empty((0, 2)), *(trajectory.uv for trajectory in trajectories)]),
+        top_v=top_v,
+        bounds=bounds,
+    )
+
+
 def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:
     """Trajectories in the order of their ends: as trackers post them, and estimators take them."""
     return sorted(trajectories, key=lambda trajectory: float(trajectory.time_s[-1]))

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.estimation.joint.observations import Observations
-from models.estimation.joint.observations import observe as observe_each
+from models.estimation.joint.observing import observe as observe_each
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.people.linking import link_pieces, walks_of
