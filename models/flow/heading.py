@@ -27,16 +27,21 @@ def on_known_ground(walkers: Walkers, site: Site, candidate: Array) -> bool:
     return known_share(walkers, site, candidate) >= _MOST
 
 
-def variance_of_halves(posterior: Posterior, candidate: Array, line: Array) -> float:
+def variance_of_halves(
+    posterior: Posterior, candidate: Array, line: Array, *, afar: bool = True
+) -> float:
     """The variance of a heading by how far two halves of the walking groups find it apart.
 
     Each half begins 4 deg to another side of a candidate (4,), the other parameters following along
     a line (4,): whether it is found from elsewhere, and whether it hangs on a few people, is seen.
-    It is of one degree of freedom: for telling that something is wrong, not for an interval.
+    Not `afar` both begin at the candidate, for people of whom most were asked from elsewhere
+    before. It is of one degree of freedom: for telling that something is wrong, and not for an
+    interval.
     """
+    sides = (_AWAY, -_AWAY) if afar else (0.0, 0.0)
     ends = [
         replace(posterior, walkers=half).climbed(candidate + away * line).candidate[3]
-        for half, away in zip(_halves(posterior.walkers), (_AWAY, -_AWAY), strict=True)
+        for half, away in zip(_halves(posterior.walkers), sides, strict=True)
     ]
     return float((ends[0] - ends[1]) / 2) ** 2
 

@@ -194,13 +194,18 @@ def settled(
 
 def shape_at(walkers: Walkers, site: Site, candidate: Array) -> Shape:
     """What a map says around a candidate (4,)."""
+    scores = site.scores(walkers, candidate, candidate)
     return Shape(
-        curvature=curvature_of(walkers, site, candidate),
-        noise=noise_of(walkers, site.scores(walkers, candidate, candidate)),
+        curvature=_curvature(walkers, site, candidate, scores), noise=noise_of(walkers, scores)
     )
 
 
 def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """How the log likelihood bends (4, 4) around a candidate (4,)."""
+    return _curvature(walkers, site, candidate, site.scores(walkers, candidate, candidate))
+
+
+def _curvature(walkers: Walkers, site: Site, candidate: Array, scores: Array) -> Array:
     """Minus the second derivative (4, 4) of the log likelihood, by differences of its slope.
 
     Where it bends less than the scores scatter, halfway between what is found in each direction
@@ -212,7 +217,7 @@ def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
         for step in _DIFFERENCE * np.eye(4)
     ]
     bent = np.array(slopes) / (2 * _DIFFERENCE)
-    scatter = _scatter(site.scores(walkers, candidate, candidate))
+    scatter = _scatter(scores)
     lower = np.linalg.cholesky(scatter + (1e-6 + 1e-6 * np.trace(scatter)) * np.eye(4))
     back = np.linalg.inv(lower)
     ratio, axes = np.linalg.eigh(back @ (bent + bent.T) / 2 @ back.T)

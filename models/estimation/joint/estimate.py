@@ -71,6 +71,12 @@ class JointEstimate:
         """What `raw` is, named; it knows no heading."""
         return PoseParameters.of_array(self.raw)
 
+    @property
+    def ends(self) -> tuple[Array, ...]:
+        """Where the search ended (3,) that explains the tracks, the best first; as `raw`."""
+        offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
+        return self.raw, *(other + offset for other in self.others)
+
     def beside_strangers(self) -> tuple[Array, Array]:
         """Values (3,) and covariance (3, 3) of people who are not the reference's.
 
@@ -83,15 +89,23 @@ class JointEstimate:
 
 
 def joint_estimate(
-    observations: Observations, prior: CameraPose, reference: SpeedReference
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: Sequence[Array] = (),
 ) -> JointEstimate:
-    """The pose that explains all tracks best, whatever it was before."""
+    """The pose that explains all tracks best, whatever it was before.
+
+    Where it is known to be `near` some (3,), as the `ends` of an estimate of almost the same
+    tracks, no others are looked at.
+    """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
-    few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-    begin = starts(few, plane_parameters_of(prior), _STARTS)
-    first = _distinct([fit_pose(few, start, hold) for start in begin])
-    ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    if not near:
+        few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
+        begin = starts(few, plane_parameters_of(prior), _STARTS)
+        near = [fit.candidate for fit in _distinct([fit_pose(few, at, hold) for at in begin])]
+    ends = _distinct([fit_pose(channels, start, hold) for start in near])
     verticals = vertical_estimate(observations.uprights, reference.verticals)
     return _said_of(observations, channels, ends, reference, verticals)
 
