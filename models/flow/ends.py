@@ -90,7 +90,7 @@ def ends_of(
     for start, rounds in begin:
         peak, posterior, score = start, first, 0.0
         for _ in range(rounds):
-            told = joint_near(observations, prior, speed_reference, peak.candidate, joint.verticals)
+            told = joint_near(observations, prior, speed_reference, peak.candidate, joint)
             posterior = replace(first, belief=_belief(told, prior))
             score = told.score - joint.score
             peak = posterior.climbed(peak.candidate)
@@ -164,7 +164,8 @@ def flatter(best: End, covariance: Array) -> Array:
     """
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])
-    turns = sd * np.linspace(-4, 4, 17)
+    # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
+    turns = sd * np.arange(-4.0, 5.0)
     values = np.array([best.posterior.value(best.candidate + turn * line) for turn in turns])
     density = np.exp(values - values.max())
     variance = float(density @ turns**2 / density.sum())

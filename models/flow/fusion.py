@@ -37,6 +37,7 @@ from models.reasons import Reason, TracksCode
 _FEWEST_GROUPS = 5
 _EDGE_RAD = math.radians(2.0)
 _FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
+_NOT_FAR = 0.5  # of that: what is less is far from it, looked at roughly
 _BY_CHANCE = 0.01  # tilt and roll of a camera that stands are so far off in so many cases
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 _NO_RIVAL = 1e-6  # and as unlikely as this, it has nothing to do with the covariance
@@ -220,6 +221,8 @@ def _unrepeated(posterior: Posterior, values: Array, covariance: Array, *, afar:
     variance = float(covariance[3, 3])
     line = covariance[:, 3] / variance
     by_halves = variance_of_halves(posterior, values, line, afar=afar)
+    if not afar and by_halves > _NOT_FAR * _FAR_APART * variance:
+        by_halves = variance_of_halves(posterior, values, line)
     if by_halves < _FAR_APART * variance:
         return np.zeros((4, 4))
     return (by_halves - variance) * np.outer(line, line)

@@ -21,7 +21,7 @@ _HOPELESS = 40.0  # of the log posterior: a start so far below another ends belo
 _LONGEST_MOVE = 0.05
 _MOST_ROUNDS = 25
 _SETTLING_ROUNDS = 4
-_CONVERGED = 1e-3  # of the log likelihood
+CONVERGED = 1e-3  # of the log likelihood
 _SHORTEST_SHARE = 1e-3
 _SAME_END = np.radians(0.3)
 _DIFFERENCE = np.radians(0.6)
@@ -104,8 +104,8 @@ class Posterior:
         chance = float(self.site.track_log_likelihoods(self.walkers, candidate).sum())
         return chance / self.variance_inflation + self.belief.log_density(candidate)
 
-    def climbed(self, candidate: Array) -> Peak:
-        """The peak above a candidate (4,)."""
+    def climbed(self, candidate: Array, least_gain: float = CONVERGED) -> Peak:
+        """The peak above a candidate (4,), up to a gain that is not worth a step."""
         value, found = self._asked(candidate)
         for _ in range(_MOST_ROUNDS):
             believed = self.belief.precision @ (candidate - self.belief.mean)
@@ -121,7 +121,7 @@ class Posterior:
             if gain <= 0:
                 break
             candidate, value, found = candidate + 2 * share * move, new_value, new_found
-            if gain < _CONVERGED:
+            if gain < least_gain:
                 break
         return Peak(candidate=candidate, value=value)
 

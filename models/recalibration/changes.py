@@ -49,8 +49,8 @@ def posed(tracks: Observations, site: CameraSite, near: Posed | None = None) -> 
 
     Where it is known to be `near` that of almost the same tracks, others are not looked at.
     """
-    speed_ends = () if near is None else near.joint.ends
-    joint = joint_estimate(tracks, site.prior, site.speed_reference, speed_ends)
+    at = None if near is None else near.joint
+    joint = joint_estimate(tracks, site.prior, site.speed_reference, at)
     if site.flow is None:
         fused = by_speeds_alone(joint, site.prior)
     else:

@@ -14,6 +14,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.parameters import PLANE_PARAMETERS
 from models.flow.fusion import FusedEstimate
+from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
 
 _FEWEST = 150  # tracks: of fewer a full search is soon made, and each of them counts for much
@@ -78,11 +79,9 @@ def is_as_known(found: Posed, known: Known) -> bool:
         and _code(found.fused) == _code(first.fused)
         and len(found.fused.ends) == len(first.fused.ends)
         and fit_of(found) > known.search.fit - _WORSE / max(found.joint.walking_groups, 1)
+        and _is_near(found.joint.values, found.joint.covariance, first.joint, PLANE_PARAMETERS)
         and _is_near(
-            found.joint.values, found.joint.covariance, first.joint.values, first.joint.covariance
-        )
-        and _is_near(
-            found.fused.values, found.fused.covariance, first.fused.values, first.fused.covariance
+            found.fused.values, found.fused.covariance, first.fused, found.fused.identifiable
         )
     )
 
@@ -101,8 +100,15 @@ def _code(fused: FusedEstimate) -> str | None:
     return None if fused.reason is None else str(fused.reason.code)
 
 
-def _is_near(values: Array, covariance: Array, others: Array, other_covariance: Array) -> bool:
-    sd, other_sd = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(other_covariance))
+def _is_near(
+    values: Array,
+    covariance: Array,
+    other: JointEstimate | FusedEstimate,
+    asked: tuple[str, ...],
+) -> bool:
+    """Whether the parameters asked for are as before, and as sure."""
+    places = [PARAMETERS.index(name) for name in asked]
+    sd, other_sd = (np.sqrt(np.diag(each)[places]) for each in (covariance, other.covariance))
+    near = np.abs(values - other.values)[places] <= _FARTHEST * np.minimum(sd, other_sd)
     ratio = sd / other_sd
-    near = np.abs(values - others) <= _FARTHEST * np.minimum(sd, other_sd)
     return bool(near.all() and (ratio < _WIDER).all() and (ratio > 1 / _WIDER).all())
