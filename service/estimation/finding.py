@@ -78,7 +78,10 @@ def compute_finding(evidence: Evidence, seed: int, recent: Recent | None = None)
     """
     recent = recent or Recent()
     walks = observe_walks(
-        [track.trajectory for track in evidence.tracks], evidence.intrinsics, evidence.prior
+        [track.trajectory for track in evidence.tracks],
+        evidence.intrinsics,
+        evidence.prior,
+        evidence.before,
     )
     observed = walks.observations
     if observed.walkers < FEWEST_WALKERS:
