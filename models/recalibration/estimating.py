@@ -76,7 +76,7 @@ def estimate_pose(
             pose is asked for without the newest people, too. That takes as long again.
         last: the finding of almost the same tracks at the same site, the newest of them left out
             and some older ones: where nothing speaks against it, its pose is refined, which takes a
-            quarter of the time and comes to the same.
+            quarter to a half of the time and comes to the same.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
