@@ -112,8 +112,7 @@ def search_change(tracks: Observations, site: CameraSite, known: Known | None = 
     full = None
     if not suspected and tracks.tracks:
         full = FullSearch(
-            to_s=float(tracks.ended_s.max()),
-            tracks=tracks.tracks,
+            ended_s=tracks.ended_s,
             suspicion=_suspicion(tracks, site, whole),
             fit=fit_of(whole),
         )

@@ -37,15 +37,20 @@ class Posed:
 class FullSearch:
     """When all poses and all moments of a change were last looked at, and no change was found.
 
-    The newest of its `tracks` ended at `to_s`. `suspicion` is how much two poses explained speeds
-    better than one when a change was last looked for, in units of the limit; `fit` how well a
-    walking group fitted the map. None is made of a window that was suspected.
+    `ended_s` (tracks,) is when each of its tracks ended, in order. `suspicion` is how much two
+    poses explained speeds better than one when a change was last looked for, in units of the
+    limit; `fit` how well a walking group fitted the map. None is made of a window that was
+    suspected.
     """
 
-    to_s: float
-    tracks: int
+    ended_s: Array
     suspicion: float
     fit: float
+
+    @property
+    def to_s(self) -> float:
+        """When the newest of its tracks ended."""
+        return float(self.ended_s[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,9 +64,10 @@ class Known:
 def begins_at(known: Known, tracks: Observations) -> bool:
     """Whether tracks are so much the same that their pose is looked for at the known one alone."""
     joint, fused = known.posed.joint, known.posed.fused
-    new = int((tracks.ended_s > known.search.to_s).sum())
+    # Late tracks are as new: a tracker may post yesterday's today.
+    new = int((~np.isin(tracks.ended_s, known.search.ended_s)).sum())
     return (
-        tracks.tracks >= max(_FEWEST, (1 - _NEW) * known.search.tracks)
+        tracks.tracks >= max(_FEWEST, (1 - _NEW) * known.search.ended_s.size)
         and new <= _NEW * tracks.tracks
         and set(joint.identifiable) == set(PLANE_PARAMETERS)
         and joint.reason is None

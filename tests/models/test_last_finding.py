@@ -118,6 +118,8 @@ def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     assert came(near, replace(last, full=replace(last.full, fit=last.full.fit + 1)))  # fits worse
     assert came(of_tracks(every, np.arange(45, 200)), last)  # a quarter is new
     assert came(of_tracks(every, np.arange(60, WINDOW + 10)), last)  # the window was cut
+    late = replace(near, ended_s=np.where(np.arange(WINDOW) % 3, near.ended_s, near.ended_s - 0.1))
+    assert came(late, last)  # a third of it is of other tracks, though none is newer
     elsewhere = replace(last.fused, values=last.fused.values + [0.0, 0.02, 0.0, 0.0])
     assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
 
