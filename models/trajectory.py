@@ -52,9 +52,14 @@ class Trajectory:
             )
         if not self.time_s.size:
             raise ShapeError("time_s: at least 1 point is needed, got 0")
-        if not (np.isfinite(self.time_s).all() and np.isfinite(self.uv).all()):
+        # What increases from a finite number to another one is finite.
+        increases = bool((self.time_s[1:] > self.time_s[:-1]).all())
+        ends = math.isfinite(self.time_s[0]) and math.isfinite(self.time_s[-1])
+        if not (ends and np.isfinite(self.uv).all()):
             raise ShapeError("time_s, uv: must be finite")
-        if not (np.diff(self.time_s) > 0).all():
+        if not increases:
+            if not np.isfinite(self.time_s).all():
+                raise ShapeError("time_s, uv: must be finite")
             raise ShapeError("time_s: must increase strictly")
 
     @property
@@ -92,6 +97,37 @@ class Windows:
 
     def __len__(self) -> int:
         return int(self.lengths.size)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """All points of N trajectories, one after the other.
+
+    `time_s` (T,), `uv` (T, 2) and `top_v` (T,), NaN where no box is known, are as of a trajectory;
+    that of number n begins at `bounds[n]` and ends before `bounds[n + 1]` (N + 1,).
+    """
+
+    time_s: Array
+    uv: Array
+    top_v: Array
+    bounds: npt.NDArray[np.int64]
+
+
+def points_of(trajectories: Sequence[Trajectory]) -> Points:
+    """The points of trajectories as arrays that loops over all of them take."""
+    sizes = [trajectory.time_s.size for trajectory in trajectories]
+    bounds = np.zeros(len(sizes) + 1, dtype=np.int64)
+    np.cumsum(sizes, out=bounds[1:])
+    top_v = np.full(int(bounds[-1]), np.nan)
+    for trajectory, first in zip(trajectories, bounds.tolist(), strict=False):
+        if trajectory.top_v is not None:
+            top_v[first : first + trajectory.top_v.size] = trajectory.top_v
+    return Points(
+        time_s=np.concatenate([np.empty(0), *(trajectory.time_s for trajectory in trajectories)]),
+        uv=np.concatenate([np.empty((0, 2)), *(trajectory.uv for trajectory in trajectories)]),
+        top_v=top_v,
+        bounds=bounds,
+    )
 
 
 def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:

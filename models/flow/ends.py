@@ -1,6 +1,7 @@
 """Where speeds and places together lead from several starts, and how sure that makes of a pose."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ HEADING_SD = math.radians(15.0)  # a knock's, before any track is seen
 REACH_RAD = math.radians(30.0)  # of the headings that are tried, both ways
 _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _ROUNDS = 2  # in which the speeds are asked again
+_ROUNDS_NEAR = 1  # where the heading is known by almost the same tracks
 _FAR_LOG_HEIGHT = 0.7  # from the speeds': twice as high, everybody walks where nobody was seen
 _UNLIKELY = 12.0  # of the log posterior, for the speeds to be asked no more
 _SHARED = 3  # parameters that speeds and places both determine
@@ -59,8 +61,11 @@ def ends_of(
     observations: Observations,
     prior: CameraPose,
     speed_reference: SpeedReference,
+    near: Sequence[Array] = (),
 ) -> list[End]:
     """The ends of climbs from several headings, and poses by speeds; the likeliest first.
+
+    Where it is known to be `near` some, as the ends of almost the same tracks, no others are tried.
 
     Args:
         walkers: who is asked where they walk.
@@ -70,6 +75,7 @@ def ends_of(
         observations: of all tracks, for the speeds to be asked again.
         prior: where the camera was.
         speed_reference: how people walk at the site.
+        near: candidates (4,) to climb from; several headings are tried unless they are given.
     """
     first = Posterior(
         walkers=walkers,
@@ -77,24 +83,36 @@ def ends_of(
         belief=_belief(joint, prior),
         variance_inflation=variance_inflation,
     )
-    peaks = register(first, _HEADINGS)
-    begin = [(peak, peak.value > peaks[0].value - _UNLIKELY) for peak in peaks]
-    for other in joint.others:
-        candidate = np.append(other, peaks[0].candidate[3])
-        begin.append((Peak(candidate=candidate, value=first.value(candidate)), True))
+    begin = [(Peak(candidate=candidate, value=-math.inf), _ROUNDS_NEAR) for candidate in near]
+    if not near:
+        begin = _from_afar(first, joint)
     ends = []
-    for start, likely in begin:
+    for start, rounds in begin:
         peak, posterior, score = start, first, 0.0
-        for _ in range(_ROUNDS if likely else 0):
-            near = joint_near(observations, prior, speed_reference, peak.candidate, joint.verticals)
-            posterior = replace(first, belief=_belief(near, prior))
-            score = near.score - joint.score
+        for _ in range(rounds):
+            told = joint_near(observations, prior, speed_reference, peak.candidate, joint)
+            posterior = replace(first, belief=_belief(told, prior))
+            score = told.score - joint.score
             peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
         ends.append(End(peak=peak, posterior=posterior, score=score))
     ends = not_far_above(ends, float(joint.values[2]))
     kept = distinct([end.peak for end in ends])
     return [next(end for end in ends if end.peak is peak) for peak in kept]
+
+
+def _from_afar(posterior: Posterior, joint: JointEstimate) -> list[tuple[Peak, int]]:
+    """The peaks of several headings and the poses by speeds, and how often these are asked again.
+
+    How fast people walk is asked of the likely ones only.
+    """
+    peaks = register(posterior, _HEADINGS)
+    best = peaks[0].value
+    begin = [(peak, _ROUNDS if peak.value > best - _UNLIKELY else 0) for peak in peaks]
+    for other in joint.others:
+        candidate = np.append(other, peaks[0].candidate[3])
+        begin.append((Peak(candidate=candidate, value=posterior.value(candidate)), _ROUNDS))
+    return begin
 
 
 def not_far_above(ends: list[End], log_height: float) -> list[End]:
@@ -146,7 +164,8 @@ def flatter(best: End, covariance: Array) -> Array:
     """
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])
-    turns = sd * np.linspace(-4, 4, 17)
+    # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
+    turns = sd * np.arange(-4.0, 5.0)
     values = np.array([best.posterior.value(best.candidate + turn * line) for turn in turns])
     density = np.exp(values - values.max())
     variance = float(density @ turns**2 / density.sum())

@@ -4,6 +4,7 @@ Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the map / va
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,8 +37,10 @@ from models.reasons import Reason, TracksCode
 _FEWEST_GROUPS = 5
 _EDGE_RAD = math.radians(2.0)
 _FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
+_NOT_FAR = 0.5  # of that: what is less is far from it, looked at roughly
 _BY_CHANCE = 0.01  # tilt and roll of a camera that stands are so far off in so many cases
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
+_NO_RIVAL = 1e-6  # and as unlikely as this, it has nothing to do with the covariance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +51,9 @@ class FusedEstimate:
     is what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
     off; None where the map had no part: then all is the joint estimate's and the heading the prior
     pose's.
-    `rivals` are headings (radians) of other poses that explain the tracks about as well.
+    `rivals` are headings (radians) of other poses that explain the tracks about as well. `ends`
+    (4,) are where the search ended, the best first: `raw`, and what may have to do with the
+    covariance. `fit` is the sum over walking groups of how well they fit the map at `raw`, in logs.
     """
 
     values: Array
@@ -57,6 +62,8 @@ class FusedEstimate:
     reason: Reason | None
     raw: Array | None = None
     rivals: tuple[float, ...] = ()
+    ends: tuple[Array, ...] = ()
+    fit: float = 0.0
 
     @property
     def registered(self) -> bool:
@@ -86,6 +93,7 @@ def fused_estimate(
     joint: JointEstimate,
     speed_reference: SpeedReference,
     reference: FlowReference,
+    near: Sequence[Array] = (),
 ) -> FusedEstimate:
     """The pose by speeds and places together.
 
@@ -100,13 +108,17 @@ def fused_estimate(
         joint: what the speeds say, the heading taken for the prior pose's.
         speed_reference: how people walk at the site.
         reference: where they do.
+        near: the `ends` (4,) of almost the same tracks, where it is known to be near them; else
+            poses all around are tried.
     """
     walkers = walkers_of(observations, np.append(joint.values, prior.heading_rad))
     if walkers.walking_groups < _FEWEST_GROUPS:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
     variance_inflation = reference.variance_inflation_for(walkers.people)
-    ends = ends_of(walkers, site, variance_inflation, joint, observations, prior, speed_reference)
+    ends = ends_of(
+        walkers, site, variance_inflation, joint, observations, prior, speed_reference, near
+    )
     best = ends[0]
     shape = shape_at(walkers, site, best.candidate)
     move = best.candidate - candidate_of(prior)
@@ -130,7 +142,7 @@ def fused_estimate(
     odds = odds_of(walkers, site, ends)
     covariance = covariance + elsewhere([end.peak for end in ends], odds)
     covariance = covariance + flatter(best, covariance)
-    covariance = covariance + _unrepeated(best.posterior, values, covariance)
+    covariance = covariance + _unrepeated(best.posterior, values, covariance, afar=not near)
     rivals = tuple(
         float(end.candidate[3])
         for end, against_best in zip(ends, odds, strict=True)
@@ -150,6 +162,12 @@ def fused_estimate(
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
+        ends=tuple(
+            end.candidate
+            for end, against_best in zip(ends, odds, strict=True)
+            if end is best or against_best > _NO_RIVAL
+        ),
+        fit=float(fits.sum()),
     )
 
 
@@ -198,11 +216,13 @@ def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
     return squared < chi_squared_above(_BY_CHANCE, 2)
 
 
-def _unrepeated(posterior: Posterior, values: Array, covariance: Array) -> Array:
+def _unrepeated(posterior: Posterior, values: Array, covariance: Array, *, afar: bool) -> Array:
     """What is added to the covariance (4, 4) where halves of the people tell other headings."""
     variance = float(covariance[3, 3])
     line = covariance[:, 3] / variance
-    by_halves = variance_of_halves(posterior, values, line)
+    by_halves = variance_of_halves(posterior, values, line, afar=afar)
+    if not afar and by_halves > _NOT_FAR * _FAR_APART * variance:
+        by_halves = variance_of_halves(posterior, values, line)
     if by_halves < _FAR_APART * variance:
         return np.zeros((4, 4))
     return (by_halves - variance) * np.outer(line, line)

@@ -7,10 +7,11 @@ import numpy as np
 from models.estimation.joint.observations import steps_where
 from models.flow.likelihood import Walkers
 from models.flow.map.placement import place_steps
-from models.flow.registration import Posterior, Site
+from models.flow.registration import CONVERGED, Posterior, Site
 from models.geometry.rotation import Array, Mask
 
 _AWAY = np.radians(4.0)  # from where a heading was found, both ways, it must be found again
+_ABOUT = 0.03  # of the log posterior: a quarter of a standard deviation
 _MOST = 0.5  # of the people must walk where the reference did see
 
 
@@ -27,16 +28,21 @@ def on_known_ground(walkers: Walkers, site: Site, candidate: Array) -> bool:
     return known_share(walkers, site, candidate) >= _MOST
 
 
-def variance_of_halves(posterior: Posterior, candidate: Array, line: Array) -> float:
+def variance_of_halves(
+    posterior: Posterior, candidate: Array, line: Array, *, afar: bool = True
+) -> float:
     """The variance of a heading by how far two halves of the walking groups find it apart.
 
     Each half begins 4 deg to another side of a candidate (4,), the other parameters following along
     a line (4,): whether it is found from elsewhere, and whether it hangs on a few people, is seen.
-    It is of one degree of freedom: for telling that something is wrong, not for an interval.
+    Not `afar` both begin at the candidate and go about as far as they would, for people of whom
+    most were asked from elsewhere before. It is of one degree of freedom: for telling that
+    something is wrong, and not for an interval.
     """
+    sides, least_gain = ((_AWAY, -_AWAY), CONVERGED) if afar else ((0.0, 0.0), _ABOUT)
     ends = [
-        replace(posterior, walkers=half).climbed(candidate + away * line).candidate[3]
-        for half, away in zip(_halves(posterior.walkers), (_AWAY, -_AWAY), strict=True)
+        replace(posterior, walkers=half).climbed(candidate + away * line, least_gain).candidate[3]
+        for half, away in zip(_halves(posterior.walkers), sides, strict=True)
     ]
     return float((ends[0] - ends[1]) / 2) ** 2
 

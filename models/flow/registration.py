@@ -21,7 +21,7 @@ _HOPELESS = 40.0  # of the log posterior: a start so far below another ends belo
 _LONGEST_MOVE = 0.05
 _MOST_ROUNDS = 25
 _SETTLING_ROUNDS = 4
-_CONVERGED = 1e-3  # of the log likelihood
+CONVERGED = 1e-3  # of the log likelihood
 _SHORTEST_SHARE = 1e-3
 _SAME_END = np.radians(0.3)
 _DIFFERENCE = np.radians(0.6)
@@ -104,8 +104,8 @@ class Posterior:
         chance = float(self.site.track_log_likelihoods(self.walkers, candidate).sum())
         return chance / self.variance_inflation + self.belief.log_density(candidate)
 
-    def climbed(self, candidate: Array) -> Peak:
-        """The peak above a candidate (4,)."""
+    def climbed(self, candidate: Array, least_gain: float = CONVERGED) -> Peak:
+        """The peak above a candidate (4,), up to a gain that is not worth a step."""
         value, found = self._asked(candidate)
         for _ in range(_MOST_ROUNDS):
             believed = self.belief.precision @ (candidate - self.belief.mean)
@@ -121,7 +121,7 @@ class Posterior:
             if gain <= 0:
                 break
             candidate, value, found = candidate + 2 * share * move, new_value, new_found
-            if gain < _CONVERGED:
+            if gain < least_gain:
                 break
         return Peak(candidate=candidate, value=value)
 
@@ -194,13 +194,18 @@ def settled(
 
 def shape_at(walkers: Walkers, site: Site, candidate: Array) -> Shape:
     """What a map says around a candidate (4,)."""
+    scores = site.scores(walkers, candidate, candidate)
     return Shape(
-        curvature=curvature_of(walkers, site, candidate),
-        noise=noise_of(walkers, site.scores(walkers, candidate, candidate)),
+        curvature=_curvature(walkers, site, candidate, scores), noise=noise_of(walkers, scores)
     )
 
 
 def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
+    """How the log likelihood bends (4, 4) around a candidate (4,)."""
+    return _curvature(walkers, site, candidate, site.scores(walkers, candidate, candidate))
+
+
+def _curvature(walkers: Walkers, site: Site, candidate: Array, scores: Array) -> Array:
     """Minus the second derivative (4, 4) of the log likelihood, by differences of its slope.
 
     Where it bends less than the scores scatter, halfway between what is found in each direction
@@ -212,7 +217,7 @@ def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
         for step in _DIFFERENCE * np.eye(4)
     ]
     bent = np.array(slopes) / (2 * _DIFFERENCE)
-    scatter = _scatter(site.scores(walkers, candidate, candidate))
+    scatter = _scatter(scores)
     lower = np.linalg.cholesky(scatter + (1e-6 + 1e-6 * np.trace(scatter)) * np.eye(4))
     back = np.linalg.inv(lower)
     ratio, axes = np.linalg.eigh(back @ (bent + bent.T) / 2 @ back.T)

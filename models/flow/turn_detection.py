@@ -46,7 +46,8 @@ class StillScores:
 
     def squares(self, scores: Array) -> Array:
         """What is compared with `level`, (W, 4): of the newest 8, 9, ... of groups (P, 4)."""
-        return _squares(scores, self.mean, self.covariance, self.bent, self.walking_groups)
+        along = _directions(self.covariance, self.bent)
+        return _squares(scores, self.mean, *along, self.walking_groups)
 
     @property
     def information_of_a_group(self) -> Array:
@@ -103,13 +104,15 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
     """
     count = len(scores)
     covariance = np.cov(scores.T)
+    directions, variance = _directions(covariance, bent)
     rng = np.random.default_rng(seed)
     statistics = np.empty(_DRAWS)
     for draw in range(_DRAWS):
         drawn_mean = scores[rng.integers(0, count, count)].mean(axis=0)
         starts = rng.integers(0, count, -(-_MOST // _BLOCK))
         window = (starts[:, None] + np.arange(_BLOCK)).ravel() % count
-        statistics[draw] = _squares(scores[window], drawn_mean, covariance, bent, count).max()
+        squares = _squares(scores[window], drawn_mean, directions, variance, count)
+        statistics[draw] = squares.max()
     passed = np.quantile(statistics, 1 - _BODY)
     alone = 2 * chance_below(-float(np.sqrt(passed)), count - 1)
     return StillScores(
@@ -146,10 +149,9 @@ def moved_within(
 
 
 def _squares(
-    scores: Array, mean: Array, covariance: Array, bent: Array, walking_groups: float
+    scores: Array, mean: Array, directions: Array, variance: Array, walking_groups: float
 ) -> Array:
     """Squared standard scores (W, 4) of the newest 8, 9, ... groups' means, for each parameter."""
-    directions, variance = _directions(covariance, bent)
     along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
     count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
     # The map is wrong by as much as its own walking groups' mean is.

@@ -11,7 +11,8 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.geometry.upright import statures
-from models.trajectory import Trajectory
+from models.people.at_ends import points_at_ends
+from models.trajectory import Points, Trajectory, points_of
 
 _SPAN_S = 1.5  # longer than a stride
 _MOST_POINTS = 8  # of an end: more of them say the same again
@@ -42,38 +43,16 @@ def ends_of(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> tuple[Ends, Ends]:
     """The first and the last ends of tracks, one at least, as a camera at a pose places them."""
-    return tuple(  # type: ignore[return-value]
-        _ends(trajectories, [_at_end(t.time_s, last) for t in trajectories], intrinsics, pose, last)
-        for last in (False, True)
-    )
+    points = points_of(trajectories)
+    heads, tails = (_ends(points, last, intrinsics, pose) for last in (False, True))
+    return heads, tails
 
 
-def _at_end(time_s: Array, last: bool) -> npt.NDArray[np.int64]:
-    """Some indices of the points within a time of an end, that end's own among them."""
-    usual_s = (time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)
-    reach_s = max(_SPAN_S, 2.2 * usual_s)
-    if last:
-        first = int(np.searchsorted(time_s, time_s[-1] - reach_s))
-        stride = -(-(time_s.size - first) // _MOST_POINTS)
-        return np.arange(time_s.size - 1, first - 1, -stride)[::-1]
-    behind = int(np.searchsorted(time_s, time_s[0] + reach_s, side="right"))
-    return np.arange(0, behind, -(-behind // _MOST_POINTS))
-
-
-def _ends(
-    trajectories: Sequence[Trajectory],
-    chosen: list[npt.NDArray[np.int64]],
-    intrinsics: Intrinsics,
-    pose: CameraPose,
-    last: bool,
-) -> Ends:
-    count = len(trajectories)
-    owner = np.repeat(np.arange(count), [indices.size for indices in chosen])
-    at = -1 if last else 0
-    end_s = np.array([t.time_s[at] for t in trajectories])
-    since_s = np.concatenate([t.time_s[i] for t, i in zip(trajectories, chosen, strict=True)])
-    since_s = since_s - end_s[owner]
-    uv = np.concatenate([t.uv[i] for t, i in zip(trajectories, chosen, strict=True)])
+def _ends(points: Points, last: bool, intrinsics: Intrinsics, pose: CameraPose) -> Ends:
+    chosen, owner = points_at_ends(points.time_s, points.bounds, last, _SPAN_S, _MOST_POINTS)
+    at = points.bounds[1:] - 1 if last else points.bounds[:-1]
+    count, end_s, uv = at.size, points.time_s[at], points.uv[chosen]
+    since_s = points.time_s[chosen] - end_s[owner]
     ground, seen = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, uv)
     ground = np.where(seen[:, None], ground, 0.0)
     number = np.bincount(owner, seen, count)
@@ -83,7 +62,7 @@ def _ends(
     moment = np.bincount(owner, apart_s**2, count)
     middle = _sums(owner, ground, count) / enough[:, None]
     velocity = _sums(owner, apart_s[:, None] * ground, count) / np.maximum(moment, 1e-9)[:, None]
-    noise, on_ground = _noise(np.array([t.uv[at] for t in trajectories]), intrinsics, pose)
+    noise, on_ground = _noise(points.uv[at], intrinsics, pose)
     valid = (number >= 2) & (number == np.bincount(owner, minlength=count)) & on_ground
     return Ends(
         time_s=end_s,
@@ -91,7 +70,7 @@ def _ends(
         velocity=np.where(valid[:, None], velocity, 0.0),
         noise=np.where(valid[:, None, None], noise, 0.0),
         span_s=np.sqrt(12 * moment / enough),  # of evenly spread times
-        log_tall=_log_tall(trajectories, chosen, intrinsics, pose),
+        log_tall=_log_tall(uv, points.top_v[chosen], owner, count, intrinsics, pose),
         valid=valid,
     )
 
@@ -109,29 +88,23 @@ def _noise(uv: Array, intrinsics: Intrinsics, pose: CameraPose) -> tuple[Array, 
 
 
 def _log_tall(
-    trajectories: Sequence[Trajectory],
-    chosen: list[npt.NDArray[np.int64]],
+    uv: Array,
+    top_v: Array,
+    owner: npt.NDArray[np.int64],
+    count: int,
     intrinsics: Intrinsics,
     pose: CameraPose,
 ) -> Array:
-    """Logs of statures (N,) at ends, NaN where there are no boxes."""
-    boxed = [n for n, t in enumerate(trajectories) if t.top_v is not None]
-    tall = np.full(len(trajectories), np.nan)
-    if not boxed:
+    """Logs of statures (N,) by the points of N ends, NaN where there are no boxes."""
+    tall = np.full(count, np.nan)
+    boxed = np.flatnonzero(np.isfinite(top_v))
+    if not boxed.size:
         return tall
-    owner = np.repeat(np.arange(len(boxed)), [chosen[n].size for n in boxed])
-    uv = np.concatenate([trajectories[n].uv[chosen[n]] for n in boxed])
-    top_v = np.concatenate([_tops(trajectories[n])[chosen[n]] for n in boxed])
-    tall_m, known = statures(intrinsics, pose.rotation, pose.height_m, uv, top_v)
-    number = np.bincount(owner, known, len(boxed))
-    total = np.bincount(owner, np.where(known, np.log(np.where(known, tall_m, 1.0)), 0.0))
-    tall[boxed] = np.where(number > 0, total / np.maximum(number, 1), np.nan)
-    return tall
-
-
-def _tops(trajectory: Trajectory) -> Array:
-    assert trajectory.top_v is not None
-    return trajectory.top_v
+    tall_m, known = statures(intrinsics, pose.rotation, pose.height_m, uv[boxed], top_v[boxed])
+    number = np.bincount(owner[boxed], known, count)
+    logs = np.where(known, np.log(np.where(known, tall_m, 1.0)), 0.0)
+    total = np.bincount(owner[boxed], logs, count)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
 def _sums(owner: npt.NDArray[np.int64], values: Array, count: int) -> Array:

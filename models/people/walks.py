@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.estimation.joint.observations import Observations
-from models.estimation.joint.observations import observe as observe_each
+from models.estimation.joint.observing import observe as observe_each
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.people.linking import link_pieces, walks_of
@@ -45,7 +45,10 @@ class Walks:
 
 
 def observe_walks(
-    trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
+    trajectories: Sequence[Trajectory],
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    before: npt.NDArray[np.int64] | None = None,
 ) -> Walks:
     """What is read of tracks, each walk once.
 
@@ -55,8 +58,11 @@ def observe_walks(
         trajectories: in the order of their ends.
         intrinsics: of the camera.
         pose: about where it stands, its prior pose.
+        before: what `link_pieces` says of them, where that is known by now.
     """
-    walk_idx = _last_pieces(trajectories, link_pieces(trajectories, intrinsics, pose))
+    if before is None:
+        before = link_pieces(trajectories, intrinsics, pose)
+    walk_idx = _last_pieces(trajectories, before)
     walks = _walks(trajectories, walk_idx)
     observations = replace(
         observe_each(walks, intrinsics),

@@ -10,7 +10,7 @@ from models.drift.verdict import Drift, DriftLimits
 from models.estimation.joint.observations import Observations
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.people.linking import count_walks
+from models.people.linking import count_walks, link_pieces
 from models.people.walks import Walks, observe, observe_walks
 from models.recalibration.alarms import AlarmRate, read_alarm_chart
 from models.recalibration.anchoring import begin_creep_log, log_creep, without_creep
@@ -44,6 +44,7 @@ __all__ = [
     "drift_of",
     "estimate_pose",
     "learn_site",
+    "link_pieces",
     "log_creep",
     "observe",
     "observe_walks",

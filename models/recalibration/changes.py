@@ -5,26 +5,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.drift.change_point import find_change
+from models.drift.change_point import find_change, suspicion
 from models.drift.confirmation import moved_beyond_doubt
-from models.estimation.joint.estimate import JointEstimate, joint_estimate
+from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
 from models.flow.after_change import widened
 from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
 from models.flow.likelihood import walkers_of
 from models.flow.turn_detection import moved_within
+from models.recalibration.doubts import (
+    FullSearch,
+    Known,
+    Posed,
+    begins_at,
+    fit_of,
+    is_as_known,
+    is_calm,
+)
 from models.recalibration.site import CameraSite
 
 _SUSPECT_RATE = 0.01  # of windows of a camera that stands are looked at twice
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Posed:
-    """The pose of some tracks: `joint` by speeds alone, `fused` by places too."""
-
-    joint: JointEstimate
-    fused: FusedEstimate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,28 +33,40 @@ class Searched:
     """What a window comes to: the tracks from the newest change on, and their pose.
 
     `change_idx` is the first track after the change; None where there was none. `first` is the
-    first that ended with it or later: `tracks` are from there on.
+    first that ended with it or later: `tracks` are from there on. `full` is the newest search of
+    all poses and changes in which nothing was suspected; None where this one suspects something.
     """
 
     change_idx: int | None
     first: int
     tracks: Observations
     posed: Posed
+    full: FullSearch | None = None
 
 
-def posed(tracks: Observations, site: CameraSite) -> Posed:
-    """The pose of tracks that are of one: by speeds, and by places where these are known."""
-    joint = joint_estimate(tracks, site.prior, site.speed_reference)
+def posed(tracks: Observations, site: CameraSite, near: Posed | None = None) -> Posed:
+    """The pose of tracks that are of one: by speeds, and by places where these are known.
+
+    Where it is known to be `near` that of almost the same tracks, others are not looked at.
+    """
+    at = None if near is None else near.joint
+    joint = joint_estimate(tracks, site.prior, site.speed_reference, at)
     if site.flow is None:
         fused = by_speeds_alone(joint, site.prior)
     else:
         fused = fused_estimate(
-            tracks, site.intrinsics, site.prior, joint, site.speed_reference, site.flow
+            tracks,
+            site.intrinsics,
+            site.prior,
+            joint,
+            site.speed_reference,
+            site.flow,
+            () if near is None else near.fused.ends,
         )
     return Posed(joint=joint, fused=fused)
 
 
-def search_change(tracks: Observations, site: CameraSite) -> Searched:
+def search_change(tracks: Observations, site: CameraSite, known: Known | None = None) -> Searched:
     """The newest change of the camera that is beyond doubt, and the pose from there on.
 
     Where people walk another way than before, or elsewhere, a window is suspected; it is cut
@@ -62,12 +75,20 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
     Args:
         tracks: of the window, in the order of their ends.
         site: how people walk, and where, if that is known.
+        known: the pose of almost the same tracks: where nothing speaks against it, no others are
+            looked at, and no change is looked for.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
+    if known is not None and begins_at(known, tracks):
+        found = _still_there(tracks, site, known)
+        if found is not None:
+            return found
     whole = posed(tracks, site)
+    suspected = False
     for change_idx in _suspected(tracks, site, whole.fused):
+        suspected = True
         first, parts = _parted(tracks, change_idx)
         if parts is None:
             continue
@@ -88,7 +109,33 @@ def search_change(tracks: Observations, site: CameraSite) -> Searched:
                 tracks=parts[1],
                 posed=replace(after, fused=fused),
             )
-    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole)
+    full = None
+    if not suspected and tracks.tracks:
+        full = FullSearch(
+            ended_s=tracks.ended_s,
+            suspicion=_suspicion(tracks, site, whole),
+            fit=fit_of(whole),
+        )
+    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole, full=full)
+
+
+def _still_there(tracks: Observations, site: CameraSite, known: Known) -> Searched | None:
+    """What tracks come to at the known pose; None where anything speaks against it."""
+    found = posed(tracks, site, known.posed)
+    if not is_as_known(found, known) or _turned(tracks, site, found.fused) is not None:
+        return None
+    full, suspected = known.search, _suspicion(tracks, site, found)
+    if not is_calm(suspected, known):
+        if _hurried(tracks, site, found.fused) is not None:
+            return None
+        full = replace(full, suspicion=suspected)
+    return Searched(change_idx=None, first=0, tracks=tracks, posed=found, full=full)
+
+
+def _suspicion(tracks: Observations, site: CameraSite, whole: Posed) -> float:
+    """How much better two poses explain the speeds than one, where the camera looks by now."""
+    turned = replace(site.prior, heading_rad=whole.fused.parameters.heading_rad)
+    return suspicion(tracks, turned, site.speed_reference, whole.joint.raw)
 
 
 def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
@@ -97,16 +144,26 @@ def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> 
     Both are asked where the camera stands by all tracks together. Asked at the prior pose, a
     camera that moved long ago seems to move with every change of the crowd.
     """
-    turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
-    found = find_change(tracks, turned, site.speed_reference)
-    if found is not None:
-        yield found.track_idx
-    if site.flow is not None:
-        at = whole.values
-        paths = site.flow.site(site.intrinsics)
-        moved = moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _SUSPECT_RATE)
+    for look in (_hurried, _turned):
+        moved = look(tracks, site, whole)
         if moved is not None:
             yield moved
+
+
+def _hurried(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+    """Where the camera may have moved by speeds; None where it did not."""
+    turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
+    found = find_change(tracks, turned, site.speed_reference)
+    return None if found is None else found.track_idx
+
+
+def _turned(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+    """Where the camera may have moved by places; None where it did not, or they are unknown."""
+    if site.flow is None:
+        return None
+    at = whole.values
+    paths = site.flow.site(site.intrinsics)
+    return moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _SUSPECT_RATE)
 
 
 def _parted(

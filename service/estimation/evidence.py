@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+import numpy.typing as npt
 from sqlalchemy.orm import Session
 
 from models.drift.verdict import DriftLimits
@@ -47,7 +49,8 @@ class Evidence:
     `site` is the learned reference as bytes; None while it is being learned. So are `flow`, `chart`
     and `anchor`; None where there is none. `predictions` has what the model in use says of the
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
-    `drifting` says that an alert tells of a drift by now.
+    `drifting` says that an alert tells of a drift by now. `before` is the piece before each of the
+    tracks of a walk, as of `link_pieces`; None where nobody has looked yet.
     """
 
     camera_id: str
@@ -66,6 +69,7 @@ class Evidence:
     drifting: bool
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
+    before: npt.NDArray[np.int64] | None = None
 
 
 def load_evidence(
@@ -83,13 +87,15 @@ def load_evidence(
     intrinsics = intrinsics_of(camera)
     prior = pose_of_prior(cameras.prior_pose(session, camera_id))
     bounds = window_of(session, reference, settings)
-    records = until_so_many(
+    gathered = until_so_many(
         lambda limit: windows.window(session, replace(bounds, tracks=limit)),
         bounds.tracks,
         intrinsics,
         prior,
         unpacked,
-    ).records
+        newest=True,
+    )
+    records = gathered.records
     model = trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
@@ -125,6 +131,7 @@ def load_evidence(
         drifting=bool(fired_by_estimate(session, camera_id) & {AlertKind.DRIFT, AlertKind.CLOCK}),
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
+        before=gathered.before,
     )
 
 

@@ -36,6 +36,7 @@ from models.recalibration import (
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.lacks import Lacks
+from service.estimation.recent import Recent
 from service.reasons import Reasons
 from service.store.tables.tracks import PredictionRecord
 from service.windows.people import MOST_PIECES
@@ -70,10 +71,17 @@ class Finding:
         return max(track.pk for track in self.tracks)
 
 
-def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
-    """The pose by all estimators, from the newest change on; None where too few people walk."""
+def compute_finding(evidence: Evidence, seed: int, recent: Recent | None = None) -> Finding | None:
+    """The pose by all estimators, from the newest change on; None where too few people walk.
+
+    It begins at what was found of the camera in `recent`, if that may be, and is kept there.
+    """
+    recent = recent or Recent()
     walks = observe_walks(
-        [track.trajectory for track in evidence.tracks], evidence.intrinsics, evidence.prior
+        [track.trajectory for track in evidence.tracks],
+        evidence.intrinsics,
+        evidence.prior,
+        evidence.before,
     )
     observed = walks.observations
     if observed.walkers < FEWEST_WALKERS:
@@ -83,17 +91,19 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     creep = lacks.unless_failed(
         "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)
     )
-    if creep is not None and creep.moved and evidence.anchor is not None:
+    crept = creep is not None and creep.moved and evidence.anchor is not None
+    if crept and evidence.anchor is not None:
         first = lacks.unless_failed("anchor", partial(first_site, site, evidence.anchor))
         site = first or site
     judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
-    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None)
+    reading = _read(evidence, observed, site, 0, lacks)
+    suspicious = reading is not None and reading.suspicious
+    last = recent.last(evidence, crept=crept, suspicious=suspicious)
+    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None, last)
+    recent.keep(evidence, found, crept=crept, suspicious=suspicious)
     lacks.take(found.lacks)
-    reading = None
-    if site.chart is not None:
-        reading = lacks.unless_failed(
-            "chart", partial(_read, evidence, observed, site, found.first)
-        )
+    if found.first:
+        reading = _read(evidence, observed, site, found.first, lacks)
     seen = evidence.tracks[found.first :]
     used = {track.pk for track in seen}
     predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
@@ -137,9 +147,11 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
 
 
 def _read(
-    evidence: Evidence, observed: Observations, site: CameraSite, first: int
+    evidence: Evidence, observed: Observations, site: CameraSite, first: int, lacks: Lacks
 ) -> Reading | None:
     """What the chart says; once a person has said how the camera stands, it begins anew."""
+    if site.chart is None:
+        return None
     rate = AlarmRate(
         alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
@@ -147,7 +159,8 @@ def _read(
         calm_groups=evidence.limits.people,
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
-    return read_alarm_chart(observed, site, rate, counted=unanswered, first=first)
+    read = partial(read_alarm_chart, observed, site, rate, counted=unanswered, first=first)
+    return lacks.unless_failed("chart", read)
 
 
 def asked_enough(evidence: Evidence) -> bool:

@@ -3,6 +3,7 @@
 import threading
 from dataclasses import dataclass, field
 
+from service.estimation.recent import Recent
 from service.job_queue import JobQueue
 from service.jobs.growth_rests import GrowthRests
 from service.jobs.in_hand import InHand
@@ -22,5 +23,6 @@ class JobContext:
     stopping: threading.Event = field(default_factory=threading.Event)
     in_hand: InHand = field(default_factory=InHand)
     growth_rests: GrowthRests = field(default_factory=GrowthRests)
+    recent: Recent = field(default_factory=Recent)
     steps: StepWatch = field(default_factory=StepWatch)
     reconciled: Rota = field(default_factory=Rota)

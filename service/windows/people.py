@@ -3,21 +3,29 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.recalibration import count_walks
+from models.recalibration import link_pieces
 from service.store.tables.tracks import TrackRecord
 from service.windows.unpacked import Unpacked
 
+_SPARE = 40
 MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked for an estimate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gathered:
-    """Tracks, and whether there are `enough`: of as many people as were wanted."""
+    """Tracks, and whether there are `enough`: of as many people as were wanted.
+
+    `before` is the piece before each of a walk, as of `link_pieces`; None where nobody looked.
+    """
 
     records: Sequence[TrackRecord]
     enough: bool
+    before: npt.NDArray[np.int64] | None = None
 
 
 def until_so_many(
@@ -26,6 +34,8 @@ def until_so_many(
     intrinsics: Intrinsics,
     prior: CameraPose,
     unpacked: Unpacked,
+    *,
+    newest: bool = False,
 ) -> Gathered:
     """The fewest tracks that are of so many people; all that there are where these are too few.
 
@@ -38,15 +48,22 @@ def until_so_many(
         intrinsics: of the camera.
         prior: about where it stands.
         unpacked: what was unpacked already, and will be.
+        newest: whether the newest are loaded, which are the last in order; or the first.
     """
     limit, most = wanted, MOST_PIECES * wanted
+    loaded = limit + max(limit // _SPARE, 1)  # most trackers cut few walks: once is enough
+    every = load(loaded)
     while True:
-        records = load(limit)
-        if len(records) < limit:
-            return Gathered(records=records, enough=False)
-        walks = count_walks(
+        if limit > loaded:
+            loaded = limit
+            every = load(loaded)
+        if len(every) < limit:
+            return Gathered(records=every, enough=False)
+        records = every[-limit:] if newest else every[:limit]
+        before = link_pieces(
             [unpacked.seen(record, intrinsics) for record in records], intrinsics, prior
         )
+        walks = int((before < 0).sum())
         if walks >= wanted or limit == most:
-            return Gathered(records=records, enough=True)
+            return Gathered(records=records, enough=True, before=before)
         limit = min(limit + wanted - walks, most)

@@ -16,7 +16,7 @@ class Unpacked:
 
     def __init__(self) -> None:
         self._feet: dict[_Track, Trajectory] = {}
-        self._seen: dict[tuple[_Track, Intrinsics], Trajectory] = {}
+        self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
 
     def feet(self, record: TrackRecord) -> Trajectory:
         """The foot points of a stored track."""
@@ -27,7 +27,9 @@ class Unpacked:
 
     def seen(self, record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
         """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
-        track = ((record.id, record.received_at), intrinsics)
-        if track not in self._seen:
-            self._seen[track] = seen_of(record, self.feet(record), intrinsics)
-        return self._seen[track]
+        track = (record.id, record.received_at)
+        lens, seen = self._seen.get(track, (None, None))
+        if seen is None or (lens is not intrinsics and lens != intrinsics):
+            seen = seen_of(record, self.feet(record), intrinsics)
+            self._seen[track] = (intrinsics, seen)
+        return seen

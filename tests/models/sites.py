@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.joint.observations import Observations, observe
+from models.estimation.joint.observations import Observations
+from models.estimation.joint.observing import observe
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.knocked import Knock

@@ -12,7 +12,7 @@ import numpy as np
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from models.estimation.joint.observations import observe
+from models.estimation.joint.observing import observe
 from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.pose import CameraPose

@@ -51,6 +51,7 @@ class JointEstimate:
     independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other
     poses (3,) that explain the tracks, if not as well. `verticals` is what their heads say, which
     is part of `values`, and `by_speeds` what was said without them; None where they tell nothing.
+    `means` are the coefficients of the fields there.
     """
 
     values: Array
@@ -65,11 +66,18 @@ class JointEstimate:
     others: tuple[Array, ...] = ()
     verticals: VerticalEstimate | None = None
     by_speeds: PlaneEstimate | None = None
+    means: tuple[Array, ...] = ()
 
     @property
     def raw_parameters(self) -> PoseParameters:
         """What `raw` is, named; it knows no heading."""
         return PoseParameters.of_array(self.raw)
+
+    @property
+    def ends(self) -> tuple[Array, ...]:
+        """Where the search ended (3,) that explains the tracks, the best first; as `raw`."""
+        offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
+        return self.raw, *(other + offset for other in self.others)
 
     def beside_strangers(self) -> tuple[Array, Array]:
         """Values (3,) and covariance (3, 3) of people who are not the reference's.
@@ -83,15 +91,25 @@ class JointEstimate:
 
 
 def joint_estimate(
-    observations: Observations, prior: CameraPose, reference: SpeedReference
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: JointEstimate | None = None,
 ) -> JointEstimate:
-    """The pose that explains all tracks best, whatever it was before."""
+    """The pose that explains all tracks best, whatever it was before.
+
+    Where it is known to be `near` one of the ends of an estimate of almost the same tracks, no
+    other poses are looked at.
+    """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
-    few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-    begin = starts(few, plane_parameters_of(prior), _STARTS)
-    first = _distinct([fit_pose(few, start, hold) for start in begin])
-    ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    if near is None:
+        few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
+        begin = starts(few, plane_parameters_of(prior), _STARTS)
+        first = _distinct([fit_pose(few, start, hold) for start in begin])
+        ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    else:
+        ends = _distinct([fit_pose(channels, start, hold, near.means) for start in near.ends])
     verticals = vertical_estimate(observations.uprights, reference.verticals)
     return _said_of(observations, channels, ends, reference, verticals)
 
@@ -101,16 +119,17 @@ def joint_near(
     prior: CameraPose,
     reference: SpeedReference,
     candidate: Array,
-    verticals: VerticalEstimate | None = None,
+    joint: JointEstimate | None = None,
 ) -> JointEstimate:
     """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
 
     How fast people are where, and which way, is another question once a camera has been panned.
     What their heads say, the joint estimate's `verticals`, is not.
     """
+    verticals, means = (None, ()) if joint is None else (joint.verticals, joint.means)
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
-    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior))
+    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior), means)
     return _said_of(observations, channels, [fit], reference, verticals)
 
 
@@ -169,6 +188,7 @@ def _said_of(
         ),
         verticals=verticals,
         by_speeds=by_speeds,
+        means=best.means,
     )
 
 

@@ -7,7 +7,7 @@ shorter; groups are the connected components of such pairs.
 import numpy as np
 import numpy.typing as npt
 
-from models.estimation.joint.loops.pairs import pairs_beside
+from models.estimation.joint.loops.pairs import firsts_of_joined, pairs_beside
 from models.estimation.joint.measures import Measured
 from models.geometry.rotation import Array
 
@@ -59,13 +59,7 @@ def walking_groups_of(
 
 def first_joined(pairs: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
     """The first track (owners,) of all that pairs (K, 2) join each to."""
-    from scipy.sparse import coo_array  # late: the HTTP process has no use for it
-    from scipy.sparse.csgraph import connected_components
-
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(owners, owners))
-    _, group_idx = connected_components(links, directed=False)
-    _, firsts = np.unique(group_idx, return_index=True)
-    return np.asarray(firsts[group_idx])
+    return firsts_of_joined(np.ascontiguousarray(pairs, dtype=np.int64), owners)
 
 
 def _sampled(

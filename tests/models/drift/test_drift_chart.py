@@ -22,7 +22,8 @@ from models.drift.chart_packing import chart_from_bytes, chart_to_bytes
 from models.drift.clock import may_be_clock
 from models.drift.group_scores import SCORES, GroupScores, Usual, score_groups
 from models.errors import CheckpointError
-from models.estimation.joint.observations import observe, of_tracks
+from models.estimation.joint.observations import of_tracks
+from models.estimation.joint.observing import observe
 from models.estimation.joint.reference import learn_speed_reference
 from models.flow.folds import fold_maps
 from models.flow.reference import candidate_of, learn_flow

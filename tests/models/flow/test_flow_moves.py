@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import observe
+from models.estimation.joint.observing import observe
 from models.estimation.joint.reference import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import walkers_of

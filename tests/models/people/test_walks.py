@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.estimation.joint.observations import check_in_time
-from models.estimation.joint.observations import observe as observe_each
+from models.estimation.joint.observing import observe as observe_each
 from models.people.walks import observe, observe_walks
 from models.reasons import Reason, TracksCode
 from models.trajectory import by_end

@@ -1,4 +1,4 @@
-"""Pairs of people who are beside one another at the same time."""
+"""Pairs of people who are beside one another at the same time, and all whom pairs join."""
 
 import numpy as np
 import numpy.typing as npt
@@ -39,3 +39,23 @@ def pairs_beside(
     for k, (first, second) in enumerate(found):
         pairs[k, 0], pairs[k, 1] = first, second
     return pairs
+
+
+@compiled
+def firsts_of_joined(pairs: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+    """The first (count,) of all that pairs (K, 2) join each to, itself where none does.
+
+    Source: Galler and Fisher 1964, trees of which each is known by its root; here the least of it.
+    """
+    firsts = np.arange(count)
+    for number in range(len(pairs)):
+        one, other = pairs[number, 0], pairs[number, 1]
+        while firsts[one] != one:
+            one = firsts[one]
+        while firsts[other] != other:
+            other = firsts[other]
+        firsts[max(one, other)] = min(one, other)
+    for member in range(count):
+        # Its parent comes before it, and knows its first by now.
+        firsts[member] = firsts[firsts[member]]
+    return firsts

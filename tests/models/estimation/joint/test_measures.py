@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
-from models.estimation.joint.observations import observe, of_tracks
+from models.estimation.joint.observations import of_tracks
+from models.estimation.joint.observing import observe
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics

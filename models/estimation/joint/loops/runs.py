@@ -1,0 +1,154 @@
+"""Runs of points without a gap, and nodes along them, smoothed by local straight lines.
+
+The points of N tracks stand one track after the other: track n has those from `bounds[n]` on, up to
+`bounds[n + 1]`. Source of the smoothing: Cleveland 1979.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.compiled import compiled
+from models.geometry.rotation import Array, Mask
+
+_USUAL_GAPS = 2.5  # of a track's usual interval between points is no gap yet
+_LEAST_TOTAL, _LEAST_SPREAD = 1e-12, 1e-9
+_LEAST_WEIGHED = 2  # points that make a line
+
+
+@compiled
+def runs_of_tracks(
+    time_s: Array,
+    inside: Mask,
+    bounds: npt.NDArray[np.int64],
+    longest_gap_s: float,
+    fewest_points: int,
+) -> npt.NDArray[np.int64]:
+    """Runs (R, 3) of points inside the image without a gap: the track, the first, one beyond.
+
+    Args:
+        time_s: of all points (T,).
+        inside: which of them are in the image (T,).
+        bounds: of the tracks (N + 1,).
+        longest_gap_s: what is no longer is no gap, however dense the points are.
+        fewest_points: of a run.
+    """
+    found = []
+    for track in range(bounds.size - 1):
+        first, beyond = bounds[track], bounds[track + 1]
+        gap_s = longest_gap_s
+        if beyond - first > 1:
+            usual_s = float(np.median(np.diff(time_s[first:beyond])))
+            gap_s = max(_USUAL_GAPS * usual_s, longest_gap_s)
+        begin = first
+        for j in range(first + 1, beyond + 1):
+            if j < beyond and inside[j] and inside[j - 1] and time_s[j] - time_s[j - 1] <= gap_s:
+                continue
+            if j - begin >= fewest_points and inside[begin]:
+                found.append((track, begin, j))
+            begin = j
+    runs = np.empty((len(found), 3), dtype=np.int64)
+    for number, (track, begin, beyond) in enumerate(found):
+        runs[number, 0], runs[number, 1], runs[number, 2] = track, begin, beyond
+    return runs
+
+
+@compiled
+def nodes_of_runs(
+    time_s: Array,
+    uv: Array,
+    top_v: Array,
+    runs: npt.NDArray[np.int64],
+    step_s: float,
+    kernel_s: float,
+) -> tuple[npt.NDArray[np.int64], Array, Array, Array]:
+    """The first node of each run (R + 1,), nodes' times (K,), smooth feet (K, 2) and tops (K,).
+
+    A run that is shorter than a step has no nodes. A top is NaN where none is known.
+
+    Args:
+        time_s: of all points (T,).
+        uv: feet (T, 2) in pixels.
+        top_v: upper edges of boxes (T,) in pixels, NaN where none is known.
+        runs: as of `runs_of_tracks`.
+        step_s: from one node to the next.
+        kernel_s: half the width of the smoothing, wider where points are sparse.
+    """
+    firsts = np.zeros(len(runs) + 1, dtype=np.int64)
+    for number in range(len(runs)):
+        begin, last = runs[number, 1], runs[number, 2] - 1
+        count = int((time_s[last] - time_s[begin]) / step_s + 1e-6)
+        firsts[number + 1] = firsts[number] + (count + 1 if count > 0 else 0)
+    nodes_s, feet = np.empty(firsts[-1]), np.empty((firsts[-1], 2))
+    tops, tall = np.full(firsts[-1], np.nan), uv[:, 1] - top_v
+    for number in range(len(runs)):
+        begin, beyond = runs[number, 1], runs[number, 2]
+        first, count = firsts[number], firsts[number + 1] - firsts[number] - 1
+        if count < 1:
+            continue
+        duration_s = time_s[beyond - 1] - time_s[begin]
+        reach_s = max(kernel_s, 1.01 * float(np.median(np.diff(time_s[begin:beyond]))))
+        boxed = 0
+        for j in range(begin, beyond):
+            boxed += np.isfinite(tall[j])
+        near = begin
+        for node in range(first, first + count + 1):
+            at_s = time_s[begin] + (duration_s - count * step_s) / 2 + (node - first) * step_s
+            nodes_s[node] = at_s
+            while near < beyond and time_s[near] <= at_s - reach_s:
+                near += 1
+            lined, u = _line(time_s, uv[:, 0], near, beyond, at_s, reach_s)
+            _, v = _line(time_s, uv[:, 1], near, beyond, at_s, reach_s)
+            if not lined:
+                u = _between(time_s, uv[:, 0], begin, beyond, at_s)
+                v = _between(time_s, uv[:, 1], begin, beyond, at_s)
+            feet[node, 0], feet[node, 1] = u, v
+            if boxed >= _LEAST_WEIGHED:
+                # The box's height is smoothed, not its top: it is the same all through a stride.
+                known, height = _line(time_s, tall, near, beyond, at_s, reach_s)
+                if known:
+                    tops[node] = v - height
+    return firsts, nodes_s, feet, tops
+
+
+@compiled
+def _line(
+    time_s: Array, values: Array, first: int, beyond: int, at_s: float, reach_s: float
+) -> tuple[bool, float]:
+    """Whether two known points are within reach, and the value of a weighted line through all."""
+    number, total, centre, mean = 0, 0.0, 0.0, 0.0
+    for j in range(first, beyond):
+        ahead = time_s[j] - at_s
+        if ahead >= reach_s:
+            break
+        weight = 1 - abs(ahead) / reach_s
+        if weight > 0 and np.isfinite(values[j]):
+            number += 1
+            total += weight
+            centre += weight * ahead
+            mean += weight * values[j]
+    total = max(total, _LEAST_TOTAL)
+    centre, mean = centre / total, mean / total
+    spread, slope = 0.0, 0.0
+    for j in range(first, beyond):
+        ahead = time_s[j] - at_s
+        if ahead >= reach_s:
+            break
+        weight = 1 - abs(ahead) / reach_s
+        if weight > 0 and np.isfinite(values[j]):
+            spread += weight * (ahead - centre) ** 2
+            slope += weight * (ahead - centre) * values[j]
+    slope = slope / total / max(spread / total, _LEAST_SPREAD)
+    return number >= _LEAST_WEIGHED, mean - slope * centre
+
+
+@compiled
+def _between(time_s: Array, values: Array, first: int, beyond: int, at_s: float) -> float:
+    """The value on the straight line between the points before and after a time."""
+    after = first + 1
+    while after < beyond - 1 and time_s[after] < at_s:
+        after += 1
+    share = (at_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
+    value: float = values[after - 1] + min(max(share, 0.0), 1.0) * (
+        values[after] - values[after - 1]
+    )
+    return value

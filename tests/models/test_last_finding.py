@@ -1,0 +1,142 @@
+"""An estimate that begins where the last one ended comes to the same as one of all poses."""
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.estimation.joint.observations import of_tracks
+from models.evaluation.scenes import load_scene
+from models.geometry.pose import CameraPose
+from models.recalibration import estimate_pose, learn_site, observe
+from models.simulation.knocked import Knock, knock_trajectory
+from models.simulation.site import SiteConfig, draw_lanes, walk_site
+from models.trajectory import by_end
+from tests.models.sites import LENS, PRIOR
+
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "/nowhere"))
+CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
+WINDOW, STEP = 160, 10
+SAME = 0.05  # of a standard deviation
+SMALL = Knock(tilt_rad=math.radians(1), heading_rad=math.radians(-1))
+LARGE = Knock(
+    tilt_rad=math.radians(3),
+    roll_rad=math.radians(-2),
+    heading_rad=math.radians(-5),
+    log_height=0.08,
+)
+# The knock, and after which share of the tracks it came; before all of them, if that is None.
+KNOCKS = {
+    "still": (None, None),
+    "a little": (SMALL, None),
+    "far": (LARGE, None),
+    "a little in mid-window": (SMALL, 0.8),
+    "far in mid-window": (LARGE, 0.8),
+}
+
+
+def knocked(tracks, lens, pose, knock, share=None):
+    """Tracks as a camera sees them that was knocked; before some share of them, if it is given."""
+    if knock is None:
+        return list(tracks)
+    first = 0 if share is None else int(share * len(tracks))
+    moved = [knock_trajectory(track, lens, pose, knock.apply(pose)) for track in tracks[first:]]
+    return by_end([*tracks[:first], *(track for track in moved if track and track.long_enough)])
+
+
+def follow(every, site, window=WINDOW, step=STEP):
+    """Looks at the newest tracks: all poses tried, begun at the last, and whether it sufficed."""
+    last, since = None, 0
+    for came in range(window, every.tracks + 1, step):
+        since = max(since, came - window)
+        tracks = of_tracks(every, np.arange(since, came))
+        full, found = estimate_pose(tracks, site), estimate_pose(tracks, site, last=last)
+        refined = found.full is not None and found.full.to_s < tracks.ended_s.max()
+        yield full, found, refined
+        last, since = found, since + full.first
+
+
+def apart(full, found):
+    """How far two findings are apart in standard deviations: poses, and their own deviations."""
+    assert found.change_idx == full.change_idx
+    assert found.fused.identifiable == full.fused.identifiable
+    assert found.fused.registered == full.fused.registered
+    names = full.fused.identifiable
+    sd = np.array([full.drift.of(name)[1] for name in names])
+    by, by_sd = (np.array([found.drift.of(name)[place] for name in names]) for place in (0, 1))
+    off = np.abs(by - [full.drift.of(name)[0] for name in names]) / sd
+    return max([0.0, *off, *np.abs(by_sd / sd - 1)])
+
+
+@pytest.fixture(scope="module")
+def lanes():
+    return draw_lanes(LENS, PRIOR, CONFIG, np.random.default_rng(3))
+
+
+@pytest.fixture(scope="module")
+def site(lanes):
+    known = walk_site(LENS, PRIOR, lanes, CONFIG, 150, np.random.default_rng(4))
+    return learn_site(observe(by_end(known), LENS, PRIOR), LENS, PRIOR, chart=False)
+
+
+@pytest.fixture(scope="module")
+def people(lanes):
+    return by_end(walk_site(LENS, PRIOR, lanes, CONFIG, 200, np.random.default_rng(5)))
+
+
+@pytest.mark.parametrize("knock", [None, LARGE])
+def test_a_few_new_tracks_refine_the_last_pose_and_come_to_the_same(site, people, knock):
+    every = observe(knocked(people, LENS, PRIOR, knock), LENS, PRIOR)
+    looks = list(follow(every, site))
+    assert sum(refined for _, _, refined in looks) >= len(looks) - 2
+    assert max(apart(full, found) for full, found, _ in looks) < SAME
+
+
+def test_a_knock_in_mid_window_is_found_as_soon(site, people):
+    every = observe(knocked(people, LENS, PRIOR, LARGE, 0.8), LENS, PRIOR)
+    looks = list(follow(every, site, step=5))
+    assert any(full.change_idx is not None for full, _, _ in looks)
+    assert max(apart(full, found) for full, found, _ in looks) < SAME
+
+
+def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
+    def came(tracks, last):
+        found = estimate_pose(tracks, site, last=last)
+        return found.full is None or found.full.to_s == tracks.ended_s.max()
+
+    every = observe(people, LENS, PRIOR)
+    first = of_tracks(every, np.arange(WINDOW))
+    last = estimate_pose(first, site)
+    near = of_tracks(every, np.arange(10, WINDOW + 10))
+    assert not came(near, last)
+    assert came(near, None)
+    assert came(near, replace(last, prior=CameraPose(height_m=6.1, tilt_rad=0.3, roll_rad=0.0)))
+    assert came(near, replace(last, full=None))  # a change was suspected
+    assert came(near, replace(last, full=replace(last.full, fit=last.full.fit + 1)))  # fits worse
+    assert came(of_tracks(every, np.arange(45, 200)), last)  # a quarter is new
+    assert came(of_tracks(every, np.arange(60, WINDOW + 10)), last)  # the window was cut
+    late = replace(near, ended_s=np.where(np.arange(WINDOW) % 3, near.ended_s, near.ended_s - 0.1))
+    assert came(late, last)  # a third of it is of other tracks, though none is newer
+    elsewhere = replace(last.fused, values=last.fused.values + [0.0, 0.02, 0.0, 0.0])
+    assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SCENES.is_dir(), reason="recorded scenes are not at hand")
+@pytest.mark.parametrize("knock", KNOCKS)
+@pytest.mark.parametrize(
+    "folder", sorted(path.parent.name for path in SCENES.glob("*/camera.json"))
+)
+def test_recorded_scenes_come_to_the_same(folder, knock):
+    scene = load_scene(SCENES / folder)
+    tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
+    lens, pose, count = scene.intrinsics, scene.true_pose, len(tracks) // 3
+    site = learn_site(observe(tracks[:count], lens, pose), lens, pose, chart=False)
+    seen = knocked(tracks[count:], lens, pose, *KNOCKS[knock])
+    every = observe(seen, lens, pose)
+    window = min(WINDOW, 3 * every.tracks // 4)
+    for full, found, _ in follow(every, site, window, 8):
+        assert apart(full, found) < SAME
