@@ -52,10 +52,10 @@ class Settings(BaseSettings):
         True, description="copy the database before its schema changes; without room: no start"
     )
 
-    trainings: Literal["on", "off"] = Field(
-        "on",
-        description="whether trainings begin by themselves; the served pose needs none, "
-        "and a training that a person asks for is done in any case",
+    trainings: Literal["on", "idle", "off"] = Field(
+        "idle",
+        description="whether trainings begin by themselves; idle: and go on only while no estimate "
+        "waits for a worker. The served pose needs none, and off, too, does what a person asks for",
     )
     recipe: Literal["default", "paper"] = Field("default", description="recipe of new trainings")
     epochs: int | None = Field(

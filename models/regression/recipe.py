@@ -20,7 +20,8 @@ class Recipe:
     `inputs`, whether the network reads points, or points and the steps between them; `target`,
     whether it answers a raw height and quaternion, with the paper's loss, or offsets from the prior
     pose in units of the range; `schedule`, whether the learning rate stays or falls to 0 by a half
-    cosine after a short rise.
+    cosine after a short rise; `arithmetic`, whether products may be of bfloat16, which is done
+    where the processor multiplies such numbers itself.
     """
 
     name: RecipeName
@@ -32,6 +33,7 @@ class Recipe:
     noise_px: float = 0.0
     learning_rate: float
     schedule: Literal["constant", "cosine"]
+    arithmetic: Literal["float32", "bfloat16"] = "float32"
     batch: int
     epochs: int
     alpha: float = 1.0
@@ -61,6 +63,7 @@ DEFAULT = Recipe(
     noise_px=1.0,
     learning_rate=0.002,
     schedule="cosine",
+    arithmetic="bfloat16",
     batch=256,
     epochs=8,
 )

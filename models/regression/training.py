@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,10 +169,21 @@ def _metrics(
 def _loss(
     network: PoseRegressor, data: SyntheticSet, rows: npt.NDArray[np.int64], recipe: Recipe
 ) -> Tensor:
-    output = network(data.points[rows], data.lengths[rows])
+    with torch.autocast("cpu", torch.bfloat16, enabled=_in_bfloat16(recipe)):
+        output = network(data.points[rows], data.lengths[rows])
+    output = output.float()
     if recipe.target == "offsets":
         return nn.functional.smooth_l1_loss(output, data.offsets[rows], beta=0.5)
     return pose_loss(output, data.height_m[rows], data.quaternion[rows], recipe.alpha)
+
+
+def _in_bfloat16(recipe: Recipe) -> bool:
+    """Whether products of this recipe are of bfloat16 here; emulated, they would take longer."""
+    if recipe.arithmetic != "bfloat16":
+        return False
+    # The oldest torch that we run on cannot be asked.
+    capabilities: Mapping[str, bool] = getattr(torch.cpu, "get_capabilities", dict)()
+    return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))
 
 
 def _schedule(name: str, steps: int) -> Callable[[int], float]:

@@ -24,7 +24,8 @@ from service.jobs.train import run_training
 
 log = logging.getLogger("surefoot.worker")
 
-_POLL_S = 0.2
+# Each look at a queue is a transaction: a training, of minutes, is not looked for so often.
+_POLL_S, _POLL_DELIVERIES_S, _POLL_TRAININGS_S = 0.2, 0.5, 2.0
 _KEEP_FINISHED = timedelta(hours=1)
 _FORGET_AT_ONCE = 500
 _ESTIMATES_AT_ONCE = 2
@@ -57,7 +58,7 @@ def launch(context: JobContext, name: str) -> None:
         TRAIN_QUEUE,
         partition_concurrency=1,
         global_concurrency=context.settings.trainings_at_once,
-        polling_interval_sec=_POLL_S,
+        polling_interval_sec=_POLL_TRAININGS_S,
         on_conflict="always_update",
     )
     # One job a camera, first come first served: a flooded camera has its turn like any other.
@@ -71,7 +72,7 @@ def launch(context: JobContext, name: str) -> None:
         DELIVER_QUEUE,
         partition_concurrency=1,
         worker_concurrency=_DELIVERIES_AT_ONCE,
-        polling_interval_sec=_POLL_S,
+        polling_interval_sec=_POLL_DELIVERIES_S,
         on_conflict="always_update",
     )
 

@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable
+from functools import partial
 
 from models.errors import CalibrationError
 from service.jobs.context import JobContext
@@ -87,12 +88,25 @@ class _ParkedError(Exception):
 
 def _train(context: JobContext, attempt: TrainingAttempt) -> Trained:
     try:
-        return train_apart(attempt.plan, context.settings, _reporter(context, attempt))
+        return train_apart(
+            attempt.plan,
+            context.settings,
+            _reporter(context, attempt),
+            partial(may_go_on, context),
+        )
     except _ParkedError:
         # Coming back from here would end the job as done; left where it is, the engine runs it
         # again at the next start.
         threading.Event().wait()
         raise
+
+
+def may_go_on(context: JobContext) -> bool:
+    """Whether a training is in nobody's way: an estimate that waits for a worker goes first."""
+    if context.settings.trainings != "idle":
+        return True
+    with context.store.read() as session:
+        return not context.queue.estimates_wait(session)
 
 
 def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[Progress | None], None]:

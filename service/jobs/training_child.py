@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import queue
 import subprocess
 import sys
@@ -17,7 +18,10 @@ from models.regression.recipe import TrainingPlan, plan_to_config
 from service.process.exits import words_of
 from service.settings import Settings
 
+log = logging.getLogger("surefoot.jobs")
+
 _TICK_S = 0.5
+REST, GO_ON = "rest", "go on"  # what a training is told, beside its order
 
 
 class TrainingDiedError(RuntimeError):
@@ -43,7 +47,10 @@ class Trained:
 
 
 def train_apart(
-    plan: TrainingPlan, settings: Settings, on_tick: Callable[[Progress | None], None]
+    plan: TrainingPlan,
+    settings: Settings,
+    on_tick: Callable[[Progress | None], None],
+    may_go_on: Callable[[], bool] = lambda: True,
 ) -> Trained:
     """Train in a process of its own; what `on_tick` raises ends it.
 
@@ -51,6 +58,7 @@ def train_apart(
         plan: what to train.
         settings: where weights go, threads and limit.
         on_tick: called twice a second with the newest progress, None before there is any.
+        may_go_on: asked as often; while it says no, the training rests between two of its steps.
 
     Raises:
         CalibrationError: the plan cannot be trained, or what came of it is no good.
@@ -64,6 +72,7 @@ def train_apart(
     }
     ends_s = time.monotonic() + settings.training_limit_s
     progress: Progress | None = None
+    resting = False
     with _process(order, settings) as (process, lines):
         while True:
             with contextlib.suppress(queue.Empty):
@@ -76,10 +85,23 @@ def train_apart(
                     return Trained(**line)
                 progress = Progress(**line["progress"])
             on_tick(progress)
+            if may_go_on() == resting:
+                resting = not resting
+                log.info("training_rests" if resting else "training_goes_on")
+                _tell(process, REST if resting else GO_ON)
+            if resting:
+                ends_s += _TICK_S
             if time.monotonic() > ends_s:
                 raise CalibrationError(
                     f"training: more than {settings.training_limit_s:g} s, which are the limit"
                 )
+
+
+def _tell(process: "subprocess.Popen[bytes]", line: str) -> None:
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):  # it died at once, which its status tells
+        process.stdin.write(line.encode() + b"\n")
+        process.stdin.flush()
 
 
 @contextmanager
@@ -94,10 +116,7 @@ def _process(
     )
     lines: queue.Queue[dict[str, Any] | None] = queue.Queue()
     try:
-        assert process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # it died at once, which its status tells
-            process.stdin.write(json.dumps(order).encode() + b"\n")
-            process.stdin.flush()
+        _tell(process, json.dumps(order))
         threading.Thread(target=_listen, args=(process, lines), daemon=True).start()
         yield process, lines
     finally:

@@ -1,7 +1,8 @@
 """A training in a process of its own: it yields to estimates, and takes its memory along.
 
 The process knows no store. It reads its plan from stdin, tells its progress and what came of it on
-stdout, a line of JSON each, and ends when stdin does: when its worker ends, in whatever way.
+stdout, a line of JSON each. It rests between two steps when stdin says so, and ends when that does:
+when its worker ends, in whatever way.
 """
 
 import json
@@ -14,12 +15,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from service.jobs.training_child import REST
 from service.logs import configure_logs
 from service.process.memory import settle_allocator
 from service.process.niceness import yield_to_others
 
 log = logging.getLogger("surefoot.jobs")
 _TELLS_EVERY_S = 0.25
+_going = threading.Event()
+_going.set()
 
 
 def main() -> None:
@@ -27,7 +31,7 @@ def main() -> None:
     tells = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what libraries print is no answer
     order = json.loads(sys.stdin.buffer.readline())
-    threading.Thread(target=_end_with_stdin, daemon=True).start()
+    threading.Thread(target=_heed_stdin, daemon=True).start()
     # Beside this, even the idle class would let a busy machine stop trainings for good.
     yield_to_others(order["nice"])
     settle_allocator()
@@ -47,6 +51,7 @@ def _train(order: dict[str, Any], tells: Any) -> dict[str, Any]:
 
     def report(progress: TrainingProgress) -> None:
         nonlocal told_s
+        _going.wait()
         if time.monotonic() - told_s >= _TELLS_EVERY_S:
             told_s = time.monotonic()
             tells.write(json.dumps({"progress": asdict(progress)}) + "\n")
@@ -64,8 +69,13 @@ def _train(order: dict[str, Any], tells: Any) -> dict[str, Any]:
     return {"weights_sha256": digest, "metrics": asdict(metrics)}
 
 
-def _end_with_stdin() -> None:
-    sys.stdin.buffer.read()
+def _heed_stdin() -> None:
+    """Rest and go on as the worker says, and end when it does."""
+    for line in sys.stdin.buffer:
+        if line.strip().decode() == REST:
+            _going.clear()
+        else:
+            _going.set()
     os._exit(1)
 
 

@@ -12,6 +12,9 @@ _WAITS = text(
     "SELECT 1 FROM workflow_status WHERE queue_name = :queue AND status = 'ENQUEUED' "
     "AND queue_partition_key = :key LIMIT 1"
 )
+_ANY_WAITS = text(
+    "SELECT 1 FROM workflow_status WHERE queue_name = :queue AND status = 'ENQUEUED' LIMIT 1"
+)
 _STATUS = text(
     "SELECT status FROM workflow_status WHERE workflow_uuid = :id OR workflow_uuid LIKE :again"
 )
@@ -25,6 +28,11 @@ def deduplicated(session: Session, queue: str) -> set[str]:
 def waits(session: Session, queue: str, key: str) -> bool:
     """Whether a job of a queue's partition waits to start."""
     return session.scalar(_WAITS, {"queue": queue, "key": key}) is not None
+
+
+def any_waits(session: Session, queue: str) -> bool:
+    """Whether any job of a queue waits to start."""
+    return session.scalar(_ANY_WAITS, {"queue": queue}) is not None
 
 
 def statuses(session: Session, job_id: str) -> list[str]:

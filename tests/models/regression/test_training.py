@@ -62,6 +62,18 @@ def test_the_seed_alone_makes_the_weights(plan: TrainingPlan) -> None:
 
 
 @pytest.mark.usefixtures("hardly_checked")
+def test_products_are_of_bfloat16_only_where_the_processor_has_them(
+    plan: TrainingPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact = weights(replace(plan, recipe=replace(plan.recipe, arithmetic="float32")))
+    for has_them in (True, False):
+        can = {"avx512_bf16": has_them}
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda can=can: can, raising=False)
+        assert torch.equal(weights(plan), exact) != has_them
+    assert PAPER.arithmetic == "float32"
+
+
+@pytest.mark.usefixtures("hardly_checked")
 def test_metrics_are_those_of_the_seed(plan: TrainingPlan) -> None:
     first, again = (train(plan)[1] for _ in range(2))
     clockless = {"simulation_s": 0.0, "training_s": 0.0}

@@ -1,0 +1,57 @@
+"""A training that is in the way rests between two of its steps, and loses nothing by it."""
+
+from dataclasses import replace
+
+import pytest
+
+from models.errors import CalibrationError
+from models.regression import recipe
+from models.regression.recipe import TrainingPlan
+from models.simulation.walkers import WalkConfig
+from service.job_queue import JobQueue
+from service.jobs.context import JobContext
+from service.jobs.train import may_go_on
+from service.jobs.training_child import Progress, train_apart
+from service.store.sqlite.database import Store
+
+_RESTS = 8  # ticks, each of half a second: no step of this training takes that long
+
+
+@pytest.mark.slow
+def test_it_rests_while_it_may_not_go_on_and_its_limit_with_it(settings, lens, pose):
+    small = replace(recipe.DEFAULT, random_poses=512, walks_per_pose=4, epochs=3, batch=64)
+    plan = TrainingPlan(intrinsics=lens, prior_pose=pose, recipe=small, walk=WalkConfig(), seed=0)
+    settings.weights_dir.mkdir(parents=True, exist_ok=True)
+    steps: list[int] = []
+    rested: list[int] = []
+
+    def may_go_on_now() -> bool:
+        if not steps or len(rested) == _RESTS:
+            return True
+        rested.append(steps[-1])
+        return False
+
+    def note(told: Progress | None) -> None:
+        if told is not None:
+            steps.append(told.step)
+
+    # So short a one comes to its end, and has learned too little there.
+    with pytest.raises(CalibrationError, match="held-out check"):
+        train_apart(plan, settings, note, may_go_on_now)
+    # It was told while a step was under way: from then on there is none.
+    assert rested[2:] == [rested[2]] * (_RESTS - 2)
+    assert steps[-1] > rested[-1]
+
+
+def test_what_waits_for_a_worker_goes_first(settings):
+    store = Store(settings)
+    context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
+    always = replace(context, settings=settings.model_copy(update={"trainings": "on"}))
+    assert settings.trainings == "idle"
+    assert may_go_on(context)
+    with store.write() as session:
+        context.queue.enqueue_estimate(session, "corner")
+    assert not may_go_on(context)
+    assert may_go_on(always)
+    context.queue.close()
+    store.close()
