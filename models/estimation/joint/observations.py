@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from models.doors.moments import Moments
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
@@ -74,7 +75,7 @@ class Tops:
 class Observations:
     """All that is read of a set of tracks, and when each of them ended (tracks,).
 
-    `uprights` are of heads; None where nobody looked for any.
+    `uprights` are of heads, `moments` of doors; None where nobody looked for any.
     """
 
     steps: Steps
@@ -82,6 +83,7 @@ class Observations:
     ended_s: Array
     tracks: int
     uprights: Uprights | None = None
+    moments: Moments | None = None
 
     @property
     def walkers(self) -> int:
@@ -96,8 +98,7 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
     starts, ends, noisy_ends, seconds, feet, tops = [], [], [], [], [], []
-    step_owners, top_owners = list[int](), list[int]()
-    step_runs, top_runs = list[int](), list[int]()
+    step_owners, top_owners, step_runs, top_runs = (list[int]() for _ in range(4))
     step_times, top_times = list[Array](), list[Array]()
     run, count = 0, len(trajectories)
     for owner, trajectory in enumerate(trajectories):
@@ -173,6 +174,7 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
         uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
+        moments=None if observations.moments is None else observations.moments.of_tracks(chosen),
     )
 
 
@@ -181,13 +183,12 @@ def steps_where(steps: Steps, kept: Mask) -> Steps:
     rows = steps.rows
     linked = rows.linked.copy()
     linked[1:] &= kept[:-1]
-    same = np.arange(rows.owners)
     return Steps(
         start_rays=steps.start_rays[kept],
         end_rays=steps.end_rays[kept],
         noisy_end_rays=steps.noisy_end_rays[kept],
         seconds=steps.seconds[kept],
-        rows=_kept(replace(rows, linked=linked), kept, same, rows.owners),
+        rows=_kept(replace(rows, linked=linked), kept, np.arange(rows.owners), rows.owners),
     )
 
 
@@ -203,8 +204,7 @@ def _runs(trajectory: Trajectory, intrinsics: Intrinsics) -> list[npt.NDArray[np
 
 def _nodes(trajectory: Trajectory, indices: npt.NDArray[np.int64]) -> tuple[Array, Array, Array]:
     """Times (K,), smoothed feet (K, 2) and box tops (K,), NaN where unknown, of one run."""
-    time_s = trajectory.time_s[indices]
-    uv = trajectory.uv[indices]
+    time_s, uv = trajectory.time_s[indices], trajectory.uv[indices]
     duration_s = float(time_s[-1] - time_s[0])
     count = int(duration_s / STEP_S + 1e-6)
     if count < 1:
