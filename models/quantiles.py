@@ -23,3 +23,20 @@ def f_above(chance: float, freedom: int, other_freedom: int) -> float:
     from scipy.special import fdtri
 
     return float(fdtri(freedom, other_freedom, 1 - chance))
+
+
+def chance_below(value: float, freedom: float) -> float:
+    """The chance that a Student's t of some degrees of freedom is below a value.
+
+    Source: Student 1908.
+    """
+    from scipy.special import stdtr
+
+    return float(stdtr(freedom, value))
+
+
+def value_below(chance: float, freedom: float) -> float:
+    """What a Student's t of some degrees of freedom is below with a chance."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, chance))

@@ -37,7 +37,7 @@ MODEL_ROOMS = [
     {"geometry"},
     {"trajectory"},
     {"simulation"},
-    {"verticals"},
+    {"verticals", "doors"},
     {"estimation"},
     {"people"},
     {"regression"},

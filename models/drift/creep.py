@@ -22,8 +22,8 @@ import numpy as np
 
 from models.drift.chart import Tested
 from models.drift.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
-from models.flow.student import value_below
 from models.geometry.rotation import Array
+from models.quantiles import value_below
 
 SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
 ANGLES = (0, 1, 3)  # tilt, roll and heading creep

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.doors.door_map import DoorGrain
 from models.estimation.joint.observations import Observations, of_tracks
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.map.flow_map import Grain
 from models.flow.registration import Site
+from models.flow.site_doors import Quarter, door_grain, with_doors
 from models.flow.site_map import best_grain, mapped
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
@@ -32,10 +34,14 @@ class Fold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folds:
-    """All quarters, and the grain of map that predicts people best."""
+    """All quarters, and the grains of map and doors that predict people best.
+
+    There is no grain of doors where there are none.
+    """
 
     each: tuple[Fold, ...]
     grain: Grain
+    door_grain: DoorGrain | None
 
 
 def fold_maps(
@@ -69,17 +75,28 @@ def fold_maps(
     grain = best_grain(
         [(of, weights[known], left_out) for of, left_out, known, _ in parts], intrinsics, at
     )
+    quarters = [
+        Quarter(
+            known=of,
+            weights=weights[known],
+            asked=left_out,
+            site=mapped(of, weights[known], intrinsics, at, grain),
+        )
+        for of, left_out, known, _ in parts
+    ]
+    doors = door_grain(quarters, at)
     return Folds(
         each=tuple(
             Fold(
-                site=mapped(of, weights[known], intrinsics, at, grain),
-                walkers=left_out,
+                site=with_doors(own.site, own.known, own.weights, at, doors),
+                walkers=own.asked,
                 known=known,
                 asked=asked,
             )
-            for of, left_out, known, asked in parts
+            for own, (_, _, known, asked) in zip(quarters, parts, strict=True)
         ),
         grain=grain,
+        door_grain=doors,
     )
 
 

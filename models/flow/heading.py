@@ -55,4 +55,10 @@ def _halves(walkers: Walkers) -> tuple[Walkers, Walkers]:
 
 
 def _part(walkers: Walkers, kept: Mask) -> Walkers:
-    return replace(walkers, steps=steps_where(walkers.steps, kept), weight=walkers.weight[kept])
+    owners = np.unique(walkers.steps.rows.owner_idx[kept])
+    return replace(
+        walkers,
+        steps=steps_where(walkers.steps, kept),
+        weight=walkers.weight[kept],
+        moments=None if walkers.moments is None else walkers.moments.of_owners(owners),
+    )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.doors.moments import Moments
 from models.estimation.joint.groups import walking_groups_of
 from models.estimation.joint.observations import Observations, Steps, steps_where
 from models.flow.compiled.steps import (
@@ -42,13 +43,14 @@ class Walkers:
     """Steps of people who move.
 
     `weight` (M,) adds up to at most 2 a track; `group_idx` (tracks,) is the walking group of each
-    track.
+    track. `moments` are theirs too; None where nobody looked for doors.
     """
 
     steps: Steps
     weight: Array
     group_idx: npt.NDArray[np.int64]
     tracks: int
+    moments: Moments | None = None
 
     @property
     def people(self) -> int:
@@ -85,6 +87,9 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
             rows.time_s, rows.owner_idx, placed.place[moving], way[moving], observations.tracks
         ),
         tracks=observations.tracks,
+        moments=None
+        if observations.moments is None
+        else observations.moments.of_owners(np.unique(rows.owner_idx)),
     )
 
 

@@ -16,9 +16,9 @@ from models.flow.map.flow_map import DIRECTIONS
 from models.flow.map.placement import place_steps
 from models.flow.map.view import in_view
 from models.flow.registration import Site
-from models.flow.student import value_below
 from models.geometry.rotation import Array
 from models.packing import stored_as
+from models.quantiles import value_below
 
 _RATE = 1e-4  # of windows with unchanged paths that are called changed
 # Of the mean log density. By the first an hour differs from another; paths that half of the people

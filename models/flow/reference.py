@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.doors.door_map import DoorMap
 from models.estimation.joint.observations import Observations
 from models.flow.cross_fit import CrossFit, cross_fit
 from models.flow.folds import Folds, fold_maps
@@ -16,6 +17,7 @@ from models.flow.map.flow_map import FlowMap
 from models.flow.map.view import Coverage
 from models.flow.path_test import UsualFit, usual_fit
 from models.flow.registration import Shape, Site
+from models.flow.site_doors import with_doors
 from models.flow.site_map import mapped
 from models.flow.turn_detection import StillScores, learn_scores
 from models.geometry.intrinsics import Intrinsics
@@ -41,7 +43,7 @@ class FlowReference:
     `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
     peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
     together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
-    its two tests go by.
+    its two tests go by. `doors` is None where there are none.
     """
 
     flow: FlowMap
@@ -54,10 +56,11 @@ class FlowReference:
     people: float
     still: StillScores
     fit: UsualFit
+    doors: DoorMap | None = None
 
     def site(self, intrinsics: Intrinsics) -> Site:
         """What walkers are registered to."""
-        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics)
+        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics, doors=self.doors)
 
     def variance_inflation_for(self, people: float) -> float:
         """How much larger squared errors are for so many people than the curvature says."""
@@ -128,10 +131,12 @@ def learn_flow(
     walkers = walkers_of(observations, at)
     weights = np.ones(observations.tracks) if weights is None else weights
     whole = mapped(walkers, weights, intrinsics, at, folds.grain)
+    whole = with_doors(whole, walkers, weights, at, folds.door_grain)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
     return FlowReference(
         flow=whole.flow,
         coverage=whole.coverage,
+        doors=whole.doors,
         bias=bias,
         bias_covariance=unsure,
         spread=np.sqrt(np.diag(scatter) / count),

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.doors.door_map import DoorMap
+from models.doors.likelihood import anchored_door_scores, door_likelihood, door_values
 from models.flow.likelihood import Likelihood, Walkers, anchored_scores, likelihood
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.view import Coverage
@@ -31,26 +33,38 @@ _EVEN = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """What walkers are registered to: a flow map, its coverage, and the camera's intrinsics."""
+    """What walkers are registered to: a flow map, its coverage, the camera's intrinsics, doors."""
 
     flow: FlowMap
     coverage: Coverage
     intrinsics: Intrinsics
+    doors: DoorMap | None = None
 
     def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
         """How likely the walkers are, seen from a candidate (4,)."""
-        return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
+        found = likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
+        if self.doors is None or walkers.moments is None:
+            return found
+        values, scores = door_likelihood(walkers.moments, self.doors, candidate)
+        values = found.values + values
+        return Likelihood(value=float(values.sum()), values=values, scores=found.scores + scores)
 
     def track_log_likelihoods(self, walkers: Walkers, candidate: Array) -> Array:
         """The log likelihood (N,) of each track alone."""
         lens = self.intrinsics
-        return likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
+        values = likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
+        if self.doors is None or walkers.moments is None:
+            return values
+        return values + door_values(walkers.moments, self.doors, candidate)
 
     def scores(self, walkers: Walkers, candidate: Array, anchor: Array) -> Array:
         """Scores (N, 4) at a candidate (4,) of who is on known ground, seen from an anchor (4,)."""
-        return anchored_scores(
+        scores = anchored_scores(
             walkers, self.flow, self.coverage, self.intrinsics, candidate, anchor
         )
+        if self.doors is None or walkers.moments is None:
+            return scores
+        return scores + anchored_door_scores(walkers.moments, self.doors, candidate, anchor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

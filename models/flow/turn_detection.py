@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from models.flow.likelihood import Walkers
 from models.flow.registration import Site
-from models.flow.student import chance_below, value_below
 from models.geometry.rotation import Array
 from models.packing import stored_as
+from models.quantiles import chance_below, value_below
 
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.
 REACH = np.array([np.radians(3), np.radians(3), 0.08, np.radians(4)])

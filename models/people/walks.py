@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from models.doors.moments import observe_moments
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.observing import observe as observe_each
 from models.geometry.intrinsics import Intrinsics
@@ -68,6 +69,7 @@ def observe_walks(
         observe_each(walks, intrinsics),
         ended_s=np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64),
         uprights=observe_uprights(walks, intrinsics),
+        moments=observe_moments(walks, intrinsics, pose),
     )
     return Walks(observations=observations, walk_idx=walk_idx)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from models.doors.moments import Moments
 from models.errors import ShapeError
 from models.geometry.rotation import Array, Mask
 from models.verticals.uprights import Uprights
@@ -62,7 +63,7 @@ class Tops:
 class Observations:
     """All that is read of a set of tracks, and when each of them ended (tracks,).
 
-    `uprights` are of heads; None where nobody looked for any.
+    `uprights` are of heads, `moments` of doors; None where nobody looked for any.
     """
 
     steps: Steps
@@ -70,6 +71,7 @@ class Observations:
     ended_s: Array
     tracks: int
     uprights: Uprights | None = None
+    moments: Moments | None = None
 
     @property
     def walkers(self) -> int:
@@ -111,6 +113,7 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
         uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
+        moments=None if observations.moments is None else observations.moments.of_tracks(chosen),
     )
 
 
@@ -119,13 +122,12 @@ def steps_where(steps: Steps, kept: Mask) -> Steps:
     rows = steps.rows
     linked = rows.linked.copy()
     linked[1:] &= kept[:-1]
-    same = np.arange(rows.owners)
     return Steps(
         start_rays=steps.start_rays[kept],
         end_rays=steps.end_rays[kept],
         noisy_end_rays=steps.noisy_end_rays[kept],
         seconds=steps.seconds[kept],
-        rows=_kept(replace(rows, linked=linked), kept, same, rows.owners),
+        rows=_kept(replace(rows, linked=linked), kept, np.arange(rows.owners), rows.owners),
     )
 
 

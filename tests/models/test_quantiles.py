@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from models.flow.student import chance_below, value_below
+from models.quantiles import chance_below, value_below
 
 
 def test_one_degree_of_freedom_is_cauchys_distribution():

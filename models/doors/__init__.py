@@ -1,0 +1,1 @@
+"""Doors: where walks begin and end inside the picture, as landmarks on the ground."""
