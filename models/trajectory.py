@@ -122,9 +122,10 @@ def points_of(trajectories: Sequence[Trajectory]) -> Points:
     for trajectory, first in zip(trajectories, bounds.tolist(), strict=False):
         if trajectory.top_v is not None:
             top_v[first : first + trajectory.top_v.size] = trajectory.top_v
+    uv = np.concatenate([np.empty((0, 2)), *(trajectory.uv for trajectory in trajectories)])
     return Points(
         time_s=np.concatenate([np.empty(0), *(trajectory.time_s for trajectory in trajectories)]),
-        uv=np.concatenate([np.empty((0, 2)), *(trajectory.uv for trajectory in trajectories)]),
+        uv=np.ascontiguousarray(uv),  # of columns in memory it would be columns, too
         top_v=top_v,
         bounds=bounds,
     )

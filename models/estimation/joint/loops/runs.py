@@ -79,7 +79,8 @@ def nodes_of_runs(
         count = int((time_s[last] - time_s[begin]) / step_s + 1e-6)
         firsts[number + 1] = firsts[number] + (count + 1 if count > 0 else 0)
     nodes_s, feet = np.empty(firsts[-1]), np.empty((firsts[-1], 2))
-    tops, tall = np.full(firsts[-1], np.nan), uv[:, 1] - top_v
+    across, along = uv[:, 0].copy(), uv[:, 1].copy()  # one kind of array for the lines
+    tops, tall = np.full(firsts[-1], np.nan), along - top_v
     for number in range(len(runs)):
         begin, beyond = runs[number, 1], runs[number, 2]
         first, count = firsts[number], firsts[number + 1] - firsts[number] - 1
@@ -96,11 +97,11 @@ def nodes_of_runs(
             nodes_s[node] = at_s
             while near < beyond and time_s[near] <= at_s - reach_s:
                 near += 1
-            lined, u = _line(time_s, uv[:, 0], near, beyond, at_s, reach_s)
-            _, v = _line(time_s, uv[:, 1], near, beyond, at_s, reach_s)
+            lined, u = _line(time_s, across, near, beyond, at_s, reach_s)
+            _, v = _line(time_s, along, near, beyond, at_s, reach_s)
             if not lined:
-                u = _between(time_s, uv[:, 0], begin, beyond, at_s)
-                v = _between(time_s, uv[:, 1], begin, beyond, at_s)
+                u = _between(time_s, across, begin, beyond, at_s)
+                v = _between(time_s, along, begin, beyond, at_s)
             feet[node, 0], feet[node, 1] = u, v
             if boxed >= _LEAST_WEIGHED:
                 # The box's height is smoothed, not its top: it is the same all through a stride.

@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,8 @@ def test_learning_an_estimate_and_a_change_ask_for_one_kind_of_arrays():
     joint_estimate(window, PRIOR, reference)
     find_change(window, PRIOR, reference)
     joint_estimate(of_tracks(window, np.empty(0, dtype=np.int64)), PRIOR, reference)
+    by_columns = [replace(track, uv=np.asfortranarray(track.uv)) for track in after]
+    seen(by_columns)
     compiled = {}
     for module in pkgutil.iter_modules(loops.__path__, f"{loops.__name__}."):
         for name, function in vars(importlib.import_module(module.name)).items():
