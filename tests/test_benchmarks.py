@@ -1,9 +1,11 @@
 """Benchmarks are run by hand: here, that each can still be."""
 
 import importlib
+import sys
 
 import pytest
 
+from tests.benchmarks import __main__ as every
 from tests.conftest import ROOT
 
 MODULES = sorted(path.stem for path in (ROOT / "tests" / "benchmarks").glob("[a-z]*.py"))
@@ -12,3 +14,11 @@ MODULES = sorted(path.stem for path in (ROOT / "tests" / "benchmarks").glob("[a-
 @pytest.mark.parametrize("name", MODULES)
 def test_each_finds_all_that_it_is_made_of(name):
     importlib.import_module(f"tests.benchmarks.{name}")
+
+
+def test_one_command_runs_those_that_there_are(monkeypatch, capsys):
+    assert set(every.BENCHMARKS) < set(MODULES)
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--only", "refresh,refrsh"])
+    with pytest.raises(SystemExit):
+        every.main()
+    assert "got refrsh" in capsys.readouterr().err
