@@ -84,9 +84,9 @@ class JobQueue:
         """The cameras for which an estimate job waits or runs."""
         return engine_jobs.deduplicated(session, ESTIMATE_QUEUE)
 
-    def estimates_wait(self, session: Session) -> bool:
-        """Whether an estimate job waits to start, for want of a worker that is free."""
-        return engine_jobs.any_waits(session, ESTIMATE_QUEUE)
+    def estimates_wait(self, session: Session, besides: str = "") -> bool:
+        """Whether an estimate job of another camera waits to start, for want of a free worker."""
+        return engine_jobs.any_waits(session, ESTIMATE_QUEUE, besides)
 
     def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
         """Queue the sending of what a webhook is due, unless a job waits to start that does.

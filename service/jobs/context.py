@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from service.estimation.recent import Recent
 from service.job_queue import JobQueue
-from service.jobs.growth_rests import GrowthRests
+from service.jobs.growth_rests import GrowthRests, GrowthTurns
 from service.jobs.in_hand import InHand
 from service.jobs.rota import Rota
 from service.settings import Settings
@@ -23,6 +23,7 @@ class JobContext:
     stopping: threading.Event = field(default_factory=threading.Event)
     in_hand: InHand = field(default_factory=InHand)
     growth_rests: GrowthRests = field(default_factory=GrowthRests)
+    growth_turns: GrowthTurns = field(default_factory=GrowthTurns)
     recent: Recent = field(default_factory=Recent)
     steps: StepWatch = field(default_factory=StepWatch)
     reconciled: Rota = field(default_factory=Rota)

@@ -108,18 +108,27 @@ def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None
         period = load_growth(session, context.settings, camera_id, unpacked)
     if period is None:
         return
+    begun_s = time.monotonic()
     learned = compute_growth(period, context.settings.seed)
     with context.store.write() as session:
         grown = save_growth(session, camera_id, period, learned)
+    context.growth_turns.spend(time.monotonic() - begun_s)
     if grown:
         fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
         log.info("flow_map_grown", extra=fields)
+
+
+def _others_wait(context: JobContext, camera_id: str) -> bool:
+    with context.store.read() as session:
+        return context.queue.estimates_wait(session, besides=camera_id)
 
 
 def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
     if context.growth_rests.lacks_of(camera_id):
         return
+    if context.growth_turns.spent and _others_wait(context, camera_id):
+        return  # the next job finds it due again
     lacks = Lacks(camera_id)
     lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id, unpacked))
     if lacks.said:

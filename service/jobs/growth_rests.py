@@ -1,10 +1,11 @@
-"""Flow maps whose growth has failed in this worker: they are left alone for an hour."""
+"""When flow maps may grow in this worker: not soon after a failure, nor at estimates' expense."""
 
 import time
 
 from service.reasons import Reasons
 
 _REST_S = 3600.0
+_SHARE = 0.2  # of a worker's time, where estimates wait for it
 
 
 class GrowthRests:
@@ -24,3 +25,23 @@ class GrowthRests:
             return why
         self._rests.pop(camera_id, None)
         return ()
+
+
+class GrowthTurns:
+    """How much of its time a worker has spent on growth: of hundreds of maps some are always due.
+
+    Where estimates wait, no more than a fifth of it: a map that grows minutes later is no worse.
+    """
+
+    def __init__(self) -> None:
+        self._free_s = 0.0
+
+    @property
+    def spent(self) -> bool:
+        """Whether so much of the time was spent that estimates go first."""
+        return time.monotonic() < self._free_s
+
+    def spend(self, seconds: float) -> None:
+        """Note how long a growth took."""
+        now_s = time.monotonic()
+        self._free_s = max(self._free_s, now_s) + seconds * (1 / _SHARE - 1)

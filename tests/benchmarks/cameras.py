@@ -156,6 +156,7 @@ def main() -> int:
             workers=wanted.workers,
             trainings="off",  # the served pose needs none
             caller_rate=0,  # all cameras have one address here
+            connections_per_address=0,
         )
         walks = seed(settings, wanted.cameras)
         service = RunningService(settings, forked=False)

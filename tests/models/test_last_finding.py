@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.observations import of_tracks
-from models.evaluation.scenes import load_scene
+from models.evaluation.recordings import load_recording
 from models.geometry.pose import CameraPose
 from models.recalibration import estimate_pose, learn_site, observe
 from models.simulation.knocked import Knock, knock_trajectory
@@ -17,7 +17,7 @@ from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR
 
-SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "/nowhere"))
+LONG = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve().parent / "long"
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 WINDOW, STEP = 160, 10
 SAME = 0.05  # of a standard deviation
@@ -124,19 +124,28 @@ def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not SCENES.is_dir(), reason="recorded scenes are not at hand")
-@pytest.mark.parametrize("knock", KNOCKS)
-@pytest.mark.parametrize(
-    "folder", sorted(path.parent.name for path in SCENES.glob("*/camera.json"))
-)
-def test_recorded_scenes_come_to_the_same(folder, knock):
-    scene = load_scene(SCENES / folder)
+@pytest.fixture(scope="module", params=["atc_20121024", "lincoln_corridor"])
+def crowd(request):
+    """Real people before a virtual camera: its site, learned of a thousand of them, and others."""
+    scene = load_recording(LONG / request.param)[0]
     tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
-    lens, pose, count = scene.intrinsics, scene.true_pose, len(tracks) // 3
-    site = learn_site(observe(tracks[:count], lens, pose), lens, pose, chart=False)
-    seen = knocked(tracks[count:], lens, pose, *KNOCKS[knock])
-    every = observe(seen, lens, pose)
-    window = min(WINDOW, 3 * every.tracks // 4)
-    for full, found, _ in follow(every, site, window, 8):
-        assert apart(full, found) < SAME
+    lens, pose = scene.intrinsics, scene.true_pose
+    site = learn_site(observe(tracks[:1000], lens, pose), lens, pose, chart=False)
+    return lens, pose, site, tracks[1000:1600]
+
+
+# The likelihood of a map of real people has small peaks beside one another, and a search that begins
+# elsewhere may end at another of these; neither is better. The recorded scenes have fewer people
+# than a window is refined with: theirs are always searched.
+@pytest.mark.slow
+@pytest.mark.skipif(not LONG.is_dir(), reason="long recordings are not at hand")
+@pytest.mark.parametrize("knock", KNOCKS)
+def test_real_people_come_to_the_same(crowd, knock):
+    lens, pose, site, tracks = crowd
+    every = observe(knocked(tracks, lens, pose, *KNOCKS[knock]), lens, pose)
+    looks = list(follow(every, site, 400, 25))
+    if KNOCKS[knock][1] is None:
+        assert sum(refined for _, _, refined in looks) >= len(looks) // 3
+    far = [apart(full, found) for full, found, refined in looks if refined]
+    assert max(far, default=0.0) < 0.4
+    assert np.median([apart(full, found) for full, found, _ in looks]) < SAME

@@ -13,7 +13,8 @@ _WAITS = text(
     "AND queue_partition_key = :key LIMIT 1"
 )
 _ANY_WAITS = text(
-    "SELECT 1 FROM workflow_status WHERE queue_name = :queue AND status = 'ENQUEUED' LIMIT 1"
+    "SELECT 1 FROM workflow_status WHERE queue_name = :queue AND status = 'ENQUEUED' "
+    "AND deduplication_id <> :besides LIMIT 1"
 )
 _STATUS = text(
     "SELECT status FROM workflow_status WHERE workflow_uuid = :id OR workflow_uuid LIKE :again"
@@ -30,9 +31,9 @@ def waits(session: Session, queue: str, key: str) -> bool:
     return session.scalar(_WAITS, {"queue": queue, "key": key}) is not None
 
 
-def any_waits(session: Session, queue: str) -> bool:
-    """Whether any job of a queue waits to start."""
-    return session.scalar(_ANY_WAITS, {"queue": queue}) is not None
+def any_waits(session: Session, queue: str, besides: str) -> bool:
+    """Whether any job of a queue waits to start, but for one by its deduplication id."""
+    return session.scalar(_ANY_WAITS, {"queue": queue, "besides": besides}) is not None
 
 
 def statuses(session: Session, job_id: str) -> list[str]:

@@ -14,12 +14,12 @@ from service.jobs.train import may_go_on
 from service.jobs.training_child import Progress, train_apart
 from service.store.sqlite.database import Store
 
-_RESTS = 8  # ticks, each of half a second: no step of this training takes that long
+_RESTS = 6  # ticks, each of half a second: no step of this training takes that long
 
 
 @pytest.mark.slow
 def test_it_rests_while_it_may_not_go_on_and_its_limit_with_it(settings, lens, pose):
-    small = replace(recipe.DEFAULT, random_poses=512, walks_per_pose=4, epochs=3, batch=64)
+    small = replace(recipe.DEFAULT, random_poses=256, walks_per_pose=2, epochs=4, batch=32)
     plan = TrainingPlan(intrinsics=lens, prior_pose=pose, recipe=small, walk=WalkConfig(), seed=0)
     settings.weights_dir.mkdir(parents=True, exist_ok=True)
     steps: list[int] = []
