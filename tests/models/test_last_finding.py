@@ -134,7 +134,7 @@ def crowd(request):
     return lens, pose, site, tracks[1000:1600]
 
 
-# The likelihood of a map of real people has small peaks beside one another, and a search that begins
+# The likelihood of a map of real people has small peaks side by side, and a search that begins
 # elsewhere may end at another of these; neither is better. The recorded scenes have fewer people
 # than a window is refined with: theirs are always searched.
 @pytest.mark.slow
