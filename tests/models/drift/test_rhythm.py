@@ -185,10 +185,10 @@ def test_what_is_no_rhythm_is_refused(change):
 
 @pytest.mark.slow
 def test_simulated_years_keep_the_rate_and_find_outages():
-    results = study_rhythm(8, seed=1)
-    assert sum(result.false_alerts for result in results) <= 8
+    results = study_rhythm(6, seed=1)
+    assert sum(result.false_alerts for result in results) <= 6
     busy = [hours for r in results if r.noon_tracks > 30 for hours in r.noticed_h]
     assert busy
     assert max(busy) < 48  # even posted nightly
-    assert describe(results).startswith("8 camera-years")
-    assert study_rhythm(2, seed=1) == results[:2]
+    assert describe(results).startswith("6 camera-years")
+    assert study_rhythm(1, seed=1) == results[:1]
