@@ -15,7 +15,6 @@ from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.paths import LearnedPaths
-from service.jobs import growth_rests
 from service.store import alerts, flow_maps, references
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import FlowMapRecord
@@ -95,28 +94,6 @@ def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     body = known.look()
     assert map_of(known).learned_at == grown.learned_at
     assert body["estimates"]["registered"]["tracks"] == WINDOW  # by the grown map
-
-
-def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
-    now_s = time.monotonic()
-    monkeypatch.setattr(growth_rests.time, "monotonic", lambda: now_s)
-    first, context = map_of(known), known.context
-    known.keep_to_lanes(PRIOR, 50 + WINDOW)
-    with context.store.write() as session:
-        context.queue.enqueue_estimate(session, "elsewhere")
-    context.growth_turns.spend(10.0)  # a fifth of the time: the next is in 40 s
-    known.look()
-    assert map_of(known).learned_at == first.learned_at
-    now_s += 41.0
-    known.look()
-    assert map_of(known).tracks == WANTED + 50
-
-
-def test_where_no_estimate_waits_it_is_in_nobodys_way(known):
-    known.keep_to_lanes(PRIOR, 50 + WINDOW)
-    known.context.growth_turns.spend(1000.0)
-    known.look()
-    assert map_of(known).tracks == WANTED + 50
 
 
 @pytest.mark.parametrize("known", [20 * DAY_S], indirect=True)

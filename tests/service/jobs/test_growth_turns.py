@@ -1,0 +1,46 @@
+"""Growth of maps at the expense of estimates that wait: a fifth of a worker's time, no more."""
+
+import time
+
+import pytest
+
+from service.jobs import growth_rests
+from tests.conftest import CAMERA
+from tests.service.estimation.test_growth import WANTED, WINDOW, make_street, map_of
+from tests.service.street import PRIOR
+
+
+@pytest.fixture
+def known(learned):
+    """A street whose reference is learned, and its map with it."""
+
+    def make(http, settings):
+        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+        street = make_street(http, settings)
+        street.keep_to_lanes(PRIOR, WANTED)
+        street.look()
+        return street
+
+    return learned("growth-turns", make)
+
+
+def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
+    now_s = time.monotonic()
+    monkeypatch.setattr(growth_rests.time, "monotonic", lambda: now_s)
+    first, context = map_of(known), known.context
+    known.keep_to_lanes(PRIOR, 50 + WINDOW)
+    with context.store.write() as session:
+        context.queue.enqueue_estimate(session, "elsewhere")
+    context.growth_turns.spend(10.0)  # a fifth of the time: the next is in 40 s
+    known.look()
+    assert map_of(known).learned_at == first.learned_at
+    now_s += 41.0
+    known.look()
+    assert map_of(known).tracks == WANTED + 50
+
+
+def test_where_no_estimate_waits_it_is_in_nobodys_way(known):
+    known.keep_to_lanes(PRIOR, 50 + WINDOW)
+    known.context.growth_turns.spend(1000.0)
+    known.look()
+    assert map_of(known).tracks == WANTED + 50
