@@ -16,7 +16,7 @@ from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
-from models.trajectory import Trajectory
+from models.trajectory import Trajectory, points_of
 
 BEGINS, ENDS = 0, 1
 _STEP_S = 0.75  # a walker's metre
@@ -150,11 +150,10 @@ def _nodes(walks: Sequence[Trajectory], owners: npt.NDArray[np.int64]) -> _Nodes
         return _Nodes(
             owner_idx=none, time_s=np.empty(0), uv=np.empty((0, 2)), first=none, last=none
         )
-    points = np.array([walk.time_s.size for walk in walks])
-    walk_idx = np.repeat(np.arange(len(walks)), points)
-    time_s = np.concatenate([walk.time_s for walk in walks])
-    uv = np.concatenate([walk.uv for walk in walks])
-    since_s = time_s - np.array([walk.time_s[0] for walk in walks])[walk_idx]
+    points = points_of(walks)
+    time_s, uv = points.time_s, points.uv
+    walk_idx = np.repeat(np.arange(len(walks)), np.diff(points.bounds))
+    since_s = time_s - time_s[points.bounds[:-1]][walk_idx]
     span = np.floor(since_s / _STEP_S).astype(np.int64)
     begin = np.flatnonzero(np.append(True, (np.diff(walk_idx) > 0) | (np.diff(span) > 0)))
     number = np.diff(np.append(begin, time_s.size))

@@ -1,10 +1,17 @@
 """When a camera moved, as far as its tracks tell: the best place to cut a window in two."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.estimation.joint.fit import Fit, fit_pose, per_track, track_log_likelihoods
+from models.estimation.joint.fit import (
+    Channel,
+    Fit,
+    fit_pose,
+    per_track,
+    track_log_likelihoods,
+)
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.speed_reference import SpeedReference, channels_of, pose_prior
 from models.estimation.parameters import plane_parameters_of
@@ -76,8 +83,7 @@ def suspicion(
     """
     if observations.tracks < 2 * FEWEST_BESIDE:
         return 0.0
-    sums = per_track(channels_of(observations, reference, prior), at)
-    ratio = _ratios(np.cumsum(sums.matrix, axis=0), np.cumsum(sums.gradient, axis=0))
+    ratio = _ratios_at(channels_of(observations, reference, prior), at)
     limit = chi_squared_above(_BY_CHANCE, 3) * reference.pose_variance_inflation
     return float(ratio[_best_cut(ratio)]) / limit
 
@@ -92,16 +98,17 @@ def _first_cut(observations: Observations, prior: CameraPose, reference: SpeedRe
     whole = fit_pose(channels, at_prior, pose_prior(prior)).candidate
     best, place = -np.inf, FEWEST_BESIDE
     for candidate in (at_prior, whole):
-        sums = per_track(channels, candidate)
-        ratio = _ratios(np.cumsum(sums.matrix, axis=0), np.cumsum(sums.gradient, axis=0))
+        ratio = _ratios_at(channels, candidate)
         cut = _best_cut(ratio)
         if ratio[cut] > best:
             best, place = float(ratio[cut]), cut
     return place
 
 
-def _ratios(matrix: Array, gradient: Array) -> Array:
-    """Twice the log likelihood ratio (N,) of cutting before each track, from running sums."""
+def _ratios_at(channels: Sequence[Channel], candidate: Array) -> Array:
+    """Twice the log likelihood ratio (N,) of cutting before each track, by scores there."""
+    sums = per_track(channels, candidate)
+    matrix, gradient = np.cumsum(sums.matrix, axis=0), np.cumsum(sums.gradient, axis=0)
     floor = 1e-6 * np.eye(3)
 
     def explained(matrices: Array, gradients: Array) -> Array:

@@ -4,6 +4,7 @@ The window that it is to judge stays out of it.
 """
 
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -36,6 +37,14 @@ def make_street(http, settings, ago_s=20_000.0):
     return street
 
 
+def learn_street(http, settings, ago_s):
+    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+    street = make_street(http, settings, ago_s)
+    street.keep_to_lanes(PRIOR, WANTED)
+    assert street.look()["reference"]["state"] == "ready"
+    return street
+
+
 @pytest.fixture
 def settings(settings):
     """People of the next minutes are taken, so that they come after what a person said now."""
@@ -46,14 +55,7 @@ def settings(settings):
 def known(request, learned):
     """A street whose reference is learned, and its map with it, so many seconds ago."""
 
-    def make(http, settings):
-        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-        street = make_street(http, settings, request.param)
-        street.keep_to_lanes(PRIOR, WANTED)
-        assert street.look()["reference"]["state"] == "ready"
-        return street
-
-    return learned(f"growth-{request.param:.0f}", make)
+    return learned(f"growth-{request.param:.0f}", partial(learn_street, ago_s=request.param))
 
 
 def map_of(street):

@@ -1,12 +1,12 @@
 """Growth of maps at the expense of estimates that wait: a fifth of a worker's time, no more."""
 
 import time
+from functools import partial
 
 import pytest
 
 from service.jobs import growth_rests
-from tests.conftest import CAMERA
-from tests.service.estimation.test_growth import WANTED, WINDOW, make_street, map_of
+from tests.service.estimation.test_growth import WANTED, WINDOW, learn_street, map_of
 from tests.service.street import PRIOR
 
 
@@ -14,14 +14,7 @@ from tests.service.street import PRIOR
 def known(learned):
     """A street whose reference is learned, and its map with it."""
 
-    def make(http, settings):
-        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-        street = make_street(http, settings)
-        street.keep_to_lanes(PRIOR, WANTED)
-        street.look()
-        return street
-
-    return learned("growth-turns", make)
+    return learned("growth-turns", partial(learn_street, ago_s=20_000.0))
 
 
 def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
