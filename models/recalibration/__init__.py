@@ -14,9 +14,11 @@ from models.people.linking import count_walks, link_pieces
 from models.people.walks import Walks, observe, observe_walks
 from models.recalibration.alarms import AlarmRate, read_alarm_chart
 from models.recalibration.anchoring import begin_creep_log, log_creep, without_creep
+from models.recalibration.doubts import LastPose
 from models.recalibration.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
 from models.recalibration.lacks import Lack
 from models.recalibration.learning import assume_site, learn_site
+from models.recalibration.packing import last_pose_from_bytes, last_pose_to_bytes
 from models.recalibration.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory
@@ -31,6 +33,7 @@ __all__ = [
     "DriftLimits",
     "Intrinsics",
     "Lack",
+    "LastPose",
     "Observations",
     "PoseFinding",
     "Reading",
@@ -43,6 +46,8 @@ __all__ = [
     "count_walks",
     "drift_of",
     "estimate_pose",
+    "last_pose_from_bytes",
+    "last_pose_to_bytes",
     "learn_site",
     "link_pieces",
     "log_creep",

@@ -16,12 +16,13 @@ from models.flow.likelihood import walkers_of
 from models.flow.turn_detection import moved_within
 from models.recalibration.doubts import (
     FullSearch,
-    Known,
+    LastPose,
     Posed,
     begins_at,
     fit_of,
-    is_as_known,
+    is_as_before,
     is_calm,
+    last_pose,
 )
 from models.recalibration.site import CameraSite
 
@@ -33,24 +34,24 @@ class Searched:
     """What a window comes to: the tracks from the newest change on, and their pose.
 
     `change_idx` is the first track after the change; None where there was none. `first` is the
-    first that ended with it or later: `tracks` are from there on. `full` is the newest search of
-    all poses and changes in which nothing was suspected; None where this one suspects something.
+    first that ended with it or later: `tracks` are from there on. `last` is what a next search may
+    begin at; None where this one suspects something.
     """
 
     change_idx: int | None
     first: int
     tracks: Observations
     posed: Posed
-    full: FullSearch | None = None
+    last: LastPose | None = None
 
 
-def posed(tracks: Observations, site: CameraSite, near: Posed | None = None) -> Posed:
+def posed(tracks: Observations, site: CameraSite, near: LastPose | None = None) -> Posed:
     """The pose of tracks that are of one: by speeds, and by places where these are known.
 
     Where it is known to be `near` that of almost the same tracks, others are not looked at.
     """
-    at = None if near is None else near.joint
-    joint = joint_estimate(tracks, site.prior, site.speed_reference, at)
+    ends, means = ((), ()) if near is None else (tuple(near.joint.ends), near.means)
+    joint = joint_estimate(tracks, site.prior, site.speed_reference, ends, means)
     if site.flow is None:
         fused = by_speeds_alone(joint, site.prior)
     else:
@@ -61,12 +62,12 @@ def posed(tracks: Observations, site: CameraSite, near: Posed | None = None) -> 
             joint,
             site.speed_reference,
             site.flow,
-            () if near is None else near.fused.ends,
+            () if near is None else tuple(near.fused.ends),
         )
     return Posed(joint=joint, fused=fused)
 
 
-def search_change(tracks: Observations, site: CameraSite, known: Known | None = None) -> Searched:
+def search_change(tracks: Observations, site: CameraSite, last: LastPose | None = None) -> Searched:
     """The newest change of the camera that is beyond doubt, and the pose from there on.
 
     Where people walk another way than before, or elsewhere, a window is suspected; it is cut
@@ -75,14 +76,14 @@ def search_change(tracks: Observations, site: CameraSite, known: Known | None = 
     Args:
         tracks: of the window, in the order of their ends.
         site: how people walk, and where, if that is known.
-        known: the pose of almost the same tracks: where nothing speaks against it, no others are
+        last: the pose of almost the same tracks: where nothing speaks against it, no others are
             looked at, and no change is looked for.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    if known is not None and begins_at(known, tracks):
-        found = _still_there(tracks, site, known)
+    if last is not None and begins_at(last, tracks):
+        found = _still_there(tracks, site, last)
         if found is not None:
             return found
     whole = posed(tracks, site)
@@ -109,27 +110,29 @@ def search_change(tracks: Observations, site: CameraSite, known: Known | None = 
                 tracks=parts[1],
                 posed=replace(after, fused=fused),
             )
-    full = None
+    begin = None
     if not suspected and tracks.tracks:
-        full = FullSearch(
+        search = FullSearch(
             ended_s=tracks.ended_s,
             suspicion=_suspicion(tracks, site, whole),
             fit=fit_of(whole),
         )
-    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole, full=full)
+        begin = last_pose(whole, site.prior, search)
+    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole, last=begin)
 
 
-def _still_there(tracks: Observations, site: CameraSite, known: Known) -> Searched | None:
-    """What tracks come to at the known pose; None where anything speaks against it."""
-    found = posed(tracks, site, known.posed)
-    if not is_as_known(found, known) or _turned(tracks, site, found.fused) is not None:
+def _still_there(tracks: Observations, site: CameraSite, last: LastPose) -> Searched | None:
+    """What tracks come to at the last pose; None where anything speaks against it."""
+    found = posed(tracks, site, last)
+    if not is_as_before(found, last) or _turned(tracks, site, found.fused) is not None:
         return None
-    full, suspected = known.search, _suspicion(tracks, site, found)
-    if not is_calm(suspected, known):
+    search, suspected = last.search, _suspicion(tracks, site, found)
+    if not is_calm(suspected, last):
         if _hurried(tracks, site, found.fused) is not None:
             return None
-        full = replace(full, suspicion=suspected)
-    return Searched(change_idx=None, first=0, tracks=tracks, posed=found, full=full)
+        search = replace(search, suspicion=suspected)
+    begin = last_pose(found, site.prior, search)
+    return Searched(change_idx=None, first=0, tracks=tracks, posed=found, last=begin)
 
 
 def _suspicion(tracks: Observations, site: CameraSite, whole: Posed) -> float:

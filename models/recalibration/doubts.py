@@ -14,6 +14,7 @@ from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.parameters import PLANE_PARAMETERS
 from models.flow.fusion import FusedEstimate
+from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
 
@@ -54,47 +55,85 @@ class FullSearch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """The pose of almost the same tracks at the same site, and when all others were looked at."""
+class Settled:
+    """What of an estimate the next one goes by: few enough numbers to be stored with each.
 
-    posed: Posed
+    `values` and `covariance` are the estimate's; `ends` (ends, parameters) is where its search
+    ended, the best first.
+    """
+
+    values: Array
+    covariance: Array
+    ends: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LastPose:
+    """Where the next estimate may begin: the pose of almost the same tracks at the same site.
+
+    `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
+    their fields. `fused` is by places too, where they are `registered`: what they determine
+    together is `identifiable`, and `said` is the code of what was to be said of the map. `search`
+    is when all other poses were looked at.
+    """
+
+    prior: CameraPose
+    joint: Settled
+    means: tuple[Array, ...]
+    fused: Settled
+    registered: bool
+    identifiable: tuple[str, ...]
+    said: str | None
     search: FullSearch
 
 
-def begins_at(known: Known, tracks: Observations) -> bool:
-    """Whether tracks are so much the same that their pose is looked for at the known one alone."""
-    joint, fused = known.posed.joint, known.posed.fused
+def last_pose(found: Posed, prior: CameraPose, search: FullSearch) -> LastPose | None:
+    """What a next estimate may begin at; None where that would have to look at all poses anyway."""
+    joint, fused = found.joint, found.fused
+    if joint.reason is not None or joint.identifiable != PLANE_PARAMETERS:
+        return None
+    if fused.identifiable[: len(PLANE_PARAMETERS)] != PLANE_PARAMETERS:
+        return None
+    return LastPose(
+        prior=prior,
+        joint=_settled(joint),
+        means=joint.means,
+        fused=_settled(fused),
+        registered=fused.registered,
+        identifiable=fused.identifiable,
+        said=_code(fused),
+        search=search,
+    )
+
+
+def begins_at(last: LastPose, tracks: Observations) -> bool:
+    """Whether tracks are so much the same that their pose is looked for at the last one alone."""
     # Late tracks are as new: a tracker may post yesterday's today.
-    new = int((~np.isin(tracks.ended_s, known.search.ended_s)).sum())
+    new = int((~np.isin(tracks.ended_s, last.search.ended_s)).sum())
     return (
-        tracks.tracks >= max(_FEWEST, (1 - _NEW) * known.search.ended_s.size)
+        tracks.tracks >= max(_FEWEST, (1 - _NEW) * last.search.ended_s.size)
         and new <= _NEW * tracks.tracks
-        and set(joint.identifiable) == set(PLANE_PARAMETERS)
-        and joint.reason is None
-        and set(PLANE_PARAMETERS) <= set(fused.identifiable)
     )
 
 
-def is_as_known(found: Posed, known: Known) -> bool:
-    """Whether a pose that was looked for at the known one alone is another version of it."""
-    first = known.posed
+def is_as_before(found: Posed, last: LastPose) -> bool:
+    """Whether a pose that was looked for at the last one alone is another version of it."""
+    joint, fused = found.joint, found.fused
     return (
-        found.joint.identifiable == first.joint.identifiable
-        and found.fused.registered == first.fused.registered
-        and found.fused.identifiable == first.fused.identifiable
-        and _code(found.fused) == _code(first.fused)
-        and len(found.fused.ends) == len(first.fused.ends)
-        and fit_of(found) > known.search.fit - _WORSE / max(found.joint.walking_groups, 1)
-        and _is_near(found.joint.values, found.joint.covariance, first.joint, PLANE_PARAMETERS)
-        and _is_near(
-            found.fused.values, found.fused.covariance, first.fused, found.fused.identifiable
-        )
+        joint.identifiable == PLANE_PARAMETERS
+        and fused.identifiable == last.identifiable
+        and fused.registered == last.registered
+        and _code(fused) == last.said
+        and len(fused.ends) == len(last.fused.ends)
+        and fit_of(found) > last.search.fit - _WORSE / max(joint.walking_groups, 1)
+        and _is_near(joint, last.joint, PLANE_PARAMETERS)
+        and _is_near(fused, last.fused, last.identifiable)
     )
 
 
-def is_calm(suspicion: float, known: Known) -> bool:
+def is_calm(suspicion: float, last: LastPose) -> bool:
     """Whether tracks are no more suspected of a change than those were that had none."""
-    return suspicion <= max(_SUSPICION, _MORE_SUSPICION * known.search.suspicion)
+    return suspicion <= max(_SUSPICION, _MORE_SUSPICION * last.search.suspicion)
 
 
 def fit_of(posed: Posed) -> float:
@@ -106,15 +145,15 @@ def _code(fused: FusedEstimate) -> str | None:
     return None if fused.reason is None else str(fused.reason.code)
 
 
-def _is_near(
-    values: Array,
-    covariance: Array,
-    other: JointEstimate | FusedEstimate,
-    asked: tuple[str, ...],
-) -> bool:
+def _settled(found: JointEstimate | FusedEstimate) -> Settled:
+    ends = np.array(found.ends, dtype=np.float64).reshape(-1, found.values.size)
+    return Settled(values=found.values, covariance=found.covariance, ends=ends)
+
+
+def _is_near(found: JointEstimate | FusedEstimate, last: Settled, asked: tuple[str, ...]) -> bool:
     """Whether the parameters asked for are as before, and as sure."""
     places = [PARAMETERS.index(name) for name in asked]
-    sd, other_sd = (np.sqrt(np.diag(each)[places]) for each in (covariance, other.covariance))
-    near = np.abs(values - other.values)[places] <= _FARTHEST * np.minimum(sd, other_sd)
-    ratio = sd / other_sd
+    sd, last_sd = (np.sqrt(np.diag(each.covariance)[places]) for each in (found, last))
+    near = np.abs(found.values - last.values)[places] <= _FARTHEST * np.minimum(sd, last_sd)
+    ratio = sd / last_sd
     return bool(near.all() and (ratio < _WIDER).all() and (ratio > 1 / _WIDER).all())

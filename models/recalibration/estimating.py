@@ -12,7 +12,7 @@ from models.estimation.joint.reference import FEWEST_WALKERS
 from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.recalibration.changes import posed, search_change
-from models.recalibration.doubts import FullSearch, Known, Posed
+from models.recalibration.doubts import LastPose
 from models.recalibration.lacks import Lack, unless_failed
 from models.recalibration.site import CameraSite
 
@@ -34,8 +34,8 @@ class PoseFinding:
     `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
     same without the newest people; None unless a verdict asks for it. `change_idx` is the first
     track after the change, None where there was none, and `first` the first that counts.
-    `lacks` says what failed beside. `full` is the newest search of all poses and changes: what a
-    next estimate goes by that begins where this one ended.
+    `lacks` says what failed beside. `last` is where the next estimate may begin; None where it has
+    to look at all poses.
     """
 
     prior: CameraPose
@@ -45,7 +45,7 @@ class PoseFinding:
     change_idx: int | None = None
     first: int = 0
     lacks: tuple[Lack, ...] = ()
-    full: FullSearch | None = None
+    last: LastPose | None = None
 
     @property
     def drift(self) -> Drift:
@@ -62,7 +62,7 @@ def estimate_pose(
     tracks: Observations,
     site: CameraSite,
     second_look: SecondLook | None = None,
-    last: PoseFinding | None = None,
+    last: LastPose | None = None,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
@@ -74,7 +74,7 @@ def estimate_pose(
         site: of the camera.
         second_look: what a verdict goes by, if there is to be one: where it is about to change, the
             pose is asked for without the newest people, too. That takes as long again.
-        last: the finding of almost the same tracks at the same site, the newest of them left out
+        last: of the finding of almost the same tracks at the same site, the newest of them left out
             and some older ones: where nothing speaks against it, its pose is refined, which takes a
             quarter to a half of the time and comes to the same.
 
@@ -89,11 +89,11 @@ def estimate_pose(
     lacks: list[Lack] = []
     searched = None
     if site.flow is not None:
-        known = _known(last, site)
-        searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site, known))
+        begin = _at_site(last, site)
+        searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site, begin))
     if searched is None:
         site = replace(site, flow=None)
-        searched = search_change(tracks, site, None if lacks else _known(last, site))
+        searched = search_change(tracks, site, None if lacks else _at_site(last, site))
     fused = searched.posed.fused
     earlier = None
     if second_look is not None:
@@ -106,17 +106,15 @@ def estimate_pose(
         change_idx=searched.change_idx,
         first=searched.first,
         lacks=tuple(lacks),
-        full=searched.full,
+        last=None if lacks else searched.last,
     )
 
 
-def _known(last: PoseFinding | None, site: CameraSite) -> Known | None:
-    """What a finding before says of the same site; None where it is none to begin at."""
-    if last is None or last.full is None or last.lacks or last.prior != site.prior:
+def _at_site(last: LastPose | None, site: CameraSite) -> LastPose | None:
+    """The last pose, where it is of the same site; else None."""
+    if last is None or last.prior != site.prior:
         return None
-    if last.fused.registered != (site.flow is not None):
-        return None
-    return Known(posed=Posed(joint=last.joint, fused=last.fused), search=last.full)
+    return last if last.registered == (site.flow is not None) else None
 
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:

@@ -22,6 +22,7 @@ from models.recalibration import drift_of
 from service.alerting.alerts import end_alert, fired_by_estimate, open_alert
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
+from service.estimation.last_poses import save_last_pose
 from service.estimation.limits import drift_limits
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
@@ -63,6 +64,7 @@ def save_estimate(
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)
     session.add(record)
+    save_last_pose(session, reference.id, finding.last)
     payload = {
         "camera_id": record.camera_id,
         "state": record.state,

@@ -43,6 +43,14 @@ class SeenTrack:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class KeptPose:
+    """A last pose as bytes, and the `basis` that it hangs on: the site and what is suspected."""
+
+    basis: bytes
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
@@ -50,7 +58,8 @@ class Evidence:
     and `anchor`; None where there is none. `predictions` has what the model in use says of the
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `drifting` says that an alert tells of a drift by now. `before` is the piece before each of the
-    tracks of a walk, as of `link_pieces`; None where nobody has looked yet.
+    tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
+    estimate before ended.
     """
 
     camera_id: str
@@ -70,6 +79,7 @@ class Evidence:
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
     before: npt.NDArray[np.int64] | None = None
+    last: KeptPose | None = None
 
 
 def load_evidence(
@@ -101,6 +111,7 @@ def load_evidence(
         return None
     answered_at = alerts.answered_at(session, camera_id)
     kept = flow_maps.find(session, reference.id)
+    last = flow_maps.last_pose(session, reference.id)
     predictions: Sequence[PredictionRecord] = []
     if model is not None:
         pks = [record.id for record in records]
@@ -132,6 +143,7 @@ def load_evidence(
         model_id=None if model is None else model.id,
         predictions=tuple(predictions),
         before=gathered.before,
+        last=None if last is None else KeptPose(basis=last.basis, data=last.data),
     )
 
 

@@ -34,9 +34,9 @@ from models.recalibration import (
     read_alarm_chart,
 )
 from service.estimation.anchoring import creep_of, first_site
-from service.estimation.evidence import Evidence, SeenTrack
+from service.estimation.evidence import Evidence, KeptPose, SeenTrack
 from service.estimation.lacks import Lacks
-from service.estimation.recent import Recent
+from service.estimation.last_poses import basis_of, begin_of, kept_of
 from service.reasons import Reasons
 from service.store.tables.tracks import PredictionRecord
 from service.windows.people import MOST_PIECES
@@ -51,7 +51,7 @@ class Finding:
     these are too few, long before a pose can say how far; None where there is no chart. `creep`
     is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `pieces` says how many of the tracks are of others' walks, where these are many. `lacks` names
-    what should be there beside the served pose and failed.
+    what should be there beside the served pose and failed. `last` is where the next one may begin.
     """
 
     joint: JointEstimate
@@ -64,6 +64,7 @@ class Finding:
     change: SeenTrack | None
     pieces: Reason | None = None
     lacks: Reasons = ()
+    last: KeptPose | None = None
 
     @property
     def newest_pk(self) -> int:
@@ -71,12 +72,11 @@ class Finding:
         return max(track.pk for track in self.tracks)
 
 
-def compute_finding(evidence: Evidence, seed: int, recent: Recent | None = None) -> Finding | None:
+def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     """The pose by all estimators, from the newest change on; None where too few people walk.
 
-    It begins at what was found of the camera in `recent`, if that may be, and is kept there.
+    It begins at what was found of the camera last, if that may be.
     """
-    recent = recent or Recent()
     walks = observe_walks(
         [track.trajectory for track in evidence.tracks],
         evidence.intrinsics,
@@ -98,9 +98,9 @@ def compute_finding(evidence: Evidence, seed: int, recent: Recent | None = None)
     judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
     reading = _read(evidence, observed, site, 0, lacks)
     suspicious = reading is not None and reading.suspicious
-    last = recent.last(evidence, crept=crept, suspicious=suspicious)
-    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None, last)
-    recent.keep(evidence, found, crept=crept, suspicious=suspicious)
+    basis = basis_of(evidence, crept=crept, suspicious=suspicious)
+    begin = begin_of(evidence.last, basis)
+    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None, begin)
     lacks.take(found.lacks)
     if found.first:
         reading = _read(evidence, observed, site, found.first, lacks)
@@ -121,6 +121,7 @@ def compute_finding(evidence: Evidence, seed: int, recent: Recent | None = None)
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         pieces=walks.reason,
         lacks=tuple(lacks.said),
+        last=kept_of(found.last, basis),
     )
 
 

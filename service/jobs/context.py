@@ -3,7 +3,6 @@
 import threading
 from dataclasses import dataclass, field
 
-from service.estimation.recent import Recent
 from service.job_queue import JobQueue
 from service.jobs.growth_rests import GrowthRests, GrowthTurns
 from service.jobs.in_hand import InHand
@@ -24,6 +23,5 @@ class JobContext:
     in_hand: InHand = field(default_factory=InHand)
     growth_rests: GrowthRests = field(default_factory=GrowthRests)
     growth_turns: GrowthTurns = field(default_factory=GrowthTurns)
-    recent: Recent = field(default_factory=Recent)
     steps: StepWatch = field(default_factory=StepWatch)
     reconciled: Rota = field(default_factory=Rota)

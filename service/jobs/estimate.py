@@ -55,7 +55,7 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     lacks.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
-    finding = None if evidence is None else compute_finding(evidence, settings.seed, context.recent)
+    finding = None if evidence is None else compute_finding(evidence, settings.seed)
     if finding is not None:
         finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
     with store.write() as session:

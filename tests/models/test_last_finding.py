@@ -8,10 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.errors import CheckpointError
 from models.estimation.joint.observations import of_tracks
 from models.evaluation.recordings import load_recording
 from models.geometry.pose import CameraPose
-from models.recalibration import estimate_pose, learn_site, observe
+from models.recalibration import (
+    estimate_pose,
+    last_pose_from_bytes,
+    last_pose_to_bytes,
+    learn_site,
+    observe,
+)
 from models.simulation.knocked import Knock, knock_trajectory
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import by_end
@@ -54,9 +61,9 @@ def follow(every, site, window=WINDOW, step=STEP):
         since = max(since, came - window)
         tracks = of_tracks(every, np.arange(since, came))
         full, found = estimate_pose(tracks, site), estimate_pose(tracks, site, last=last)
-        refined = found.full is not None and found.full.to_s < tracks.ended_s.max()
+        refined = found.last is not None and found.last.search.to_s < tracks.ended_s.max()
         yield full, found, refined
-        last, since = found, since + full.first
+        last, since = found.last, since + full.first
 
 
 def apart(full, found):
@@ -105,23 +112,40 @@ def test_a_knock_in_mid_window_is_found_as_soon(site, people):
 def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     def came(tracks, last):
         found = estimate_pose(tracks, site, last=last)
-        return found.full is None or found.full.to_s == tracks.ended_s.max()
+        return found.last is None or found.last.search.to_s == tracks.ended_s.max()
 
     every = observe(people, LENS, PRIOR)
     first = of_tracks(every, np.arange(WINDOW))
-    last = estimate_pose(first, site)
+    last = estimate_pose(first, site).last
     near = of_tracks(every, np.arange(10, WINDOW + 10))
     assert not came(near, last)
     assert came(near, None)
     assert came(near, replace(last, prior=CameraPose(height_m=6.1, tilt_rad=0.3, roll_rad=0.0)))
-    assert came(near, replace(last, full=None))  # a change was suspected
-    assert came(near, replace(last, full=replace(last.full, fit=last.full.fit + 1)))  # fits worse
+    better = replace(last.search, fit=last.search.fit + 1)
+    assert came(near, replace(last, search=better))  # it fits worse
     assert came(of_tracks(every, np.arange(45, 200)), last)  # a quarter is new
     assert came(of_tracks(every, np.arange(60, WINDOW + 10)), last)  # the window was cut
     late = replace(near, ended_s=np.where(np.arange(WINDOW) % 3, near.ended_s, near.ended_s - 0.1))
     assert came(late, last)  # a third of it is of other tracks, though none is newer
     elsewhere = replace(last.fused, values=last.fused.values + [0.0, 0.02, 0.0, 0.0])
     assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
+    assert came(near, replace(last, registered=False))  # by a site without a map
+    assert came(near, replace(last, said="flow_changed"))
+
+
+def test_a_last_pose_that_was_stored_is_the_same_start(site, people):
+    every = observe(people, LENS, PRIOR)
+    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).last
+    data = last_pose_to_bytes(last)
+    assert len(data) < 8000
+    stored = last_pose_from_bytes(data)
+    assert last_pose_to_bytes(stored) == data
+    near = of_tracks(every, np.arange(10, WINDOW + 10))
+    first, second = (estimate_pose(near, site, last=begin) for begin in (last, stored))
+    assert second.pose == first.pose
+    assert second.last.search.to_s == last.search.to_s  # no other poses were tried
+    with pytest.raises(CheckpointError, match="last_pose"):
+        last_pose_from_bytes(data[:-9])
 
 
 @pytest.fixture(scope="module", params=["atc_20121024", "lincoln_corridor"])

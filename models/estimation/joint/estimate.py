@@ -94,22 +94,23 @@ def joint_estimate(
     observations: Observations,
     prior: CameraPose,
     reference: SpeedReference,
-    near: JointEstimate | None = None,
+    near: Sequence[Array] = (),
+    means: Sequence[Array] = (),
 ) -> JointEstimate:
     """The pose that explains all tracks best, whatever it was before.
 
-    Where it is known to be `near` one of the ends of an estimate of almost the same tracks, no
-    other poses are looked at.
+    Where it is known to be `near` one of the `ends` (3,) of an estimate of almost the same tracks,
+    with about its `means`, no other poses are looked at.
     """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
-    if near is None:
+    if not near:
         few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
         begin = starts(few, plane_parameters_of(prior), _STARTS)
         first = _distinct([fit_pose(few, start, hold) for start in begin])
         ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     else:
-        ends = _distinct([fit_pose(channels, start, hold, near.means) for start in near.ends])
+        ends = _distinct([fit_pose(channels, start, hold, means) for start in near])
     verticals = vertical_estimate(observations.uprights, reference.verticals)
     return _said_of(observations, channels, ends, reference, verticals)
 

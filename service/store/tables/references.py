@@ -1,4 +1,4 @@
-"""Records of references, the flow maps learned with them, and their anchors."""
+"""Records of references, the flow maps learned with them, their anchors and last poses."""
 
 from datetime import datetime
 
@@ -90,3 +90,16 @@ class AnchorRecord(Record):
     learned_at: Mapped[datetime]
     creep: Mapped[bytes | None] = mapped_column(LargeBinary)
     logged_to_s: Mapped[float | None]
+
+
+class LastPoseRecord(Record):
+    """Where the next estimate against a reference may begin (`models.recalibration.doubts`).
+
+    `basis` tells what it hangs on beside the tracks: of another one it says nothing.
+    """
+
+    __tablename__ = "last_poses"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    basis: Mapped[bytes] = mapped_column(LargeBinary)
+    data: Mapped[bytes] = mapped_column(LargeBinary)

@@ -1,0 +1,58 @@
+"""Where an estimate begins: at what was found of the camera last, by whichever worker.
+
+Losing it costs a full search, and nothing else.
+"""
+
+import hashlib
+
+from sqlalchemy.orm import Session
+
+from models.errors import CheckpointError
+from models.recalibration import LastPose, last_pose_from_bytes, last_pose_to_bytes
+from service.estimation.evidence import Evidence, KeptPose
+from service.store import flow_maps
+from service.store.tables.references import LastPoseRecord
+
+
+def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
+    """What tells the site of an estimate, and what its chart suspects, from any other."""
+    parts = (
+        evidence.site,
+        evidence.flow,
+        evidence.anchor.flow if crept and evidence.anchor else b"",
+    )
+    named = (evidence.reference_id, evidence.intrinsics, evidence.prior, suspicious)
+    digest = hashlib.blake2b(repr(named).encode(), digest_size=16)
+    for part in parts:
+        digest.update(hashlib.blake2b(part or b"", digest_size=16).digest())
+    return digest.digest()
+
+
+def begin_of(kept: KeptPose | None, basis: bytes) -> LastPose | None:
+    """The pose that an estimate may begin at; None where there is none on the same basis.
+
+    One of another release cannot be read: that is as none.
+    """
+    if kept is None or kept.basis != basis:
+        return None
+    try:
+        return last_pose_from_bytes(kept.data)
+    except CheckpointError:
+        return None
+
+
+def kept_of(last: LastPose | None, basis: bytes) -> KeptPose | None:
+    """What is to be kept for the next estimate, if anything is."""
+    return None if last is None else KeptPose(basis=basis, data=last_pose_to_bytes(last))
+
+
+def save_last_pose(session: Session, reference_id: int, kept: KeptPose | None) -> None:
+    """Keep it in the place of the one before; what is None takes that away."""
+    record = flow_maps.last_pose(session, reference_id)
+    if kept is None:
+        if record is not None:
+            session.delete(record)
+    elif record is None:
+        session.add(LastPoseRecord(reference_id=reference_id, basis=kept.basis, data=kept.data))
+    else:
+        record.basis, record.data = kept.basis, kept.data
