@@ -15,7 +15,8 @@ from models.doors.door_map import (
     DoorGrain,
     DoorMap,
     Nodes,
-    count_around,
+    around,
+    count_at,
     door_map_of,
 )
 from models.doors.likelihood import door_values
@@ -45,7 +46,8 @@ def doors_of(
     moments: Moments, weights: Array, at: Array, nodes: Nodes, grain: DoorGrain
 ) -> DoorMap:
     """The door map of moments seen from a known pose (4,), each track counted by its weight."""
-    return door_map_of(_counts(moments, weights, at, nodes, grain.smooth_m), nodes, grain)
+    (counts,) = around(_counts(moments, weights, at, nodes), nodes, (grain.smooth_m,))
+    return door_map_of(counts, nodes, grain)
 
 
 def best_door_grain(parts: Sequence[Part], at: Array) -> DoorGrain | None:
@@ -58,9 +60,10 @@ def best_door_grain(parts: Sequence[Part], at: Array) -> DoorGrain | None:
     if not all(part.known.events and part.asked.events for part in parts):
         return None
     gains: dict[DoorGrain, list[Array]] = {}
-    for smooth_m in _SMOOTH_M:
-        for part in parts:
-            counts = _counts(part.known, part.weights, at, part.nodes, smooth_m)
+    for part in parts:
+        counted = _counts(part.known, part.weights, at, part.nodes)
+        smoothed = around(counted, part.nodes, _SMOOTH_M)
+        for smooth_m, counts in zip(_SMOOTH_M, smoothed, strict=True):
             for alike in (False, True):
                 grain = DoorGrain(smooth_m=smooth_m, alike=alike)
                 doors = door_map_of(counts, part.nodes, grain)
@@ -71,23 +74,18 @@ def best_door_grain(parts: Sequence[Part], at: Array) -> DoorGrain | None:
     return best if gained.mean() > _CLEAR * gained.std() / math.sqrt(gained.size) else None
 
 
-def _counts(moments: Moments, weights: Array, at: Array, nodes: Nodes, smooth_m: float) -> Counts:
+def _counts(moments: Moments, weights: Array, at: Array, nodes: Nodes) -> Counts:
     rotation = rotation_from_angles(at[0], at[1], at[3])
     place, on_ground = ground_of_rays(moments.rays, rotation, beyond=0.0)
-    return count_around(
-        moments,
-        place * math.exp(at[2]),
-        on_ground,
-        weights[moments.owner_idx],
-        nodes,
-        smooth_m,
-    )
+    weight = weights[moments.owner_idx]
+    return count_at(moments, place * math.exp(at[2]), on_ground, weight, nodes)
 
 
 def _gains(part: Part, doors: DoorMap, at: Array) -> Array:
     """How much (P,) likelier each walking group's people begin and end there than without doors."""
     none = replace(doors, ratio=np.ones_like(doors.ratio))
-    gains = door_values(part.asked, doors, at) - door_values(part.asked, none, at)
+    there, nowhere = (door_values(part.asked, each, at[None])[0] for each in (doors, none))
+    gains = there - nowhere
     owners = np.unique(part.asked.owner_idx)
     _, group = np.unique(part.group_idx[owners], return_inverse=True)
     return np.asarray(np.bincount(group, gains[owners]) / np.bincount(group))

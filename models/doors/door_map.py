@@ -5,7 +5,8 @@ Source: Clayton and Kaldor 1987, observed over expected counts, shrunk; Stauffer
 sinks of tracks.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -62,23 +63,24 @@ class DoorMap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
-    """What there is within the reach of a Gaussian around nodes, all (X, Y) for each kind.
+    """What there is at each of the nodes, or within the reach of a Gaussian around them.
 
-    `seen` are events, `wanted` those that are usual, `walked_s` the time at risk of both kinds.
-    `log_size` (K,) and `rate` (2, K) are as of a door map.
+    For either kind, `seen` (2, X, Y) are events, `wanted` (2, X, Y) those that are usual;
+    `walked_s` (X, Y) is the time at risk of both. `log_size` (K,) and `rate` (2, K) are as of a
+    door map.
     """
 
-    seen: tuple[Array, Array]
-    wanted: tuple[Array, Array]
+    seen: Array
+    wanted: Array
     walked_s: Array
     log_size: Array
     rate: Array
 
 
-def count_around(
-    moments: Moments, place: Array, on_ground: Mask, weight: Array, nodes: Nodes, smooth_m: float
+def count_at(
+    moments: Moments, place: Array, on_ground: Mask, weight: Array, nodes: Nodes
 ) -> Counts:
-    """What there is around nodes, of moments at a known pose.
+    """What there is at the nodes, of moments at a known pose.
 
     Args:
         moments: of people who walk, one at least.
@@ -86,36 +88,41 @@ def count_around(
         on_ground: which have one (M,).
         weight: what each counts for (M,), its track's.
         nodes: of the map.
-        smooth_m: standard deviation of the Gaussian.
     """
     weight = weight * on_ground
     small, large = float(moments.log_size.min()), float(moments.log_size.max())
     log_size = np.linspace(small, large + _SIZES_APART, int((large - small) / _SIZES_APART) + 2)
     rate = np.stack([_rates(moments, weight, log_size, kind) for kind in (0, 1)])
-    sd = smooth_m / nodes.cell_m
     at = (place - nodes.corner) / nodes.cell_m
-
-    def around(counted: Array) -> Array:
-        return np.asarray(4 * np.pi * sd**2 * _smoothed(_binned(at, counted, nodes.size), sd))
-
-    def usual(kind: int) -> Array:
-        return np.asarray(np.interp(moments.log_size, log_size, rate[kind]))
-
+    usual = [np.interp(moments.log_size, log_size, rate[kind]) for kind in (0, 1)]
+    counted = [
+        *(moments.event == kind for kind in (0, 1)),
+        *(usual[kind] * moments.seconds[:, kind] for kind in (0, 1)),
+        moments.seconds.mean(axis=1),
+    ]
+    every = np.stack([_binned(at, weight * each, nodes.size) for each in counted])
     return Counts(
-        seen=(around(weight * (moments.event == 0)), around(weight * (moments.event == 1))),
-        wanted=(
-            around(weight * usual(0) * moments.seconds[:, 0]),
-            around(weight * usual(1) * moments.seconds[:, 1]),
-        ),
-        walked_s=around(weight * moments.seconds.mean(axis=1)),
-        log_size=log_size,
-        rate=rate,
+        seen=every[:2], wanted=every[2:4], walked_s=every[4], log_size=log_size, rate=rate
     )
+
+
+def around(counts: Counts, nodes: Nodes, widths_m: Sequence[float]) -> Iterator[Counts]:
+    """What there is within the reach of a Gaussian around the nodes, for each of its widths."""
+    every = np.concatenate([counts.seen, counts.wanted, counts.walked_s[None]])
+    size = (_fast(nodes.size[0]), _fast(nodes.size[1]))
+    waves = np.fft.rfft2(every, s=size)
+    rates = 2 * np.pi * np.fft.fftfreq(size[0])[:, None], 2 * np.pi * np.fft.rfftfreq(size[1])
+    for smooth_m in widths_m:
+        sd = smooth_m / nodes.cell_m
+        kernel = 4 * np.pi * sd**2 * np.exp(-0.5 * sd**2 * (rates[0] ** 2 + rates[1] ** 2))
+        smooth = np.fft.irfft2(waves * kernel, s=size)[:, : nodes.size[0], : nodes.size[1]]
+        smooth = np.clip(smooth, 0.0, None)
+        yield replace(counts, seen=smooth[:2], wanted=smooth[2:4], walked_s=smooth[4])
 
 
 def door_map_of(counts: Counts, nodes: Nodes, grain: DoorGrain) -> DoorMap:
     """The door map of what there is around its nodes."""
-    seen, wanted = np.stack(counts.seen, axis=2), np.stack(counts.wanted, axis=2)
+    seen, wanted = (np.stack(list(each), axis=2) for each in (counts.seen, counts.wanted))
     if grain.alike:
         seen, wanted = (np.repeat(n.sum(axis=2, keepdims=True), 2, axis=2) for n in (seen, wanted))
     return DoorMap(
@@ -170,12 +177,13 @@ def _binned(at: Array, weight: Array, size: tuple[int, int]) -> Array:
     return counts.reshape(size)
 
 
-def _smoothed(counts: Array, sd: float) -> Array:
-    """Counts (X, Y) smoothed by a Gaussian of so many nodes."""
-    rates = (
-        2 * np.pi * np.fft.fftfreq(counts.shape[0]),
-        2 * np.pi * np.fft.rfftfreq(counts.shape[1]),
-    )
-    kernel = np.exp(-0.5 * sd**2 * (rates[0][:, None] ** 2 + rates[1] ** 2))
-    smooth = np.fft.irfft2(np.fft.rfft2(counts) * kernel, s=counts.shape)
-    return np.asarray(np.clip(smooth, 0.0, None))
+def _fast(length: int) -> int:
+    """The next length that Fourier transforms are fast for: of no prime factor beyond 5."""
+    while True:
+        left = length
+        for factor in (2, 3, 5):
+            while left % factor == 0:
+                left //= factor
+        if left == 1:
+            return length
+        length += 1

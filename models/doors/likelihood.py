@@ -2,21 +2,25 @@
 
 import math
 
+import numpy as np
+
 from models.doors.door_map import DoorMap
 from models.doors.moments import Moments
 from models.doors.terms import Camera, Nodes, Rates, terms_of
 from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, rotation_from_angles
 
+_NO_TURNS = np.empty((0, 3, 3))  # no slopes are asked for
 
-def door_values(moments: Moments, doors: DoorMap, candidate: Array) -> Array:
-    """The log likelihood (tracks,) of beginnings and ends, seen from a candidate (4,)."""
-    return _asked(moments, doors, candidate, None, scored=False)[0]
+
+def door_values(moments: Moments, doors: DoorMap, candidates: Array) -> Array:
+    """Log likelihoods (K, tracks) of beginnings and ends, seen from candidates (K, 4)."""
+    return np.stack([_terms(moments, doors, _camera(each))[0] for each in candidates])
 
 
 def door_likelihood(moments: Moments, doors: DoorMap, candidate: Array) -> tuple[Array, Array]:
     """The same with its slopes (tracks, 4) by tilt, roll, log height and heading."""
-    return _asked(moments, doors, candidate, None, scored=True)
+    return _terms(moments, doors, _camera(candidate), _turns(candidate))
 
 
 def anchored_door_scores(
@@ -26,15 +30,17 @@ def anchored_door_scores(
 
     Their mean is nothing at the truth, whatever doors there are on ground nobody knows.
     """
-    return _asked(moments, doors, candidate, anchor, scored=True)[1]
+    return _terms(moments, doors, _camera(candidate), _turns(candidate), _camera(anchor))[1]
 
 
-def _asked(
-    moments: Moments, doors: DoorMap, candidate: Array, anchor: Array | None, *, scored: bool
+def _terms(
+    moments: Moments,
+    doors: DoorMap,
+    camera: Camera,
+    turns: Array = _NO_TURNS,
+    anchor: Camera | None = None,
 ) -> tuple[Array, Array]:
-    """Values and scores; of known ground alone, where there is an anchor (4,)."""
-    rotation, turns = rotation_and_turns(*(float(candidate[number]) for number in (0, 1, 3)))
-    camera = Camera(rotation=rotation, height_m=math.exp(candidate[2]))
+    """Values and, with the turns, scores; of known ground alone, where there is an anchor."""
     values, scores = terms_of(
         moments.rays,
         moments.event,
@@ -55,9 +61,8 @@ def _asked(
         ),
         camera,
         turns,
-        camera if anchor is None else _camera(anchor),
+        camera if anchor is None else anchor,
         anchor is not None,
-        scored,
     )
     return doors.weight * values, doors.weight * scores
 
@@ -65,3 +70,7 @@ def _asked(
 def _camera(candidate: Array) -> Camera:
     rotation = rotation_from_angles(candidate[0], candidate[1], candidate[3])
     return Camera(rotation=rotation, height_m=math.exp(candidate[2]))
+
+
+def _turns(candidate: Array) -> Array:
+    return rotation_and_turns(*(float(candidate[number]) for number in (0, 1, 3)))[1]

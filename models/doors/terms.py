@@ -82,9 +82,8 @@ def terms_of(
     turns: Array,
     anchor: Camera,
     anchored: bool,
-    scored: bool,
 ) -> tuple[Array, Array]:
-    """Values (tracks,) and scores (tracks, 4), zeros where they are not scored.
+    """Values (tracks,) and scores (tracks, 4), zeros where no slopes are asked for.
 
     The rate of a kind is the usual one times a r + b, where r is the map's ratio. If there are
     fewer events than usual, all doors are used less, a < 1; if there are more, the tracker loses
@@ -100,12 +99,11 @@ def terms_of(
         nodes: the door map.
         rates: what is usual.
         camera: at the candidate.
-        turns: of tilt and roll (2, 3, 3), as of `rotation_and_turns`.
+        turns: of tilt and roll (2, 3, 3), as of `rotation_and_turns`; (0, 3, 3) for no slopes.
         anchor: another camera.
         anchored: whether moments count by how well their places, seen from there, are known.
-        scored: whether slopes are wanted.
     """
-    count = len(rays)
+    count, scored = len(rays), len(turns) > 0
     share, usual = np.ones(count), np.zeros((count, 2))
     events, expected = np.full(2, _USUAL_EVENTS), np.full(2, _USUAL_EVENTS)
     for number in range(count):

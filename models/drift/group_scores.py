@@ -22,12 +22,13 @@ from models.estimation.parameters import plane_parameters_of
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.reference import candidate_of
 from models.flow.registration import Site
-from models.flow.turn_detection import REACH, groups_in_time
+from models.flow.turn_detection import REACH, along_paths, groups_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
 SCORES = 14
-_STEPS = (1.0, 0.35)  # of the reach: a map smoothed by a metre, and its finer lines
+# The reach, and a part of it: a map is smoothed by a metre, and has finer lines.
+_STEPS = np.concatenate([share * np.diag(REACH) for share in (1.0, 0.35)])
 _FARTHEST = 0.5  # of a log: a pace that is further off says no more than this
 _PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and paces are weighed
 
@@ -89,7 +90,7 @@ def scores_at(
         [
             -slopes,
             _bounded(observations, walkers, usual, parameters),
-            *(_along_paths(walkers, usual.paths, at, step) for step in _STEPS),
+            along_paths(walkers, usual.paths, at, _STEPS),
         ],
         axis=1,
     )
@@ -125,15 +126,3 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
     np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
     number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)
     return np.asarray(sums / np.maximum(number, 1)[:, None])
-
-
-def _along_paths(walkers: Walkers, paths: Site, at: Array, share: float) -> Array:
-    """How much likelier tracks (N, 4) are a step on than a step back, along each parameter."""
-    return np.stack(
-        [
-            paths.track_log_likelihoods(walkers, at + step)
-            - paths.track_log_likelihoods(walkers, at - step)
-            for step in share * np.diag(REACH)
-        ],
-        axis=1,
-    )

@@ -109,9 +109,11 @@ def _from_afar(posterior: Posterior, joint: JointEstimate) -> list[tuple[Peak, i
     peaks = register(posterior, _HEADINGS)
     best = peaks[0].value
     begin = [(peak, _ROUNDS if peak.value > best - _UNLIKELY else 0) for peak in peaks]
-    for other in joint.others:
-        candidate = np.append(other, peaks[0].candidate[3])
-        begin.append((Peak(candidate=candidate, value=posterior.value(candidate)), _ROUNDS))
+    others = np.array([np.append(other, peaks[0].candidate[3]) for other in joint.others])
+    if len(others):
+        values = posterior.values(others).tolist()
+        found = (Peak(candidate=c, value=v) for c, v in zip(others, values, strict=True))
+        begin.extend((peak, _ROUNDS) for peak in found)
     return begin
 
 
@@ -166,7 +168,7 @@ def flatter(best: End, covariance: Array) -> Array:
     sd = math.sqrt(covariance[3, 3])
     # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
     turns = sd * np.arange(-4.0, 5.0)
-    values = np.array([best.posterior.value(best.candidate + turn * line) for turn in turns])
+    values = best.posterior.values(best.candidate + turns[:, None] * line)
     density = np.exp(values - values.max())
     variance = float(density @ turns**2 / density.sum())
     return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

@@ -13,7 +13,7 @@ from models.estimation.joint.observations import Observations, of_tracks
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.map.flow_map import Grain
 from models.flow.registration import Site
-from models.flow.site_doors import Quarter, door_grain, with_doors
+from models.flow.site_doors import Quarter, door_grain
 from models.flow.site_map import best_grain, mapped
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
@@ -84,16 +84,11 @@ def fold_maps(
         )
         for of, left_out, known, _ in parts
     ]
-    doors = door_grain(quarters, at)
+    doors, sites = door_grain(quarters, at)
     return Folds(
         each=tuple(
-            Fold(
-                site=with_doors(own.site, own.known, own.weights, at, doors),
-                walkers=own.asked,
-                known=known,
-                asked=asked,
-            )
-            for own, (_, _, known, asked) in zip(quarters, parts, strict=True)
+            Fold(site=site, walkers=left_out, known=known, asked=asked)
+            for site, (_, left_out, known, asked) in zip(sites, parts, strict=True)
         ),
         grain=grain,
         door_grain=doors,

@@ -11,7 +11,13 @@ import numpy as np
 
 from models.doors.door_map import DoorMap
 from models.doors.likelihood import anchored_door_scores, door_likelihood, door_values
-from models.flow.likelihood import Likelihood, Walkers, anchored_scores, likelihood
+from models.flow.likelihood import (
+    Likelihood,
+    Walkers,
+    anchored_scores,
+    likelihood,
+    track_values,
+)
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.view import Coverage
 from models.geometry.intrinsics import Intrinsics
@@ -49,13 +55,12 @@ class Site:
         values = found.values + values
         return Likelihood(value=float(values.sum()), values=values, scores=found.scores + scores)
 
-    def track_log_likelihoods(self, walkers: Walkers, candidate: Array) -> Array:
-        """The log likelihood (N,) of each track alone."""
-        lens = self.intrinsics
-        values = likelihood(walkers, self.flow, self.coverage, lens, candidate, scored=False).values
+    def track_log_likelihoods(self, walkers: Walkers, candidates: Array) -> Array:
+        """The log likelihood (K, N) of each track alone, seen from candidates (K, 4)."""
+        values = track_values(walkers, self.flow, self.coverage, self.intrinsics, candidates)
         if self.doors is None or walkers.moments is None:
             return values
-        return values + door_values(walkers.moments, self.doors, candidate)
+        return values + door_values(walkers.moments, self.doors, candidates)
 
     def scores(self, walkers: Walkers, candidate: Array, anchor: Array) -> Array:
         """Scores (N, 4) at a candidate (4,) of who is on known ground, seen from an anchor (4,)."""
@@ -113,10 +118,11 @@ class Posterior:
     belief: Belief
     variance_inflation: float
 
-    def value(self, candidate: Array) -> float:
-        """The log posterior of a candidate (4,), up to a constant."""
-        chance = float(self.site.track_log_likelihoods(self.walkers, candidate).sum())
-        return chance / self.variance_inflation + self.belief.log_density(candidate)
+    def values(self, candidates: Array) -> Array:
+        """The log posteriors (K,) of candidates (K, 4), up to a constant."""
+        chances = self.site.track_log_likelihoods(self.walkers, candidates).sum(axis=1)
+        believed = [self.belief.log_density(candidate) for candidate in candidates]
+        return np.asarray(chances / self.variance_inflation + believed)
 
     def climbed(self, candidate: Array, least_gain: float = CONVERGED) -> Peak:
         """The peak above a candidate (4,), up to a gain that is not worth a step."""
@@ -150,14 +156,13 @@ def register(posterior: Posterior, headings: Sequence[float]) -> list[Peak]:
     The headings (radians) are tried around the belief's mean, the best of them that are 5 deg apart
     are climbed from, and ends that are the same are one.
     """
-    tried = [
-        posterior.belief.mean + heading * np.array([0.0, 0.0, 0.0, 1.0]) for heading in headings
-    ]
-    log_posteriors = [posterior.value(candidate) for candidate in tried]
+    tried = np.tile(posterior.belief.mean, (len(headings), 1))
+    tried[:, 3] += headings
+    log_posteriors = posterior.values(tried)
     begin: list[Array] = []
     for number in np.argsort(log_posteriors)[::-1]:
         apart = [abs(tried[number][3] - other[3]) for other in begin]
-        hopeless = log_posteriors[number] < max(log_posteriors) - _HOPELESS
+        hopeless = log_posteriors[number] < log_posteriors.max() - _HOPELESS
         if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
             begin.append(tried[number])
     return distinct([posterior.climbed(candidate) for candidate in begin])

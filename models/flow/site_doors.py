@@ -46,8 +46,8 @@ def with_doors(
     return replace(site, doors=doors_of(walkers.moments, weights, at, _nodes_of(site), grain))
 
 
-def door_grain(quarters: Sequence[Quarter], at: Array) -> DoorGrain | None:
-    """The grain of doors that help; None where there are none, or they do not.
+def door_grain(quarters: Sequence[Quarter], at: Array) -> tuple[DoorGrain | None, tuple[Site, ...]]:
+    """The grain of doors that help, and the quarters' sites with these; None where none do.
 
     They do where they clearly predict where the people left out begin and end, and make the
     pose that is told by these surer, at the weight that makes it surest.
@@ -69,38 +69,42 @@ def door_grain(quarters: Sequence[Quarter], at: Array) -> DoorGrain | None:
         for quarter in quarters
         if quarter.known.moments is not None and quarter.asked.moments is not None
     ]
+    surest, sites = None, tuple(quarter.site for quarter in quarters)
     if not parts or len(parts) < len(quarters):
-        return None
+        return surest, sites
     grain = best_door_grain(parts, at)
     if grain is None:
-        return None
-    surest, most = None, _log_information(quarters, at) + _SURER
+        return surest, sites
+    asked = [quarter.asked for quarter in quarters]
+    every = [with_doors(own.site, own.known, own.weights, at, grain) for own in quarters]
+    most = _log_information(sites, asked, at) + _SURER
     for weight in _WEIGHTS:
-        weighed = replace(grain, weight=weight)
-        doors = [
-            replace(own, site=with_doors(own.site, own.known, own.weights, at, weighed))
-            for own in quarters
-        ]
-        information = _log_information(doors, at)
+        weighed = tuple(_weighed(site, weight) for site in every)
+        information = _log_information(weighed, asked, at)
         if information > most:
-            surest, most = weighed, information
-    return surest
+            surest, sites, most = replace(grain, weight=weight), weighed, information
+    return surest, sites
 
 
-def _log_information(quarters: Sequence[Quarter], at: Array) -> float:
+def _weighed(site: Site, weight: float) -> Site:
+    """A site whose doors count for so much."""
+    return replace(site, doors=None if site.doors is None else replace(site.doors, weight=weight))
+
+
+def _log_information(sites: Sequence[Site], asked: Sequence[Walkers], at: Array) -> float:
     """The log determinant of what walkers tell of a pose, by maps that they have no part of.
 
     Source: Godambe 1960, H J^-1 H, with J by walking groups.
     """
     curvature = np.zeros((4, 4))
     slopes = []
-    for quarter in quarters:
-        scores = quarter.site.scores(quarter.asked, at, at)
-        people, group_of, last = groups_in_time(quarter.asked)
+    for site, walkers in zip(sites, asked, strict=True):
+        scores = site.scores(walkers, at, at)
+        people, group_of, last = groups_in_time(walkers)
         sums = np.zeros((last.size, 4))
         np.add.at(sums, group_of, scores[people])
         slopes.append(sums)
-        curvature += curvature_of(quarter.asked, quarter.site, at)
+        curvature += curvature_of(walkers, site, at)
     every = np.concatenate(slopes)
     centred = every - every.mean(axis=0)
     return float(2 * np.linalg.slogdet(curvature)[1] - np.linalg.slogdet(centred.T @ centred)[1])

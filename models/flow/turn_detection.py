@@ -62,18 +62,19 @@ class StillScores:
 
 def group_scores(walkers: Walkers, site: Site, at: Array) -> tuple[Array, npt.NDArray[np.int64]]:
     """The mean scores (P, 4) of each walking group, in the order of their last tracks (P,)."""
-    scores = np.stack(
-        [
-            site.track_log_likelihoods(walkers, at + step)
-            - site.track_log_likelihoods(walkers, at - step)
-            for step in np.diag(REACH)
-        ],
-        axis=1,
-    )
+    scores = along_paths(walkers, site, at, np.diag(REACH))
     people, group_of, last = groups_in_time(walkers)
     sums = np.zeros((last.size, 4))
     np.add.at(sums, group_of, scores[people] / 2)
     return sums / np.bincount(group_of)[:, None], last
+
+
+def along_paths(walkers: Walkers, site: Site, at: Array, steps: Array) -> Array:
+    """How much likelier tracks (N, S) are some steps (S, 4) on than as far back."""
+    on, back = np.split(
+        site.track_log_likelihoods(walkers, np.concatenate([at + steps, at - steps])), 2
+    )
+    return np.asarray((on - back).T)
 
 
 def groups_in_time(

@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.doors.choosing import Part, best_door_grain
-from models.doors.door_map import DoorGrain, DoorMap, Nodes, count_around, door_map_of
+from models.doors.door_map import DoorGrain, DoorMap, Nodes, around, count_at, door_map_of
 from models.doors.likelihood import anchored_door_scores, door_likelihood, door_values
 from models.doors.moments import BEGINS, ENDS, Moments, observe_moments
 from models.geometry.ground import pixel_from_ground
@@ -111,9 +111,8 @@ def test_ratios_are_observed_over_expected():
     # 100 s of walking in one place and 10 ends; 100 s in another, and none.
     places = [(0, 0)] * 11 + [(6, 0)]
     moments = moments_at(places, [-1] + [1] * 10 + [-1], [100.0] + [0.0] * 10 + [100.0])
-    counts = count_around(
-        moments, np.array(places, float), np.ones(12, bool), np.ones(12), NODES, GRAIN.smooth_m
-    )
+    counted = count_at(moments, np.array(places, float), np.ones(12, bool), np.ones(12), NODES)
+    (counts,) = around(counted, NODES, (GRAIN.smooth_m,))
     doors = door_map_of(counts, NODES, GRAIN)
     # All look as tall: 10 ends in 200 s, begun with 5 more at that very rate.
     assert_allclose(doors.rate[ENDS].max(), 0.05, rtol=1e-6)
@@ -131,7 +130,7 @@ def test_who_ends_at_a_door_is_likelier_by_its_ratio():
     doors = door_at(2.0, 1.0)
     at_door, elsewhere = (moments_at([place], [1]) for place in ((2.0, 1.0), (-5.0, 1.0)))
     often = (1 + FEW) / FEW  # one more than the none that are usual in no time: 0.2 anywhere
-    apart = door_values(at_door, doors, DOWN) - door_values(elsewhere, doors, DOWN)
+    apart = door_values(at_door, doors, DOWN[None]) - door_values(elsewhere, doors, DOWN[None])
     assert_allclose(apart, math.log((20.0 + often - 1) / often), rtol=1e-6)
 
 
@@ -139,14 +138,14 @@ def test_who_passes_a_door_pays_for_it():
     doors = door_at(2.0, 1.0)
     passes = moments_at([(2.0, 1.0)], [-1], [3.0])  # 0.3 events at the usual rate, 6 at the door
     often = FEW / (0.3 + FEW)  # nobody begins or ends: people use all doors less
-    assert_allclose(door_values(passes, doors, DOWN), [-2 * often * 6.0], rtol=1e-6)
+    assert_allclose(door_values(passes, doors, DOWN[None]), [[-2 * often * 6.0]], rtol=1e-6)
 
 
 def test_a_tracker_that_loses_people_anywhere_says_less_at_doors():
     doors = door_at(2.0, 1.0)
     often = (20 + FEW) / FEW
     at_door, elsewhere = (
-        door_values(moments_at([place] * 20, [1] * 20), doors, DOWN)[0]
+        door_values(moments_at([place] * 20, [1] * 20), doors, DOWN[None])[0, 0]
         for place in ((2.0, 1.0), (-5.0, 1.0))
     )
     assert_allclose(at_door, math.log(20.0 + often - 1), rtol=1e-6)
@@ -160,8 +159,8 @@ def test_all_on_the_busiest_door_is_no_better_than_where_they_walk():
     event, seconds = [-1] * count + [1] * count, [10.0] * count + [0.0] * count
     at_door = moments_at([(2.0, 1.0)] * 2 * count, event, seconds)
     away = moments_at([(-5.0, 1.0)] * 2 * count, event, seconds)
-    apart = door_values(at_door, doors, DOWN).sum() - door_values(away, doors, DOWN).sum()
-    assert apart < 0
+    gained, lost = (door_values(moments, doors, DOWN[None]).sum() for moments in (at_door, away))
+    assert gained < lost
 
 
 @pytest.mark.parametrize("at", [DOWN, AHEAD])
@@ -177,12 +176,11 @@ def test_scores_are_derivatives(at):
     )
     moments = replace(moments, seconds=moments.seconds * (moments.event < 0)[:, None])
     values, scores = door_likelihood(moments, smooth, at)
-    assert_allclose(values, door_values(moments, smooth, at))
+    assert_allclose(values, door_values(moments, smooth, at[None])[0])
     assert_allclose(anchored_door_scores(moments, smooth, at, at).any(), scores.any())
     for parameter, step in enumerate(1e-6 * np.eye(4)):
-        ahead, behind = (
-            door_values(moments, smooth, at + sign * step).sum() for sign in (1.0, -1.0)
-        )
+        beside = np.array([at + step, at - step])
+        ahead, behind = door_values(moments, smooth, beside).sum(axis=1)
         assert scores[:, parameter].sum() == pytest.approx((ahead - behind) / 2e-6, abs=2e-3)
 
 
@@ -203,8 +201,9 @@ def test_a_turn_is_seen_at_a_door():
     _, scores = door_likelihood(moments, doors, DOWN)
     assert scores[:, 3].sum() > 0
     turn = 0.3 / 4.0
-    turned = door_values(moments, doors, DOWN + [0, 0, 0, turn]).sum()
-    assert turned > door_values(moments, doors, DOWN).sum()
+    there = np.array([DOWN, DOWN + [0, 0, 0, turn]])
+    as_it_was, turned = door_values(moments, doors, there).sum(axis=1)
+    assert turned > as_it_was
 
 
 def part_of(rng: np.random.Generator, doors: bool) -> Part:

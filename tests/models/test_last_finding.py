@@ -38,10 +38,8 @@ LARGE = Knock(
 # The knock, and after which share of the tracks it came; before all of them, if that is None.
 KNOCKS = {
     "still": (None, None),
-    "a little": (SMALL, None),
     "far": (LARGE, None),
     "a little in mid-window": (SMALL, 0.8),
-    "far in mid-window": (LARGE, 0.8),
 }
 
 
@@ -155,7 +153,7 @@ def crowd(request):
     tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
     lens, pose = scene.intrinsics, scene.true_pose
     site = learn_site(observe(tracks[:1000], lens, pose), lens, pose, chart=False)
-    return lens, pose, site, tracks[1000:1600]
+    return lens, pose, site, tracks[1000:1550]
 
 
 # The likelihood of a map of real people has small peaks side by side, and a search that begins

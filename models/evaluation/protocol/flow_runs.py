@@ -92,7 +92,7 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: flo
     )
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
-        number: max(posterior.value(belief.mean + node + turn) for turn in turns)
+        number: float(posterior.values(belief.mean + node + turns).max())
         for number, node in enumerate(_NODES)
     }
     likeliest = sorted(starts, key=lambda number: -starts[number])
@@ -105,7 +105,8 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: flo
             precision = bent / variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(precision, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
-                peaks.append(replace(peak, candidate=candidate, value=posterior.value(candidate)))
+                value = float(posterior.values(candidate[None])[0])
+                peaks.append(replace(peak, candidate=candidate, value=value))
     return sorted(peaks, key=lambda peak: -peak.value)
 
 

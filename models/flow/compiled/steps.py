@@ -25,7 +25,7 @@ class Told(NamedTuple):
 
     The log density `known` (M,) of known ground, which part is `unseen` (M,), and the log ratio
     (M,) of what is `valid`. `slopes` (M, 3, 4) are by the candidate of the three; (0, 3, 4) of what
-    is not scored.
+    has no slopes.
     """
 
     known: Array
@@ -44,10 +44,9 @@ def tell(
     rotation: Array,
     turns: Array,
     log_height: float,
-    scored: bool,
 ) -> Told:
-    """What each step says at a candidate."""
-    count = len(starts)
+    """What each step says at a candidate; without slopes where there are no turns (0, 3, 3)."""
+    count, scored = len(starts), len(turns) > 0
     known, unseen, log_ratio = np.empty(count), np.empty(count), np.empty(count)
     valid = np.empty(count, dtype=np.bool_)
     slopes = np.empty((count if scored else 0, 3, 4))
@@ -155,6 +154,42 @@ def likelihood_of_tracks(
                     )
                 scores[owner, parameter] += weight[number] * score
     return values, scores
+
+
+@compiled
+def values_of_tracks(
+    starts: Array,
+    ends: Array,
+    weight: Array,
+    owner_idx: Index,
+    slot_idx: Index,
+    grid: Grid,
+    rotations: Array,
+    log_heights: Array,
+    typical: float,
+    seen: Array,
+    beyond: Array,
+    busy: Array,
+    log_prior: Array,
+    tracks: int,
+) -> Array:
+    """Values (K, tracks) at K candidates, by `rotations` (K, 3, 3) and `log_heights` (K,).
+
+    `seen` (K, S) and `beyond` (K,) are each candidate's; all else is as in `busiest` and
+    `likelihood_of_tracks`.
+    """
+    values = np.empty((len(rotations), tracks))
+    no_turns, no_slopes = np.empty((0, 3, 3)), np.zeros((seen.shape[1], 4))
+    for candidate in range(len(rotations)):
+        rotation, log_height = rotations[candidate], log_heights[candidate]
+        told = tell(starts, ends, slot_idx, grid, rotation, no_turns, log_height)
+        own, away = seen[candidate], beyond[candidate]
+        as_busy = busiest(told, weight, slot_idx, typical, own, away, busy, log_prior)
+        log_share = np.log(own + as_busy * away)
+        values[candidate], _ = likelihood_of_tracks(
+            told, weight, owner_idx, slot_idx, as_busy * typical, log_share, no_slopes, tracks
+        )
+    return values
 
 
 @compiled

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose
 import models.flow.compiled
 from models.compiled import _Compiled
 from models.estimation.joint.observations import Rows, Steps
-from models.flow.likelihood import Walkers, anchored_scores, likelihood
+from models.flow.likelihood import Walkers, anchored_scores, likelihood, track_values
 from models.flow.map import placement
 from models.flow.map.flow_map import DIRECTIONS, FlowMap
 from models.flow.map.placement import place_steps
@@ -175,9 +175,11 @@ def test_scores_of_each_track_are_differences_of_its_value(slots):
     said = likelihood(walkers, flow, coverage, LENS, AHEAD)
 
     def values(candidate: np.ndarray) -> np.ndarray:
-        return likelihood(walkers, flow, coverage, LENS, candidate, scored=False).values
+        return track_values(walkers, flow, coverage, LENS, candidate[None])[0]
 
     assert_allclose(values(AHEAD), said.values, rtol=1e-13)
+    both = track_values(walkers, flow, coverage, LENS, np.array([AHEAD + 0.01, AHEAD]))
+    assert_allclose(both, [values(AHEAD + 0.01), said.values], rtol=1e-13)
     assert coverage.seen_from(LENS, AHEAD)[0] == pytest.approx(1)
     for number, step in enumerate(1e-6 * np.eye(4)):
         slope = (values(AHEAD + step) - values(AHEAD - step)) / 2e-6
@@ -243,8 +245,9 @@ def test_one_kind_of_arguments_is_compiled_whoever_calls():
         turned = replace(flow, unseen=np.asfortranarray(flow.unseen), cell_m=1, elsewhere=-9)
         for some, asked in ((flow, walkers), (turned, every_other)):
             coverage = coverage_of(some)
-            for scored in (True, False):
-                likelihood(asked, some, coverage, LENS, AHEAD, scored=scored)
+            likelihood(asked, some, coverage, LENS, AHEAD)
+            track_values(asked, some, coverage, LENS, np.array([AHEAD, DOWN]))
+            track_values(asked, some, coverage, LENS, np.array([AHEAD, DOWN, DOWN]).T[:, :2].T)
             place_steps(asked.steps, AHEAD)
             anchored_scores(asked, some, coverage, LENS, AHEAD, DOWN)
             in_view(LENS, np.array([AHEAD, DOWN]), coverage.places, 1)
