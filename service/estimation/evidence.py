@@ -22,10 +22,11 @@ from service.store import alerts, cameras, estimates, flow_maps, references, tra
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import PredictionRecord, TrackRecord
+from service.store.tables.tracks import PredictionRecord
 from service.store.tables.trainings import ModelRecord
 from service.store.tracks import predictions as stored_predictions
 from service.store.tracks import tracks, windows
+from service.store.tracks.stored import StoredTrack
 from service.windows.people import until_so_many
 from service.windows.references import made_against, window_of
 from service.windows.unpacked import Unpacked
@@ -158,7 +159,7 @@ def _is_news(
     session: Session,
     reference: SiteReferenceRecord,
     model: ModelRecord | None,
-    records: Sequence[TrackRecord],
+    records: Sequence[StoredTrack],
 ) -> bool:
     """Whether the last estimate was of other tracks, another model or another reference."""
     last = estimates.newest(session, reference.camera_id)

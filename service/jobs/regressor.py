@@ -13,7 +13,7 @@ from models.regression.network import PoseRegressor
 from models.regression.prediction import predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.trajectory import cut_windows
-from service.store.tables.tracks import TrackRecord
+from service.store.tracks.stored import StoredTrack
 from service.training.predictions import PendingTracks
 from service.windows.unpacked import Unpacked
 
@@ -46,7 +46,7 @@ def predict(weights_dir: Path, pending: PendingTracks, unpacked: Unpacked) -> li
     return rows
 
 
-def _empty_rows(model_id: str, tracks: Sequence[TrackRecord]) -> list[dict[str, Any]]:
+def _empty_rows(model_id: str, tracks: Sequence[StoredTrack]) -> list[dict[str, Any]]:
     nothing = dict.fromkeys(("height_m", "qw", "qx", "qy", "qz"))
     return [
         {"model_id": model_id, "track_pk": track.id, "windows": 0, **nothing} for track in tracks

@@ -12,7 +12,7 @@ from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes, uncut
 from models.trajectory import Trajectory
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
-from service.store.tables.tracks import TrackRecord
+from service.store.tracks.stored import StoredTrack
 
 
 def pack(array: Array) -> bytes:
@@ -25,13 +25,13 @@ def unpack(data: bytes, columns: int) -> Array:
     return np.frombuffer(data, dtype="<f8").reshape(-1, columns).astype(np.float64)
 
 
-def trajectory_of(record: TrackRecord) -> Trajectory:
+def trajectory_of(record: StoredTrack) -> Trajectory:
     """The foot points of a stored track."""
     points = unpack(record.points, 3)
     return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
 
 
-def seen_of(record: TrackRecord, feet: Trajectory, intrinsics: Intrinsics) -> Trajectory:
+def seen_of(record: StoredTrack, feet: Trajectory, intrinsics: Intrinsics) -> Trajectory:
     """The feet of a stored track with the upper edges of its boxes or its heads, where it has any.
 
     Who has a head is as tall as it is high, where the picture's border does not cut it.

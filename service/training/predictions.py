@@ -8,8 +8,8 @@ from sqlalchemy.orm import Session
 
 from service.settings import Settings
 from service.store import references, trainings
-from service.store.tables.tracks import TrackRecord
 from service.store.tracks import predictions, tracks
+from service.store.tracks.stored import StoredTrack
 from service.windows.references import window_of
 
 
@@ -20,7 +20,7 @@ class PendingTracks:
     model_id: str
     weights_sha256: str
     config: dict[str, Any]
-    tracks: Sequence[TrackRecord]
+    tracks: Sequence[StoredTrack]
 
 
 def load_pending(

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.recalibration import link_pieces
-from service.store.tables.tracks import TrackRecord
+from service.store.tracks.stored import StoredTrack
 from service.windows.unpacked import Unpacked
 
 _SPARE = 40
@@ -23,13 +23,13 @@ class Gathered:
     `before` is the piece before each of a walk, as of `link_pieces`; None where nobody looked.
     """
 
-    records: Sequence[TrackRecord]
+    records: Sequence[StoredTrack]
     enough: bool
     before: npt.NDArray[np.int64] | None = None
 
 
 def until_so_many(
-    load: Callable[[int], Sequence[TrackRecord]],
+    load: Callable[[int], Sequence[StoredTrack]],
     wanted: int,
     intrinsics: Intrinsics,
     prior: CameraPose,

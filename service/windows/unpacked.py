@@ -5,7 +5,7 @@ from datetime import datetime
 from models.geometry.intrinsics import Intrinsics
 from models.trajectory import Trajectory
 from service.store.packing import seen_of, trajectory_of
-from service.store.tables.tracks import TrackRecord
+from service.store.tracks.stored import StoredTrack
 
 # The store may give a deleted track's number to a new one.
 _Track = tuple[int, datetime]
@@ -18,14 +18,14 @@ class Unpacked:
         self._feet: dict[_Track, Trajectory] = {}
         self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
 
-    def feet(self, record: TrackRecord) -> Trajectory:
+    def feet(self, record: StoredTrack) -> Trajectory:
         """The foot points of a stored track."""
         track = (record.id, record.received_at)
         if track not in self._feet:
             self._feet[track] = trajectory_of(record)
         return self._feet[track]
 
-    def seen(self, record: TrackRecord, intrinsics: Intrinsics) -> Trajectory:
+    def seen(self, record: StoredTrack, intrinsics: Intrinsics) -> Trajectory:
         """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
         track = (record.id, record.received_at)
         lens, seen = self._seen.get(track, (None, None))

@@ -25,7 +25,7 @@ class Told(NamedTuple):
 
     The log density `known` (M,) of known ground, which part is `unseen` (M,), and the log ratio
     (M,) of what is `valid`. `slopes` (M, 3, 4) are by the candidate of the three; (0, 3, 4) of what
-    has no slopes.
+    was asked for no slopes.
     """
 
     known: Array

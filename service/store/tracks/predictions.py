@@ -8,15 +8,17 @@ from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from service.store.tables.tracks import PredictionRecord, TrackRecord
+from service.store.tracks.stored import StoredTrack, read, select_tracks
 from service.store.tracks.windows import WindowBounds, window_ids
 
 
 def without_prediction(
     session: Session, bounds: WindowBounds, model_id: str, limit: int
-) -> Sequence[TrackRecord]:
+) -> Sequence[StoredTrack]:
     """Tracks of the window that the model has not looked at, newest first."""
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .outerjoin(
             PredictionRecord,
             (PredictionRecord.track_pk == TrackRecord.id) & (PredictionRecord.model_id == model_id),
@@ -26,8 +28,8 @@ def without_prediction(
             PredictionRecord.track_pk.is_(None),
         )
         .order_by(TrackRecord.ended_s.desc())
-        .limit(limit)
-    ).all()
+        .limit(limit),
+    )
 
 
 def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:

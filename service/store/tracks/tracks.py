@@ -21,6 +21,7 @@ from service.store.tracks.counting import (
     of_counting_source,
     started_from,
 )
+from service.store.tracks.stored import StoredTrack, read, select_tracks
 
 _DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
 
@@ -133,14 +134,15 @@ def a_year(session: Session, camera_id: str) -> float:
 
 def newest(
     session: Session, camera_id: str, limit: int, started_from_s: float | None = None
-) -> Sequence[TrackRecord]:
+) -> Sequence[StoredTrack]:
     """The newest tracks, newest first; of those that started from a time on, if it is given."""
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .where(*started_from(camera_id, started_from_s))
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit)
-    ).all()
+        .limit(limit),
+    )
 
 
 def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:

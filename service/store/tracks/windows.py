@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import Spans, counting, outside, started_from
+from service.store.tracks.stored import StoredTrack, read, select_tracks
 
 _DAY_S = 86_400.0
 
@@ -48,13 +49,14 @@ class StillBounds:
     attended: Spans = ()
 
 
-def window(session: Session, bounds: WindowBounds) -> Sequence[TrackRecord]:
+def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .where(TrackRecord.id.in_(window_ids(session, bounds)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id)
-    ).all()
+        .order_by(TrackRecord.ended_s, TrackRecord.id),
+    )
 
 
 def count_from(
@@ -78,24 +80,26 @@ def first(
     started_from_s: float | None,
     limit: int,
     without: Spans = (),
-) -> Sequence[TrackRecord]:
+) -> Sequence[StoredTrack]:
     """The first tracks by their ends that started from a time on and were not seen at others."""
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .where(*started_from(camera_id, started_from_s), *outside(without))
         .order_by(TrackRecord.ended_s, TrackRecord.id)
-        .limit(limit)
-    ).all()
+        .limit(limit),
+    )
 
 
-def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[TrackRecord]:
+def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredTrack]:
     """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .where(*_still(bounds))
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit)
-    ).all()[::-1]
+        .limit(limit),
+    )[::-1]
 
 
 def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
@@ -136,7 +140,7 @@ def oldest_end_s(session: Session, bounds: WindowBounds) -> float | None:
 
 def of_days(
     session: Session, bounds: WindowBounds, after_s: float, to_s: float, most_a_day: int
-) -> Sequence[TrackRecord]:
+) -> Sequence[StoredTrack]:
     """The tracks within bounds that ended after a time and before another, by their ends.
 
     However many tracks and days the bounds allow; of each day no more than so many, evenly.
@@ -154,11 +158,12 @@ def of_days(
     )
     nth = (each.c.place * most_a_day) // each.c.people
     before = ((each.c.place - 1) * most_a_day) // each.c.people
-    return session.scalars(
-        select(TrackRecord)
+    return read(
+        session,
+        select_tracks()
         .where(TrackRecord.id.in_(select(each.c.id).where(nth > before)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id)
-    ).all()
+        .order_by(TrackRecord.ended_s, TrackRecord.id),
+    )
 
 
 def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
