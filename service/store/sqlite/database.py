@@ -1,10 +1,10 @@
 """Engine and sessions of the store."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from sqlalchemy import Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.orm import Session
 
 from service.data_dir import make_private
@@ -46,6 +46,10 @@ class Store:
         with Session(self.engine) as session:
             yield session
 
+    def look(self) -> AbstractContextManager[Connection]:
+        """A connection that only reads, for statements that need no session."""
+        return self.engine.connect()
+
     @contextmanager
     def write(self) -> Iterator[Session]:
         """A session that holds the write lock from its start; commits at the end.
@@ -65,13 +69,33 @@ class Store:
             self._turns.turn(self._patience_s),
             Session(self.engine, expire_on_commit=False) as session,
         ):
-            session.execute(text("BEGIN IMMEDIATE"))
+            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
             yield session
             session.commit()
+
+    @contextmanager
+    def change(self) -> Iterator[Connection]:
+        """A connection that writes as a session of `write` does, for who needs none.
+
+        Raises:
+            OverloadedError: the turn did not come in time.
+        """
+        with self._turns.turn(self._patience_s), self.engine.connect() as connection:
+            connection.exec_driver_sql("BEGIN IMMEDIATE")
+            yield connection
+            connection.commit()
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+@contextmanager
+def joined(connection: Connection) -> Iterator[Session]:
+    """A session within a connection's transaction, which is not its own to commit."""
+    with Session(connection, join_transaction_mode="rollback_only") as session:
+        yield session
+        session.flush()
 
 
 def engine_for(
