@@ -4,16 +4,18 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.orm import Session
 
 from service.data_dir import make_private
 from service.settings import Settings
+from service.store.sqlite.prepared import Prepared
 from service.store.sqlite.turns import Turns
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
 _CONNECTIONS = 15
 
+_BEGIN = Prepared(text("BEGIN IMMEDIATE"))
 _WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
@@ -80,10 +82,13 @@ class Store:
         Raises:
             OverloadedError: the turn did not come in time.
         """
-        with self._turns.turn(self._patience_s), self.engine.connect() as connection:
-            connection.exec_driver_sql("BEGIN IMMEDIATE")
+        with (
+            self._turns.turn(self._patience_s),
+            self.engine.connect() as connection,
+            connection.begin(),  # so that a session that joins does not think it its own
+        ):
+            _BEGIN.run(connection)
             yield connection
-            connection.commit()
 
     def close(self) -> None:
         """Close all connections."""

@@ -5,7 +5,8 @@ written and wrapping what comes back, is twenty times that.
 """
 
 import sqlite3
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import ClauseElement, Connection, Dialect, Select
@@ -19,7 +20,7 @@ Values = Mapping[str, Any]
 
 
 class Prepared:
-    """A statement of SQLAlchemy's that the driver runs itself, within a connection's transaction.
+    """A statement of SQLAlchemy's that the driver runs itself, on a connection of SQLAlchemy's.
 
     Values are converted as SQLAlchemy does, and errors are SQLAlchemy's. Rows come as they are
     stored: columns whose values would have to be converted are not taken.
@@ -44,33 +45,37 @@ class Prepared:
                 kind = column.type.dialect_impl(_DIALECT)
                 assert kind.result_processor(_DIALECT, None) is None, column
 
+    def run(self, connection: Connection) -> None:
+        """Run what takes no values and gives no rows."""
+        with self._cursor(connection) as cursor:
+            cursor.execute(self._sql)
+
     def row(self, connection: Connection, values: Values) -> tuple[Any, ...] | None:
         """The first row; None where there is none."""
-        cursor = self._cursor(connection)
-        try:
+        with self._cursor(connection) as cursor:
             cursor.execute(self._sql, self._in_order(values))
             row: tuple[Any, ...] | None = cursor.fetchone()
-        except sqlite3.Error as error:
-            raise self._told(error) from error
-        finally:
-            cursor.close()
         return row
 
     def change(self, connection: Connection, *values: Values) -> int:
         """Change what is stored, by each of some values; how many rows that changed."""
-        cursor = self._cursor(connection)
-        try:
+        with self._cursor(connection) as cursor:
             cursor.executemany(self._sql, [self._in_order(each) for each in values])
-        except sqlite3.Error as error:
-            raise self._told(error) from error
-        finally:
-            cursor.close()
         return cursor.rowcount
 
-    def _cursor(self, connection: Connection) -> sqlite3.Cursor:
+    @contextmanager
+    def _cursor(self, connection: Connection) -> Iterator[sqlite3.Cursor]:
         driver: sqlite3.Connection | None = connection.connection.driver_connection
         assert driver is not None
-        return driver.cursor()
+        cursor = driver.cursor()
+        try:
+            yield cursor
+        except sqlite3.Error as error:
+            raise DBAPIError.instance(
+                self._sql, None, error, sqlite3.Error, hide_parameters=True, dialect=_DIALECT
+            ) from error
+        finally:
+            cursor.close()  # and with it a look at rows that goes on
 
     def _in_order(self, values: Values) -> list[Any]:
         values = {**self._own, **values} if self._own else values
@@ -78,8 +83,3 @@ class Prepared:
             values[name] if convert is None else convert(values[name])
             for name, convert in self._values
         ]
-
-    def _told(self, error: sqlite3.Error) -> BaseException:
-        return DBAPIError.instance(
-            self._sql, None, error, sqlite3.Error, hide_parameters=True, dialect=_DIALECT
-        )

@@ -74,6 +74,15 @@ def test_nothing_is_kept_of_a_change_that_fails(store):
         assert _NAME.row(connection, {"camera": "corner"}) == ("Corner",)
 
 
+def test_who_may_not_write_in_time_is_told_so(store, settings):
+    with sqlite3.connect(settings.database_path) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(OperationalError) as raised:
+            see(store, _NOON)
+        assert isinstance(failure_of(raised.value), OverloadedError)
+    assert see(store, _NOON) == 1
+
+
 def test_a_session_within_a_change_is_committed_with_it_or_not_at_all(store):
     for fails in (True, False):
         try:
