@@ -14,7 +14,7 @@ def plain_rows(value: list[Any], lengths: tuple[int, ...]) -> Array | None:
     """The array (N, columns) of a list that is right in every way; None of any other.
 
     All its rows are lists of one of the lengths, of numbers within `LARGEST`. Who says what is
-    wrong looks at one number after another, which takes ten times as long.
+    wrong looks at one number after another.
     """
     if set(map(type, value)) != {list} or len(found := set(map(len, value))) != 1:
         return None

@@ -1,7 +1,7 @@
 """Routes that answer the plain one among their requests without FastAPI's reading of it.
 
 What a route declares is what is documented, and how a request with a query is read. To work that
-out for a path and nothing else costs a small request as much as all that it asks of the store.
+out anew for a path and nothing else is a good part of what a small request costs.
 """
 
 from collections.abc import Awaitable, Callable, Coroutine

@@ -1,7 +1,7 @@
 """Answers that are written where they are made.
 
 Of a body that a plain route returns, FastAPI makes JSON in a second turn in a thread, once it has
-been checked against itself: as much work as the rest of a small request.
+been checked against itself.
 """
 
 from pydantic import BaseModel

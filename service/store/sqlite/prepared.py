@@ -1,7 +1,7 @@
 """Statements written out once, for the few that every post of tracks makes.
 
 The driver takes some microseconds to run one. What SQLAlchemy adds each time, looking up how it is
-written and wrapping what comes back, is twenty times that.
+written and wrapping what comes back, is several times that.
 """
 
 import sqlite3
