@@ -11,6 +11,7 @@ from service.cameras.quota import Quota
 from service.http import pages
 from service.http.bodies import BodyMiddleware
 from service.http.dependencies import AppState
+from service.http.direct.kept import Kept
 from service.http.guard import GuardMiddleware
 from service.http.instruments import InstrumentMiddleware, Instruments
 from service.http.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
@@ -37,6 +38,7 @@ from service.routes import (
 )
 from service.routes.ui import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings
+from service.store.sqlite.changes import Changes
 from service.store.sqlite.database import Store
 
 _SPARE_THREADS = 8
@@ -58,6 +60,7 @@ def create_app(settings: Settings) -> FastAPI:
         # A request is in one thread at a time; some are left for what needs no turn.
         await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
+        changes = Changes(settings.database_path)
         state = AppState(
             settings=settings,
             store=store,
@@ -65,10 +68,12 @@ def create_app(settings: Settings) -> FastAPI:
             instruments=instruments,
             quota=Quota(settings),
             stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
+            poses=Kept(changes),
         )
         yield {"app": state}
         state.stopping.set()
         state.queue.close()
+        changes.close()
         store.close()
 
     app = FastAPI(
@@ -79,11 +84,12 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,  # FastAPI's own fetch their viewers from a public host
         redoc_url=None,
     )
+    # A path is looked for in one after another: what is asked for most comes first.
     for module in (
-        cameras,
         tracks,
-        sources,
         poses,
+        cameras,
+        sources,
         snapshots,
         trainings,
         alerts,

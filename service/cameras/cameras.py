@@ -208,8 +208,13 @@ def require_camera(session: Session, camera_id: str) -> CameraRecord:
     """
     record = cameras.find(session, camera_id)
     if record is None:
-        raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
+        raise no_camera(camera_id)
     return record
+
+
+def no_camera(camera_id: str) -> NotFoundError:
+    """What to answer where there is no camera of an id."""
+    return NotFoundError(f"camera_id: there is no camera {camera_id!r}")
 
 
 def renew_prior_pose(

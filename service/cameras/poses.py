@@ -8,17 +8,17 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
-from service.cameras.cameras import require_camera
+from service.cameras.cameras import no_camera, require_camera
 from service.cameras.standing import Standing, standings
 from service.cameras.state_words import reasons_of
 from service.kinds import PoseState
 from service.reason_words import in_words
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import cameras, estimates, trainings
+from service.store import cameras, estimates, fleet
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.estimates import EstimateRecord
-from service.windows.references import tracks_so_far
+from service.windows.references import wanted_tracks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,14 +70,15 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     Raises:
         NotFoundError: there is no such camera.
     """
-    camera = require_camera(session, camera_id)
-    session.flush()
+    set_up = cameras.as_set_up(session, camera_id)
+    if set_up is None:
+        raise no_camera(camera_id)
+    camera, prior, model_id = set_up
     standing = standings(session, settings, (camera_id,))[camera_id]
-    model = trainings.newest_model(session, camera_id)
     record = standing.reference
-    so_far = tracks_so_far(session, settings, record, standing.attended)
+    so_far = _tracks_so_far(session, settings, standing)
     reasons = reasons_of(session, settings, standing, so_far)
-    pose = pose_of_prior(cameras.prior_pose(session, camera_id))
+    pose = pose_of_prior(prior)
     estimate = standing.estimate
     if estimate is not None:
         pose = replace(
@@ -93,7 +94,6 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         wanted=record.wanted,
         walking_speed_mps=record.walking_speed_mps,
     )
-    model_id = None if model is None else model.id
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
@@ -108,6 +108,16 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         model_id=model_id,
         etag=f'"{hashlib.sha256(repr(served).encode()).hexdigest()[:24]}"',
     )
+
+
+def _tracks_so_far(session: Session, settings: Settings, standing: Standing) -> int:
+    """How many of the wanted tracks of its reference a camera has."""
+    reference = standing.reference
+    if reference.ready_at is not None:
+        return reference.tracks
+    camera_id = standing.camera_id
+    counts = fleet.learning_counts(session, (camera_id,), {camera_id: standing.attended.spans})
+    return min(counts.get(camera_id, 0), wanted_tracks(reference, settings))
 
 
 def pose_history(

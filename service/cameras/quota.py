@@ -4,11 +4,10 @@ import threading
 import time
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from service.errors import QuotaError
 from service.formats.track import Batch
 from service.settings import Settings
+from service.store.sqlite.database import Store
 from service.store.tracks import tracks
 
 _BEYOND = 1.5  # times `keep_mb` that may lie there until the next retention
@@ -33,8 +32,8 @@ class Quota:
         self._counts: dict[str, _Count] = {}
         self._lock = threading.Lock()
 
-    def check(self, session: Session, camera_id: str, batch: Batch) -> None:
-        """Refuse tracks for which a camera has no room now.
+    def check(self, store: Store, camera_id: str, batch: Batch) -> None:
+        """Refuse tracks for which a camera has no room now; the store is asked where that is near.
 
         Raises:
             QuotaError: well more is stored than retention will leave.
@@ -47,7 +46,8 @@ class Quota:
                 count.stored + coming > self._most and now_s - count.at_s > _RECOUNT_S
             )
         if count is None or stale:
-            count = _Count(stored=tracks.stored_bytes(session, camera_id), at_s=now_s)
+            with store.read() as session:
+                count = _Count(stored=tracks.stored_bytes(session, camera_id), at_s=now_s)
         with self._lock:
             self._counts[camera_id] = count
             if count.stored + coming > self._most:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
@@ -20,6 +21,7 @@ from service.kinds import Activity, AlertKind, AlertSource, Origin, Outcome, Pos
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references
+from service.store.sqlite.database import joined
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.tracks import SourceRecord
 from service.store.tracks import sources
@@ -47,21 +49,23 @@ class SourceView:
     wanted: int
 
 
-def note_source(session: Session, camera_id: str, name: str, stored: int, max_sources: int) -> None:
-    """Take down that a source has posted; the first one of a camera counts.
+def note_source(
+    connection: Connection, camera_id: str, name: str, stored: int, max_sources: int
+) -> None:
+    """Take down that a source has posted.
 
     Raises:
         TooManySourcesError: it is new, and the camera has as many as it may have.
     """
     now = datetime.now(UTC)
-    if not sources.note_seen(session, camera_id, name, stored, now):
+    if sources.note_seen(connection, camera_id, name, stored, now):
+        return
+    with joined(connection) as session:
         _make_room(session, camera_id, name, max_sources)
         record = SourceRecord(
             camera_id=camera_id, name=name, tracks=stored, first_seen_at=now, last_seen_at=now
         )
         session.add(record)
-        session.flush()
-    references.be_of_source(session, camera_id, name)
 
 
 def list_sources(session: Session, settings: Settings, camera_id: str) -> list[SourceView]:

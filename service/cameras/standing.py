@@ -6,13 +6,13 @@ it was a false alarm, its pose is accepted), nothing that was estimated before c
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.alerting.arrival_rates import unpacked
+from service.alerting.arrival_rates import CameraRhythm, unpacked
 from service.alerting.presence import is_no_data
 from service.delivery.outbox import is_silenced
 from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
@@ -20,6 +20,7 @@ from service.settings import Settings
 from service.store import fleet, metrics
 from service.store.alerts import POSE_KINDS
 from service.store.tables.alerts import AlertRecord
+from service.store.tables.attendance import MaintenanceRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.windows.attendance import Attendance, attendance_by
@@ -29,11 +30,31 @@ MOVED = (PoseState.DRIFTING, PoseState.OUT_OF_RANGE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Clockwork:
+    """All by which the clock alone, with nothing new in the store, changes how a camera stands.
+
+    `moments` are when somebody comes to the camera or leaves it, and when an alert's silence ends.
+    """
+
+    settings: Settings
+    rhythm: CameraRhythm | None
+    last_track_s: float | None
+    moments: tuple[datetime, ...]
+
+    def silent(self, now: datetime) -> bool:
+        """Whether nobody has been seen for longer than is usual; why says for how long, then."""
+        return is_no_data(self.settings, self.rhythm, self.last_track_s, now)
+
+    def hands(self, now: datetime) -> tuple[bool, ...]:
+        """The same at two times between which nothing changes."""
+        return (self.silent(now), *(at <= now for at in self.moments))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFacts:
     """What is stored of a camera that its state follows from, at a moment.
 
     `estimate` is the newest, `last_identifiable` the newest of which something is identifiable.
-    `silent` says that nobody has been seen for longer than is usual.
     """
 
     reference: SiteReferenceRecord
@@ -41,8 +62,7 @@ class CameraFacts:
     last_identifiable: EstimateRecord | None
     attended: Attendance
     firing: Sequence[AlertRecord]
-    last_track_s: float | None
-    silent: bool
+    clockwork: Clockwork
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +84,13 @@ class Standing:
     cause: Cause
     alerts: tuple[AlertRecord, ...]
     attended: Attendance
-    last_track_s: float | None
     silent: bool
+    clockwork: Clockwork
+
+    @property
+    def last_track_s(self) -> float | None:
+        """When the newest track ended of those that count."""
+        return self.clockwork.last_track_s
 
     @property
     def identifiable(self) -> tuple[str, ...]:
@@ -78,31 +103,35 @@ def standings(
 ) -> dict[str, Standing]:
     """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
     now = datetime.now(UTC)
-    references = metrics.newest_references(session, ids)
-    newest = metrics.newest_estimates(session, ids)
-    ended_s = metrics.last_tracks_s(session, ids)
-    windows = fleet.maintenance_windows(session, ids)
-    rhythms = fleet.rhythm_profiles(session, ids)
+    newest = metrics.newest(session, ids)
+    windows: dict[str, list[MaintenanceRecord]] = {}
+    if any(each.attended for each in newest.values()):
+        windows = fleet.maintenance_windows(session, ids)
     firing: dict[str, list[AlertRecord]] = defaultdict(list)
-    for alert in fleet.firing(session, ids):
-        firing[str(alert.camera_id)].append(alert)
-    held = [camera_id for camera_id, alerts in firing.items() if _holds(alerts)]
-    without = [i for i in held if i in newest and not newest[i].identifiable]
+    if any(each.fires for each in newest.values()):
+        for alert in fleet.firing(session, ids):
+            firing[str(alert.camera_id)].append(alert)
+    without = [
+        camera_id
+        for camera_id, alerts in firing.items()
+        if _holds(alerts) and camera_id in newest and not _identifies(newest[camera_id].estimate)
+    ]
     before = metrics.newest_identifiable_estimates(session, without) if without else {}
     found = {}
-    for camera_id, last_s in ended_s.items():
-        known = unpacked(rhythms[camera_id]) if camera_id in rhythms else None
-        last_identifiable = newest.get(camera_id)
-        if camera_id in without:
-            last_identifiable = before.get(camera_id)
+    for camera_id, each in newest.items():
+        attending = windows.get(camera_id, [])
         facts = CameraFacts(
-            reference=references[camera_id],
-            estimate=newest.get(camera_id),
-            last_identifiable=last_identifiable,
-            attended=attendance_by(windows[camera_id], now),
+            reference=each.reference,
+            estimate=each.estimate,
+            last_identifiable=before.get(camera_id) if camera_id in without else each.estimate,
+            attended=attendance_by(attending, now),
             firing=firing[camera_id],
-            last_track_s=last_s,
-            silent=is_no_data(settings, known, last_s, now),
+            clockwork=Clockwork(
+                settings=settings,
+                rhythm=None if each.rhythm is None else unpacked(each.rhythm),
+                last_track_s=each.last_track_s,
+                moments=tuple(_moments(attending, firing[camera_id])),
+            ),
         )
         found[camera_id] = standing_of(facts, now)
     return found
@@ -116,6 +145,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
     alerts = tuple(sorted(facts.firing, key=lambda alert: _urgency(alert, now)))
     cause = _cause(reference, facts.attended, now)
     holding = _holds(alerts)
+    silent = facts.clockwork.silent(now)
     state: PoseState
     if holding:
         estimate = estimate if judged else facts.last_identifiable
@@ -125,7 +155,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
             state = estimate.state
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
-    elif facts.silent:
+    elif silent:
         state = PoseState.NO_DATA
     elif judged and estimate is not None:
         state = estimate.state
@@ -141,9 +171,25 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
         cause=cause,
         alerts=alerts,
         attended=facts.attended,
-        last_track_s=facts.last_track_s,
-        silent=facts.silent,
+        silent=silent,
+        clockwork=facts.clockwork,
     )
+
+
+def _identifies(estimate: EstimateRecord | None) -> bool:
+    """Whether the newest estimate is the last that tells something; none is the last, too."""
+    return estimate is None or bool(estimate.identifiable)
+
+
+def _moments(
+    windows: Sequence[MaintenanceRecord], firing: Sequence[AlertRecord]
+) -> Iterator[datetime]:
+    for window in windows:
+        yield window.from_at
+        yield window.until
+    for alert in firing:
+        if alert.silenced_until is not None:
+            yield alert.silenced_until
 
 
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
@@ -202,8 +248,8 @@ def _since(
     reference = facts.reference
     if alerts:
         return alert_since(alerts[0])
-    if state == PoseState.NO_DATA and facts.last_track_s is not None:
-        return datetime.fromtimestamp(facts.last_track_s, UTC)
+    if state == PoseState.NO_DATA and facts.clockwork.last_track_s is not None:
+        return datetime.fromtimestamp(facts.clockwork.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
         return reference.answered_at
     return reference.created_at if reference.ready_at is None else reference.ready_at

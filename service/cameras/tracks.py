@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from sqlalchemy.orm import Session
+from sqlalchemy import Connection
 
-from service.cameras.cameras import require_camera
+from service.cameras.cameras import no_camera
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
+from service.store import cameras, references
+from service.store.cameras import Picture
 from service.store.packing import pack
+from service.store.sqlite.database import joined
 from service.store.tracks import tracks
 from service.windows.requests import request_estimate
 
@@ -25,8 +28,20 @@ class Receipt:
     left_out: int
 
 
+def picture_of(connection: Connection, camera_id: str) -> Picture:
+    """The pictures of a camera, which tracks have to keep to.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    found = cameras.picture(connection, camera_id)
+    if found is None:
+        raise no_camera(camera_id)
+    return found
+
+
 def receive_tracks(
-    session: Session, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 16
+    connection: Connection, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 16
 ) -> Receipt:
     """Store the good tracks of a request and have them looked at, in one transaction.
 
@@ -38,12 +53,14 @@ def receive_tracks(
         NothingTakenError: there were tracks, and none of them could be taken.
         TooManySourcesError: the source is new, and the camera has as many as it may have.
     """
-    camera = require_camera(session, camera_id)  # held, since a session forgets what nobody holds
+    awaited = cameras.awaited(connection, camera_id)
+    if awaited is None:
+        raise no_camera(camera_id)
     if batch.rejections and not batch.tracks:
         raise _nothing_taken(batch)
     now = datetime.now(UTC)
     added = tracks.add(
-        session,
+        connection,
         [
             {
                 "camera_id": camera_id,
@@ -59,11 +76,15 @@ def receive_tracks(
             for track in batch.tracks
         ],
     )
-    for source in sorted({track.source for track in batch.tracks}):
+    sources = sorted({track.source for track in batch.tracks})
+    for source in sources:
         stored = added if source == batch.tracks[0].source else 0
-        note_source(session, camera_id, source, stored, max_sources)
-    if added:
-        request_estimate(session, queue, camera.id)
+        note_source(connection, camera_id, source, stored, max_sources)
+    if awaited.source and sources:
+        references.be_of_source(connection, camera_id, sources[0])
+    if added and awaited.look:
+        with joined(connection) as session:
+            request_estimate(session, queue, camera_id)
     return Receipt(
         accepted=added,
         duplicates=len(batch.tracks) - added,

@@ -10,6 +10,7 @@ from models.geometry.rotation import Array
 from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
 from service.formats.people import check_person
+from service.formats.rows import LARGEST, plain_rows
 
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
@@ -232,6 +233,8 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
         raise TrackRejectedError(
             "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
         )
+    if (plain := plain_rows(value, taken)) is not None:
+        return plain
     columns = taken[0]
     for at, row in enumerate(value):
         if not at and isinstance(row, list) and len(row) in taken:
@@ -250,7 +253,7 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
                 raise TrackRejectedError(
                     code, f"{form}/{at}: numbers are needed, got {number!r:.40}"
                 )
-            if isinstance(number, int) and abs(number) > 2**53 or math.isinf(number):
+            if isinstance(number, int) and abs(number) > LARGEST or math.isinf(number):
                 raise TrackRejectedError(
                     "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
                 )

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 from service.access.callers import Caller
 from service.cameras.quota import Quota
 from service.errors import PreconditionRequiredError
+from service.http.direct.kept import Kept, KeptAnswer
 from service.http.instruments import Instruments
 from service.job_queue import JobQueue
 from service.settings import Settings
@@ -28,6 +29,8 @@ from service.store.sqlite.turns import Turns
 class AppState:
     """What one application holds from start to stop.
 
+    `poses` are the answers to who asks for the pose of a camera, by its id.
+
     Event streams look for news by `stream_polls`; large bodies are read in `large_bodies`' turns.
     """
 
@@ -36,6 +39,7 @@ class AppState:
     queue: JobQueue
     quota: Quota
     stream_polls: anyio.CapacityLimiter
+    poses: Kept[KeptAnswer]
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
     stopping: threading.Event = field(default_factory=threading.Event)

@@ -45,6 +45,7 @@ class GuardMiddleware:
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
         self._settings = settings
+        self._on = auth_on(settings)
         self._attempts = Attempts()
         self._used_s: dict[str, float] = {}
         self._looking = anyio.CapacityLimiter(LOOKUPS - 1)
@@ -65,8 +66,8 @@ class GuardMiddleware:
         request.state.caller = request.state.token_id = None
         request.state.address = address_of(request, self._settings)
         request.state.attempts = self._attempts
-        need, parameters = need_of(request.method, scope["path"])
-        if auth_on(self._settings) and need is not None and not _is_static(request):
+        need, parameters = need_of(scope["method"], scope["path"]) if self._on else (None, {})
+        if need is not None and not _is_static(request):
             try:
                 await self._let_in(request, need, parameters)
             except UnauthorizedError:

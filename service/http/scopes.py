@@ -1,5 +1,8 @@
 """What each route needs, in one place; a test fails for a route that is not here."""
 
+import re
+from collections import defaultdict
+
 from starlette.routing import compile_path
 
 from service.http.packaged import CHARTS_URL, VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
@@ -98,9 +101,15 @@ NEEDS: dict[tuple[str, str], Need] = {
         for each in some
     },
 }
-_PATTERNS = [(method, compile_path(path)[0], path, need) for (method, path), need in NEEDS.items()]
 # A path without parameters is only what it says, before those that fit it, too.
-_PATTERNS.sort(key=lambda item: item[2].count("{"))
+_PLAIN: dict[tuple[str, str], Need] = {
+    each: need for each, need in NEEDS.items() if "{" not in each[1]
+}
+# By method and by what the path begins with: each request is looked for.
+_PATTERNS: defaultdict[tuple[str, str], list[tuple[re.Pattern[str], Need]]] = defaultdict(list)
+for (_method, _path), _need in sorted(NEEDS.items(), key=lambda item: item[0][1].count("{")):
+    if "{" in _path:
+        _PATTERNS[_method, _path.split("/")[1]].append((compile_path(_path)[0], _need))
 
 
 def need_of(method: str, path: str) -> tuple[Need, dict[str, str]]:
@@ -109,8 +118,11 @@ def need_of(method: str, path: str) -> tuple[Need, dict[str, str]]:
     What is not declared needs most: `read` to be told that there is nothing, else `admin`.
     """
     method = "GET" if method == "HEAD" else method
-    for known, pattern, _, need in _PATTERNS:
-        match = pattern.match(path) if known == method else None
+    if (method, path) in _PLAIN:
+        return _PLAIN[method, path], {}
+    first = path[1:].partition("/")[0]
+    for pattern, need in _PATTERNS.get((method, first), ()):
+        match = pattern.match(path)
         if match is not None:
             return need, match.groupdict()
     return (TokenScope.READ if method == "GET" else TokenScope.ADMIN), {}

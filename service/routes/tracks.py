@@ -4,18 +4,21 @@ import time
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 
-from service.cameras import cameras, tracks
+from service.cameras import tracks
 from service.errors import UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
 from service.formats.track import Batch, Clock, Limits
 from service.http.dependencies import AppState, BodyDep, StateDep
+from service.http.direct.straight import StraightRoute, straight
+from service.http.direct.written import written
 from service.schemas.cameras.tracks import DESCRIBED_TRACK, ReceiptOut
 
-router = APIRouter(tags=["tracks"])
+router = APIRouter(tags=["tracks"], route_class=StraightRoute)
 
 _LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
 
@@ -48,10 +51,10 @@ class Posted:
 
     body: bytes
     media_type: str
-    source: str
-    frame_rate_hz: float | None
-    started_at: str | None
-    classes: str | None
+    source: str = DEFAULT_SOURCE
+    frame_rate_hz: float | None = None
+    started_at: str | None = None
+    classes: str | None = None
 
 
 async def posted(
@@ -65,12 +68,16 @@ async def posted(
     """What is to be read, in the route's own thread."""
     return Posted(
         body=body,
-        media_type=request.headers.get("content-type", "").split(";")[0].strip().lower(),
+        media_type=_media_type(request),
         source=source,
         frame_rate_hz=frame_rate_hz,
         started_at=started_at,
         classes=classes,
     )
+
+
+def _media_type(request: Request) -> str:
+    return request.headers.get("content-type", "").split(";")[0].strip().lower()
 
 
 def read_batch(state: AppState, camera_id: str, came: Posted) -> Batch:
@@ -83,8 +90,8 @@ def read_batch(state: AppState, camera_id: str, came: Posted) -> Batch:
     """
     source = formats.read_source(came.source, "/source")
     people = None if came.classes is None else read_classes(came.classes)
-    with state.store.read() as session:
-        camera = cameras.require_camera(session, camera_id)
+    with state.store.look() as connection:
+        camera = tracks.picture_of(connection, camera_id)
     limits = Limits(
         width=camera.width,
         height=camera.height,
@@ -123,24 +130,34 @@ def _read(
     )
 
 
+def _take(state: AppState, camera_id: str, came: Posted) -> Response:
+    batch = read_batch(state, camera_id, came)
+    state.quota.check(state.store, camera_id, batch)
+    with state.store.change() as connection:
+        receipt = tracks.receive_tracks(
+            connection, state.queue, camera_id, batch, max_sources=state.settings.max_sources
+        )
+    body = written(ReceiptOut.from_value(receipt), exclude_defaults=True)
+    return Response(body, 202, media_type="application/json")
+
+
+async def _take_plain(request: Request) -> Response:
+    came = Posted(body=await request.body(), media_type=_media_type(request))
+    return await run_in_threadpool(_take, request.state.app, request.path_params["camera_id"], came)
+
+
 @router.post(
     "/cameras/{camera_id}/tracks",
     status_code=202,
     openapi_extra=_DESCRIBED_BODY,
-    response_model_exclude_defaults=True,
+    response_model=ReceiptOut,
 )
+@straight(_take_plain)
 def post_tracks(
     camera_id: str, came: Annotated[Posted, Depends(posted)], state: StateDep
-) -> ReceiptOut:
+) -> Response:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk.
 
     422 where there were tracks and none of them could be taken.
     """
-    batch = read_batch(state, camera_id, came)
-    with state.store.read() as session:
-        state.quota.check(session, camera_id, batch)
-    with state.store.write() as session:
-        receipt = tracks.receive_tracks(
-            session, state.queue, camera_id, batch, max_sources=state.settings.max_sources
-        )
-    return ReceiptOut.from_value(receipt)
+    return _take(state, camera_id, came)

@@ -1,16 +1,37 @@
 """Statements on cameras and their prior poses."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from sqlalchemy import bindparam, delete, func, select
+from sqlalchemy import Connection, Integer, bindparam, delete, func, select, type_coerce
 from sqlalchemy.orm import Session
 
+from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.trainings import ModelRecord, TrainingRecord
 
-# Built once: each request for a pose asks for it.
+# Built once: each request for a pose asks for them.
+_NEWEST_POSE = (
+    select(func.max(PriorPoseRecord.id))
+    .where(PriorPoseRecord.camera_id == CameraRecord.id)
+    .correlate(CameraRecord)
+    .scalar_subquery()
+)
+_NEWEST_MODEL = (
+    select(ModelRecord.id)
+    .where(ModelRecord.camera_id == CameraRecord.id)
+    .order_by(ModelRecord.created_at.desc())
+    .limit(1)
+    .correlate(CameraRecord)
+    .scalar_subquery()
+)
+_AS_SET_UP = (
+    select(CameraRecord, PriorPoseRecord, _NEWEST_MODEL)
+    .join(PriorPoseRecord, PriorPoseRecord.id == _NEWEST_POSE)
+    .where(CameraRecord.id == bindparam("camera"))
+)
 _PRIOR_POSE = (
     select(PriorPoseRecord)
     .where(PriorPoseRecord.camera_id == bindparam("camera"))
@@ -18,10 +39,68 @@ _PRIOR_POSE = (
     .limit(1)
 )
 
+# A record takes ten times as long as what each post of tracks has to know of its camera.
+_PICTURE = Prepared(
+    select(CameraRecord.width, CameraRecord.height, CameraRecord.frame_rate_hz).where(
+        CameraRecord.id == bindparam("camera")
+    )
+)
+_NEWEST_SOURCE = (
+    select(SiteReferenceRecord.source)
+    .where(SiteReferenceRecord.camera_id == CameraRecord.id)
+    .order_by(SiteReferenceRecord.id.desc())
+    .limit(1)
+    .correlate(CameraRecord)
+    .scalar_subquery()
+)
+_AWAITED = Prepared(
+    select(
+        type_coerce(CameraRecord.estimate_due_at.is_(None), Integer),
+        type_coerce(_NEWEST_SOURCE.is_(None), Integer),
+    ).where(CameraRecord.id == bindparam("camera"))
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """The pictures of a camera: their size, and how many a second, where that is known."""
+
+    width: int
+    height: int
+    frame_rate_hz: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Awaited:
+    """What a camera's tracks are awaited for: a `look` at them, a `source` for its reference."""
+
+    look: bool
+    source: bool
+
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:
     """The camera, or None."""
     return session.get(CameraRecord, camera_id)
+
+
+def picture(connection: Connection, camera_id: str) -> Picture | None:
+    """The pictures of a camera, or None."""
+    row = _PICTURE.row(connection, {"camera": camera_id})
+    return None if row is None else Picture(width=row[0], height=row[1], frame_rate_hz=row[2])
+
+
+def awaited(connection: Connection, camera_id: str) -> Awaited | None:
+    """What tracks of a camera are awaited for; None where there is no such camera."""
+    row = _AWAITED.row(connection, {"camera": camera_id})
+    return None if row is None else Awaited(look=bool(row[0]), source=bool(row[1]))
+
+
+def as_set_up(
+    session: Session, camera_id: str
+) -> tuple[CameraRecord, PriorPoseRecord, str | None] | None:
+    """The camera, its prior pose and the id of its model in use, if it has one; or None."""
+    row = session.execute(_AS_SET_UP, {"camera": camera_id}).first()
+    return None if row is None else (row[0], row[1], row[2])
 
 
 def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:

@@ -15,6 +15,7 @@ from sqlalchemy import (
     column,
     func,
     select,
+    true,
     type_coerce,
     values,
 )
@@ -24,7 +25,7 @@ from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
 from service.store.metrics import Ids, among, among_given, given, newest_of
 from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
+from service.store.tables.attendance import MaintenanceRecord
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
@@ -84,14 +85,27 @@ def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) ->
 
     Of those of a camera that were seen at any time `without`, none.
     """
+    some = ids is not None
+    if any(without.values()):
+        query = _learning_counts(~_seen_within(without), some=some)
+    else:
+        query = _all_learning_counts(some=some)
+    return {camera_id: number for camera_id, number in session.execute(query, given(ids))}
+
+
+@cache
+def _all_learning_counts(*, some: bool) -> Select[str, int]:
+    return _learning_counts(true(), some=some)
+
+
+def _learning_counts(counts: ColumnElement[bool], *, some: bool) -> Select[str, int]:
     begun = func.coalesce(SiteReferenceRecord.from_s, -math.inf)
     wanted = [
         TrackRecord.camera_id == CameraRecord.id,
         TrackRecord.started_s >= begun,
         TrackRecord.source == func.coalesce(SiteReferenceRecord.source, TrackRecord.source),
+        counts,
     ]
-    if any(without.values()):
-        wanted.append(~_seen_within(without))
     count = (
         select(func.count())
         .where(*wanted)
@@ -100,12 +114,14 @@ def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) ->
     )
     other = aliased(SiteReferenceRecord)
     newest = newest_of(other.id, other.camera_id)
-    query = (
+    return (
         select(CameraRecord.id, count)
         .join(SiteReferenceRecord, SiteReferenceRecord.id == newest)
-        .where(among(CameraRecord.id, ids), SiteReferenceRecord.ready_at.is_(None))
+        .where(
+            among_given(CameraRecord.id, some=some),
+            SiteReferenceRecord.ready_at.is_(None),
+        )
     )
-    return {camera_id: number for camera_id, number in session.execute(query)}
 
 
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:
@@ -140,12 +156,6 @@ def maintenance_windows(session: Session, ids: Ids) -> dict[str, list[Maintenanc
     return found
 
 
-def rhythm_profiles(session: Session, ids: Ids) -> dict[str, dict[str, Any]]:
-    """The rhythm of each camera that has one."""
-    rows = session.execute(_rhythm_profiles(some=ids is not None), given(ids))
-    return {camera_id: profile for camera_id, profile in rows if profile}
-
-
 @cache
 def _firing(*, some: bool) -> Select[AlertRecord]:
     query = select(AlertRecord).where(
@@ -158,12 +168,6 @@ def _firing(*, some: bool) -> Select[AlertRecord]:
 def _maintenance_windows(*, some: bool) -> Select[MaintenanceRecord]:
     query = select(MaintenanceRecord).where(among_given(MaintenanceRecord.camera_id, some=some))
     return query.order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
-
-
-@cache
-def _rhythm_profiles(*, some: bool) -> Select[str, dict[str, Any]]:
-    query = select(RhythmRecord.camera_id, RhythmRecord.profile)
-    return query.where(among_given(RhythmRecord.camera_id, some=some))
 
 
 def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:

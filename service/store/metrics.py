@@ -9,11 +9,22 @@ from datetime import datetime
 from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, String, bindparam, func, select, true, type_coerce
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    String,
+    bindparam,
+    exists,
+    func,
+    select,
+    true,
+    type_coerce,
+)
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.kinds import AlertState, DeliveryState, TrainingState
 from service.store.tables.alerts import AlertRecord
+from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.deliveries import DeliveryRecord
 from service.store.tables.estimates import EstimateRecord
@@ -30,6 +41,23 @@ _IDS = "ids"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Newest:
+    """What is newest of a camera, and whether there is more to know.
+
+    The reference that counts comes without the site itself, and of several cameras the estimate
+    without what is behind it. `last_track_s` is when the newest track ended of those that count.
+    `fires` says that an alert does, `attended` that there are maintenance windows.
+    """
+
+    reference: SiteReferenceRecord
+    estimate: EstimateRecord | None
+    last_track_s: float | None
+    rhythm: dict[str, Any] | None
+    fires: bool
+    attended: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Backlog:
     """What waits for a webhook, and since when."""
 
@@ -37,22 +65,22 @@ class Backlog:
     oldest_at: datetime
 
 
-def last_tracks_s(session: Session, ids: Ids = None) -> dict[str, float | None]:
-    """When the newest track of each camera ended, of those that count."""
-    rows = session.execute(_last_tracks_s(some=ids is not None), given(ids))
-    return {camera_id: ended_s for camera_id, ended_s in rows}
-
-
-def newest_references(session: Session, ids: Ids = None) -> dict[str, SiteReferenceRecord]:
-    """The reference of each camera that counts, without the site itself."""
-    query = _newest_references(some=ids is not None)
-    return {record.camera_id: record for record in session.scalars(query, given(ids))}
-
-
-def newest_estimates(session: Session, ids: Ids = None) -> dict[str, EstimateRecord]:
-    """The newest estimate of each camera; of several, without what is behind it."""
-    query = _newest_estimates(some=ids is not None, whole=ids is not None and len(ids) == 1)
-    return {record.camera_id: record for record in session.scalars(query, given(ids))}
+def newest(session: Session, ids: Ids = None) -> dict[str, Newest]:
+    """What is newest of each camera, in order of their ids."""
+    query = _newest(some=ids is not None, whole=ids is not None and len(ids) == 1)
+    return {
+        camera_id: Newest(
+            reference=reference,
+            estimate=estimate,
+            last_track_s=ended_s,
+            rhythm=profile or None,
+            fires=bool(fires),
+            attended=bool(attended),
+        )
+        for camera_id, reference, estimate, ended_s, profile, fires, attended in session.execute(
+            query, given(ids)
+        )
+    }
 
 
 def newest_identifiable_estimates(
@@ -105,30 +133,36 @@ def backlogs(session: Session) -> dict[str, Backlog]:
 
 
 @cache
-def _last_tracks_s(*, some: bool) -> Select[str, float | None]:
-    newest = (
-        select(func.max(TrackRecord.ended_s))
-        .where(TrackRecord.camera_id == CameraRecord.id, of_counting_source(CameraRecord.id))
-        .correlate(CameraRecord)
-        .scalar_subquery()
+def _newest(*, some: bool, whole: bool) -> Select[Any]:
+    """One statement: each that a request for a pose asks takes as long as all it looks up."""
+    of_camera = TrackRecord.camera_id == CameraRecord.id
+    last = select(func.max(TrackRecord.ended_s)).where(
+        of_camera, of_counting_source(CameraRecord.id)
     )
-    query = select(CameraRecord.id, newest).where(among_given(CameraRecord.id, some=some))
-    return query.order_by(CameraRecord.id)
-
-
-@cache
-def _newest_references(*, some: bool) -> Select[SiteReferenceRecord]:
-    newest = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
-    query = select(SiteReferenceRecord).join(CameraRecord, SiteReferenceRecord.id == newest)
-    query = query.where(among_given(CameraRecord.id, some=some))
-    return query.options(defer(SiteReferenceRecord.data))
-
-
-@cache
-def _newest_estimates(*, some: bool, whole: bool) -> Select[EstimateRecord]:
-    newest = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
-    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
-    query = query.where(among_given(CameraRecord.id, some=some))
+    fires = exists().where(
+        AlertRecord.camera_id == CameraRecord.id, AlertRecord.state == AlertState.FIRING
+    )
+    attended = exists().where(MaintenanceRecord.camera_id == CameraRecord.id)
+    reference = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
+    estimate = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
+    query = (
+        select(
+            CameraRecord.id,
+            SiteReferenceRecord,
+            EstimateRecord,
+            last.correlate(CameraRecord).scalar_subquery(),
+            RhythmRecord.profile,
+            fires.correlate(CameraRecord),
+            attended.correlate(CameraRecord),
+        )
+        .select_from(CameraRecord)
+        .join(SiteReferenceRecord, SiteReferenceRecord.id == reference)
+        .outerjoin(EstimateRecord, EstimateRecord.id == estimate)
+        .outerjoin(RhythmRecord, RhythmRecord.camera_id == CameraRecord.id)
+        .where(among_given(CameraRecord.id, some=some))
+        .order_by(CameraRecord.id)
+        .options(defer(SiteReferenceRecord.data))
+    )
     return query if whole else query.options(defer(EstimateRecord.raw))
 
 

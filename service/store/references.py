@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import Select, bindparam, delete, exists, func, select, update
+from sqlalchemy import Connection, Select, bindparam, delete, exists, func, select, update
 from sqlalchemy.orm import Session, aliased, defer
 
 from service.store.tables.estimates import EstimateRecord
@@ -20,9 +20,9 @@ _OF_SOURCE = (
 )
 
 
-def be_of_source(session: Session, camera_id: str, name: str) -> None:
+def be_of_source(connection: Connection, camera_id: str, name: str) -> None:
     """Have the reference that counts be of a source, if it is of none yet."""
-    session.connection().execute(_OF_SOURCE, {"camera": camera_id, "name": name})
+    connection.execute(_OF_SOURCE, {"camera": camera_id, "name": name})
 
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:

@@ -1,19 +1,21 @@
 """Engine and sessions of the store."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from sqlalchemy import Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.orm import Session
 
 from service.data_dir import make_private
 from service.settings import Settings
+from service.store.sqlite.prepared import Prepared
 from service.store.sqlite.turns import Turns
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
 _CONNECTIONS = 15
 
+_BEGIN = Prepared(text("BEGIN IMMEDIATE"))
 _WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
@@ -46,6 +48,10 @@ class Store:
         with Session(self.engine) as session:
             yield session
 
+    def look(self) -> AbstractContextManager[Connection]:
+        """A connection that only reads, for statements that need no session."""
+        return self.engine.connect()
+
     @contextmanager
     def write(self) -> Iterator[Session]:
         """A session that holds the write lock from its start; commits at the end.
@@ -65,13 +71,36 @@ class Store:
             self._turns.turn(self._patience_s),
             Session(self.engine, expire_on_commit=False) as session,
         ):
-            session.execute(text("BEGIN IMMEDIATE"))
+            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
             yield session
             session.commit()
+
+    @contextmanager
+    def change(self) -> Iterator[Connection]:
+        """A connection that writes as a session of `write` does, for who needs none.
+
+        Raises:
+            OverloadedError: the turn did not come in time.
+        """
+        with (
+            self._turns.turn(self._patience_s),
+            self.engine.connect() as connection,
+            connection.begin(),  # so that a session that joins does not think it its own
+        ):
+            _BEGIN.run(connection)
+            yield connection
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+@contextmanager
+def joined(connection: Connection) -> Iterator[Session]:
+    """A session within a connection's transaction, which is not its own to commit."""
+    with Session(connection, join_transaction_mode="rollback_only") as session:
+        yield session
+        session.flush()
 
 
 def engine_for(

@@ -3,23 +3,26 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import bindparam, delete, func, select, update
+from sqlalchemy import Connection, bindparam, delete, func, select, update
 from sqlalchemy.orm import Session
 
+from service.store.sqlite.prepared import Prepared
 from service.store.tables.tracks import SourceRecord, TrackRecord
 from service.store.tracks.counting import Spans, outside
 
-_SEEN = (
+_SEEN = Prepared(
     update(SourceRecord.__table__)  # type: ignore[arg-type]
     .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("posted"))
     .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
 )
 
 
-def note_seen(session: Session, camera_id: str, name: str, stored: int, now: datetime) -> bool:
+def note_seen(
+    connection: Connection, camera_id: str, name: str, stored: int, now: datetime
+) -> bool:
     """Count what a source has posted; whether it is known."""
     said = {"camera": camera_id, "posted": name, "stored": stored, "now": now}
-    return bool(session.connection().execute(_SEEN, said).rowcount)
+    return bool(_SEEN.change(connection, said))
 
 
 def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, delete, func, select
+from sqlalchemy import ColumnElement, Connection, and_, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
+from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import (
@@ -23,16 +24,16 @@ from service.store.tracks.counting import (
 )
 from service.store.tracks.stored import StoredTrack, read, select_tracks
 
+_ADDED = Prepared(
+    insert(TrackRecord.__table__).on_conflict_do_nothing(),  # type: ignore[arg-type]
+    [column for column in TrackRecord.__table__.columns.keys() if column != "id"],  # noqa: SIM118
+)
 _DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
 
 
-def add(session: Session, rows: Sequence[dict[str, Any]]) -> int:
+def add(connection: Connection, rows: Sequence[dict[str, Any]]) -> int:
     """Insert tracks; one that is already stored stays as it is. Returns how many are new."""
-    if not rows:
-        return 0
-    # One statement for all of them: others wait for the lock meanwhile.
-    statement = insert(TrackRecord.__table__).on_conflict_do_nothing()  # type: ignore[arg-type]
-    return session.connection().execute(statement, rows).rowcount
+    return _ADDED.change(connection, *rows) if rows else 0
 
 
 def count(session: Session, camera_id: str) -> int:

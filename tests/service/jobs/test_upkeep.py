@@ -75,7 +75,9 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         clock = Clock(frame_rate_hz=None, started_at_s=None)
         limits = Limits(width=1280, height=720, now_s=time.time(), max_ahead_s=60.0)
         batch.append(read_track(raw, "t", clock, limits))
-    return receive_tracks(session, Recorder(), "corner", Batch(tracks=tuple(batch), rejections=()))
+    return receive_tracks(
+        session.connection(), Recorder(), "corner", Batch(tracks=tuple(batch), rejections=())
+    )
 
 
 def test_a_training_under_way_is_left_alone(session, queue, settings):
