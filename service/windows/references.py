@@ -10,7 +10,7 @@ from service.settings import Settings
 from service.store import cameras, estimates, references
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
-from service.store.tracks import tracks, windows
+from service.store.tracks import tracks
 from service.store.tracks.windows import WindowBounds
 from service.windows.attendance import Attendance, attendance_of
 
@@ -133,15 +133,3 @@ def _is_before(to_s: float, bounds: WindowBounds) -> bool:
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
     """How many tracks a reference is learned of: no more than are kept."""
     return min(reference.wanted, settings.keep_tracks)
-
-
-def tracks_so_far(
-    session: Session, settings: Settings, reference: SiteReferenceRecord, attended: Attendance
-) -> int:
-    """How many of the wanted tracks there are."""
-    if reference.ready_at is not None:
-        return reference.tracks
-    stored = windows.count_from(
-        session, reference.camera_id, reference.from_s, without=attended.spans
-    )
-    return min(stored, wanted_tracks(reference, settings))

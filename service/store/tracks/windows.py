@@ -59,15 +59,6 @@ def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
     )
 
 
-def count_from(
-    session: Session, camera_id: str, started_from_s: float | None, without: Spans = ()
-) -> int:
-    """How many tracks started at or after a time and were not seen at others."""
-    query = select(func.count()).select_from(TrackRecord)
-    wanted = (*started_from(camera_id, started_from_s), *outside(without))
-    return session.scalar(query.where(*wanted)) or 0
-
-
 def count_window(session: Session, bounds: WindowBounds) -> int:
     """How many tracks are in a window."""
     query = select(func.count()).select_from(window_ids(session, bounds).subquery())
