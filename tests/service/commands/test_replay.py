@@ -84,18 +84,16 @@ def test_centred_prints_a_table_and_writes_json_and_a_plot(offline):
     assert (offline / "out.png").stat().st_size > 5000
 
 
-def test_evaluate_knocks_scenes_says_how_each_estimator_did_and_draws_it(tmp_path):
+def test_evaluate_knocks_a_scene_says_how_each_estimator_did_and_draws_it(tmp_path):
     output, plots = tmp_path / "out.json", tmp_path / "plots"
-    scenes = [str(SCENES / name) for name in ("pets2009_s2l1_v001_sort", "meva_g336_school")]
-    text = surefoot(
-        "evaluate", *scenes, "--seeds", "1", "--knocks", "knock,still", "--output", str(output),
+    surefoot(
+        "evaluate", str(SCENES / "meva_g336_school"), "--seeds", "1", "--knocks", "knock,still", "--output", str(output),
         "--plots", str(plots),
     )  # fmt: skip
     outcomes = json.loads(output.read_text())["outcomes"]
-    assert len(outcomes) == 2 * 2 * 5  # scenes, ranges, estimators
+    assert len(outcomes) == 2 * 5  # ranges, estimators
     assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
     assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
-    assert "bar (or declared)" in text  # the bar stands beside the figures
     for name in (
         "drift-knock.png",
         "ground-meva_g336_school.png",
