@@ -1,10 +1,12 @@
 """The estimators of the protocol that need no training, by the names of its tables."""
 
+from models.evaluation.protocol.base_runs import base_model
 from models.evaluation.protocol.flow_runs import fused, registration
 from models.evaluation.protocol.joint_runs import joint, joint_assumed, joint_feet
 from models.evaluation.protocol.learned import LearnedEstimator
 
 UNTRAINED: dict[str, LearnedEstimator] = {
+    "base model": base_model,
     "joint": joint,
     "joint, feet only": joint_feet,
     "joint, no reference": joint_assumed,

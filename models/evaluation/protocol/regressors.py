@@ -19,8 +19,6 @@ from models.geometry.pose import CameraPose
 from models.regression.calibration import learn_calibration
 from models.regression.prediction import predict_windows
 from models.regression.recipe import plan_training
-from models.regression.set_prediction import set_estimate
-from models.regression.set_training import SetPlan, train_set
 from models.regression.training import train
 from models.simulation.crowds import FlowConfig
 from models.simulation.walkers import WalkConfig
@@ -28,7 +26,6 @@ from models.trajectory import Trajectory, choose_step_s, cut_windows
 
 # A number of which an answer is less sure than this is not identifiable.
 _IDENTIFIABLE_SD = (math.radians(3), math.radians(3), 0.2)
-_TRAINING_SHARE = 0.5  # of the time: the other half is the set network's
 
 Tracks = Sequence[Trajectory]
 Reading = Callable[[Tracks], PlaneEstimate]
@@ -43,9 +40,9 @@ def prepare_regressors(
 ) -> dict[str, Estimator]:
     """The estimators of a scene's camera, trained at its true pose: the prior of every case.
 
-    `averaged`, `calibrated` and `set` answer from the tracks alone; `averaged_reference`,
-    `calibrated_reference` and `set_reference` also use the case's reference tracks. `epochs`
-    replaces those of both trainings; `on_progress` gets the share that is done.
+    `averaged` and `calibrated` answer from the tracks alone; `averaged_reference` and
+    `calibrated_reference` also use the case's reference tracks. `epochs` replaces those of the
+    training; `on_progress` gets the share that is done.
 
     Raises:
         CalibrationError: the camera sees no ground.
@@ -60,16 +57,8 @@ def prepare_regressors(
         seed=seed,
         epochs=epochs,
     )
-    network, _ = train(plan, lambda at: on_progress(_TRAINING_SHARE * at.step / at.steps))
+    network, _ = train(plan, lambda at: on_progress(at.step / at.steps))
     calibration = learn_calibration(network, plan, FlowConfig())
-    set_plan = SetPlan(
-        intrinsics=scene.intrinsics, prior_pose=scene.true_pose, walk=walk, seed=seed
-    )
-    if epochs is not None:
-        set_plan = set_plan.with_epochs(epochs)
-    set_network = train_set(
-        set_plan, lambda share: on_progress(_TRAINING_SHARE + (1 - _TRAINING_SHARE) * share)
-    )
 
     def averaged(tracks: Tracks) -> PlaneEstimate:
         windows = cut_windows(tracks, scene.intrinsics, step_s)
@@ -88,20 +77,11 @@ def prepare_regressors(
         _, predictions = average_windows(height_m, q, windows.owner_idx)
         return calibrated_estimate(predictions, calibration, seed)
 
-    def at_once(case: ProtocolCase, *, with_reference: bool) -> Answer:
-        seen = cut_windows(case.seen, scene.intrinsics, step_s)
-        reference = cut_windows(case.reference, scene.intrinsics, step_s)
-        return _answer(
-            set_estimate(set_network, set_plan, seen, reference if with_reference else None)
-        )
-
     estimators: dict[str, Estimator] = {
         "averaged": lambda case: _answer(averaged(case.seen)),
         "calibrated": lambda case: _answer(calibrated(case.seen)),
-        "set": lambda case: at_once(case, with_reference=False),
         "averaged_reference": lambda case: _with_offset(averaged, case),
         "calibrated_reference": lambda case: _with_offset(calibrated, case),
-        "set_reference": lambda case: at_once(case, with_reference=True),
     }
     return {name: _declaring(estimator) for name, estimator in estimators.items()}
 

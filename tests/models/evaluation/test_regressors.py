@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from math import radians
 
 import numpy as np
 import pytest
@@ -27,7 +26,6 @@ from models.geometry.pose_parameters import array_of
 from models.regression import training
 from models.regression.prediction import predict_windows
 from models.regression.recipe import DEFAULT, TrainingPlan, plan_training
-from models.regression.set_training import SetPlan
 from models.regression.training import train
 from models.simulation.crowds import FlowConfig
 from models.simulation.flows import simulate_sites
@@ -35,7 +33,7 @@ from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig
 from models.trajectory import Trajectory, choose_step_s, cut_windows
 
-NAMES = {"averaged", "calibrated", "set"}
+NAMES = {"averaged", "calibrated"}
 
 
 def tiny_plan(**asked: object) -> TrainingPlan:
@@ -50,9 +48,6 @@ def tiny() -> Iterator[None]:
         patch.setattr(training, "_HELD_OUT_WALKS", 100)
         patch.setattr(
             regressors, "learn_calibration", partial(regressors.learn_calibration, sites=60)
-        )
-        patch.setattr(
-            regressors, "SetPlan", partial(SetPlan, sites=24, people=16, fewest_people=6, batch=8)
         )
         yield
 
@@ -126,18 +121,6 @@ def test_only_those_of_the_reference_look_at_it(scene: Scene, estimators: Mappin
         alone, beside = estimators[name], estimators[f"{name}_reference"]
         assert_array_equal(alone(case).values, alone(fewer).values)
         assert np.abs(beside(case).values - beside(fewer).values).max() > 1e-9
-
-
-def test_on_its_own_reference_the_set_sees_hardly_a_drift(
-    scene: Scene, estimators: Mapping[str, Estimator]
-):
-    # The same tracks before and after: whatever the network makes of them is taken off again.
-    case = draw_case(scene, 5, KNOCKED)
-    still = replace(case, true_pose=case.prior_pose, seen=case.reference)
-    said = estimators["set_reference"](still)
-    pose = case.prior_pose
-    expected = array_of(pose)[:3]
-    assert_allclose(said.values, expected, atol=radians(1e-3))
 
 
 def test_hardly_a_track_is_declared(scene: Scene, estimators: Mapping[str, Estimator]):

@@ -1,0 +1,1 @@
+"""The base model: a set network trained once, over many cameras, for cameras never seen."""
