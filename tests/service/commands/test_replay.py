@@ -91,7 +91,7 @@ def test_evaluate_knocks_a_scene_says_how_each_estimator_did_and_draws_it(tmp_pa
         "--output", str(output), "--plots", str(plots),
     )  # fmt: skip
     outcomes = json.loads(output.read_text())["outcomes"]
-    assert len(outcomes) == 2 * 5  # ranges, estimators
+    assert len(outcomes) == 2 * 6  # ranges, estimators
     assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
     assert {outcome["knock"] for outcome in outcomes} == {"knock", "still"}
     for name in (
