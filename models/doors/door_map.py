@@ -122,7 +122,10 @@ def around(counts: Counts, nodes: Nodes, widths_m: Sequence[float]) -> Iterator[
 
 def door_map_of(counts: Counts, nodes: Nodes, grain: DoorGrain) -> DoorMap:
     """The door map of what there is around its nodes."""
-    seen, wanted = (np.stack(list(each), axis=2) for each in (counts.seen, counts.wanted))
+    # Compiled loops read ratios that lie row by row.
+    seen, wanted = (
+        np.ascontiguousarray(np.moveaxis(each, 0, 2)) for each in (counts.seen, counts.wanted)
+    )
     if grain.alike:
         seen, wanted = (np.repeat(n.sum(axis=2, keepdims=True), 2, axis=2) for n in (seen, wanted))
     return DoorMap(

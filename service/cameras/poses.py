@@ -18,7 +18,7 @@ from service.settings import Settings
 from service.store import cameras, estimates, fleet
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.estimates import EstimateRecord
-from service.windows.references import wanted_tracks
+from service.windows.references import tracks_so_far
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +76,11 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     camera, prior, model_id = set_up
     standing = standings(session, settings, (camera_id,))[camera_id]
     record = standing.reference
-    so_far = _tracks_so_far(session, settings, standing)
+    counts = {}
+    if record.ready_at is None:
+        attended = {camera_id: standing.attended.spans}
+        counts = fleet.learning_counts(session, (camera_id,), attended)
+    so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
     reasons = reasons_of(session, settings, standing, so_far)
     pose = pose_of_prior(prior)
     estimate = standing.estimate
@@ -108,16 +112,6 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         model_id=model_id,
         etag=f'"{hashlib.sha256(repr(served).encode()).hexdigest()[:24]}"',
     )
-
-
-def _tracks_so_far(session: Session, settings: Settings, standing: Standing) -> int:
-    """How many of the wanted tracks of its reference a camera has."""
-    reference = standing.reference
-    if reference.ready_at is not None:
-        return reference.tracks
-    camera_id = standing.camera_id
-    counts = fleet.learning_counts(session, (camera_id,), {camera_id: standing.attended.spans})
-    return min(counts.get(camera_id, 0), wanted_tracks(reference, settings))
 
 
 def pose_history(

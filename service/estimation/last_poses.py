@@ -48,11 +48,7 @@ def kept_of(last: LastPose | None, basis: bytes) -> KeptPose | None:
 
 def save_last_pose(session: Session, reference_id: int, kept: KeptPose | None) -> None:
     """Keep it in the place of the one before; what is None takes that away."""
-    record = flow_maps.last_pose(session, reference_id)
-    if kept is None:
-        if record is not None:
-            session.delete(record)
-    elif record is None:
-        session.add(LastPoseRecord(reference_id=reference_id, basis=kept.basis, data=kept.data))
-    else:
-        record.basis, record.data = kept.basis, kept.data
+    if kept is not None:
+        session.merge(LastPoseRecord(reference_id=reference_id, basis=kept.basis, data=kept.data))
+    elif (record := flow_maps.last_pose(session, reference_id)) is not None:
+        session.delete(record)

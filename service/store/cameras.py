@@ -6,19 +6,16 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Integer, bindparam, delete, func, select, type_coerce
 from sqlalchemy.orm import Session
 
+from service.store.metrics import newest_of
 from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.trainings import ModelRecord, TrainingRecord
+from service.store.tracks.counting import counting_source
 
 # Built once: each request for a pose asks for them.
-_NEWEST_POSE = (
-    select(func.max(PriorPoseRecord.id))
-    .where(PriorPoseRecord.camera_id == CameraRecord.id)
-    .correlate(CameraRecord)
-    .scalar_subquery()
-)
+_NEWEST_POSE = newest_of(PriorPoseRecord.id, PriorPoseRecord.camera_id)
 _NEWEST_MODEL = (
     select(ModelRecord.id)
     .where(ModelRecord.camera_id == CameraRecord.id)
@@ -45,18 +42,10 @@ _PICTURE = Prepared(
         CameraRecord.id == bindparam("camera")
     )
 )
-_NEWEST_SOURCE = (
-    select(SiteReferenceRecord.source)
-    .where(SiteReferenceRecord.camera_id == CameraRecord.id)
-    .order_by(SiteReferenceRecord.id.desc())
-    .limit(1)
-    .correlate(CameraRecord)
-    .scalar_subquery()
-)
 _AWAITED = Prepared(
     select(
         type_coerce(CameraRecord.estimate_due_at.is_(None), Integer),
-        type_coerce(_NEWEST_SOURCE.is_(None), Integer),
+        type_coerce(counting_source(CameraRecord.id).scalar_subquery().is_(None), Integer),
     ).where(CameraRecord.id == bindparam("camera"))
 )
 

@@ -18,7 +18,7 @@ from service.store.tables.alerts import AlertRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.trainings import TrainingRecord
 from service.windows.attendance import Attendance
-from service.windows.references import wanted_tracks
+from service.windows.references import tracks_so_far, wanted_tracks
 
 _HISTORY = 24  # estimates of a sparkline
 # How soon a camera without an alert needs a person.
@@ -193,7 +193,7 @@ def _learns(standing: Standing) -> bool:
 def _learned(settings: Settings, standing: Standing, counts: dict[str, int]) -> int | None:
     if not _learns(standing):
         return None
-    return min(counts.get(standing.camera_id, 0), wanted_tracks(standing.reference, settings))
+    return tracks_so_far(standing.reference, settings, counts.get(standing.camera_id, 0))
 
 
 def _training(record: TrainingRecord | None) -> FleetTraining | None:

@@ -133,3 +133,10 @@ def _is_before(to_s: float, bounds: WindowBounds) -> bool:
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
     """How many tracks a reference is learned of: no more than are kept."""
     return min(reference.wanted, settings.keep_tracks)
+
+
+def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: int) -> int:
+    """How many of the wanted tracks a reference has, by how many were counted if it is learning."""
+    if reference.ready_at is not None:
+        return reference.tracks
+    return min(counted, wanted_tracks(reference, settings))

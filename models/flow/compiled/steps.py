@@ -24,8 +24,8 @@ class Told(NamedTuple):
     """What each step says before it is known how busy unseen ground is.
 
     The log density `known` (M,) of known ground, which part is `unseen` (M,), and the log ratio
-    (M,) of what is `valid`. `slopes` (M, 3, 4) are by the candidate of the three; (0, 3, 4) of what
-    was asked for no slopes.
+    (M,) of what is `valid`. `slopes` (M, 3, 4) are by the candidate of the three; (0, 3, 4)
+    where no slopes were asked for.
     """
 
     known: Array

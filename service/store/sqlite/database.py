@@ -71,7 +71,7 @@ class Store:
             self._turns.turn(self._patience_s),
             Session(self.engine, expire_on_commit=False) as session,
         ):
-            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
+            _BEGIN.run(session.connection())
             yield session
             session.commit()
 
