@@ -38,4 +38,5 @@ def test_no_request_waits_for_a_thread_to_start(monkeypatch):
     asyncio.run(serve())
     for each in pool() - before:
         each.join(10)
-    assert pool() == before
+    # Threads of earlier tests end when they please.
+    assert pool() <= before
