@@ -3,20 +3,22 @@
 import math
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from pydantic import ValidationError
 from rich.console import Console
 
 from service.commands.data import DATA_COMMANDS, DataDir
+from service.commands.settings_given import WrongSettingsError, settings_given
 from service.commands.studies import STUDIES
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
+from service.process.collector import importing
 from service.process.manners import be_private
-from service.setting_values import wrong_settings
-from service.settings import Settings
+
+if TYPE_CHECKING:
+    from models.simulation.knocked import Knock
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -42,11 +44,14 @@ def serve(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Serve the API and run the local workers, until SIGTERM."""
-    from service.commands.serve import run_service
-
     configure_logs()
     be_private()
-    settings = _settings(data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe)
+    settings = settings_given(
+        data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe
+    )
+    with importing():
+        from service.commands.serve import run_service
+
     run_service(settings, follow_stdin=follow_stdin)
 
 
@@ -59,13 +64,14 @@ def worker(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Run a worker alone, beside an API that runs elsewhere on this machine."""
-    from service.commands.migrate import migrate as run_migrations
-    from service.commands.worker import WorkerRunningError, run_worker
-    from service.process import exits
-
     configure_logs()
     be_private()
-    settings = _settings(data_dir=data_dir)
+    settings = settings_given(data_dir=data_dir)
+    with importing():
+        from service.commands.migrate import migrate as run_migrations
+        from service.commands.worker import WorkerRunningError, run_worker
+        from service.process import exits
+
     if not follow_stdin:  # `serve` has migrated already
         run_migrations(settings)
     try:
@@ -196,12 +202,7 @@ def _replay_protocol(
     print_outcome(outcome, console)
 
 
-def _settings(**flags: Any) -> Settings:
-    """Settings of the environment, with the flags that were given above them."""
-    return Settings(**{name: value for name, value in flags.items() if value is not None})
-
-
-def _knock(text: str) -> "Any":
+def _knock(text: str) -> "Knock":
     from models.simulation.knocked import Knock
 
     try:
@@ -224,10 +225,8 @@ def main() -> None:
     except StartError as error:
         typer.echo(f"surefoot: {error}", err=True)
         raise SystemExit(1) from None
-    except ValidationError as error:
-        if error.title != Settings.__name__:
-            raise
-        for line in wrong_settings(error):
+    except WrongSettingsError as error:
+        for line in error.lines:
             typer.echo(f"surefoot: {line}", err=True)
         raise SystemExit(2) from None
 

@@ -53,7 +53,7 @@ class RunningService:
             with self.log.open("a") as log:
                 command = [sys.executable, "-m", "service.cli", "serve"]
                 self.process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-        wait_for(self.answers)
+        wait_for(self.answers, every_s=0.02)
 
     def start_again(self, **changes: Any) -> None:
         """Stop, and start with some settings changed."""

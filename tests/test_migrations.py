@@ -4,6 +4,7 @@ from datetime import UTC, datetime
 
 import alembic.command
 import pytest
+from alembic.script import ScriptDirectory
 from fastapi.testclient import TestClient
 from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
@@ -17,7 +18,7 @@ from service.settings import Settings
 from service.store import references
 from service.store.alerts import AlertFilter
 from service.store.sqlite.database import Store
-from service.store.sqlite.revisions import alembic_config
+from service.store.sqlite.revisions import alembic_config, known_revisions
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.record import Record
 from service.store.tracks import sources
@@ -29,6 +30,11 @@ def test_migrating_twice_changes_nothing(settings):
 
 def test_the_migrated_tables_are_the_declared_ones(settings):
     alembic.command.check(alembic_config(settings.database_url))
+
+
+def test_the_known_revisions_are_alembics():
+    scripts = ScriptDirectory.from_config(alembic_config(""))
+    assert known_revisions() == [script.revision for script in scripts.walk_revisions()]
 
 
 def test_down_to_nothing_and_up_again(tmp_path):

@@ -111,8 +111,11 @@ def _by_the_limit(
     """By the fixed limit alone: too little is known of the camera."""
     limit_s = settings.no_data_after_h * _HOUR_S
     silent_s = now.timestamp() - last_s
-    # What was recorded long ago and posted just now is old, but not a camera that fell silent.
-    begun_s = max(last_s, _received_s(session, camera_id), _answered_s(session, camera_id, now))
+    severity = None
+    if silent_s > limit_s:  # at night, hundreds of cameras need no closer look
+        # What was recorded long ago and posted just now is old, but not a camera that fell silent.
+        begun_s = max(_received_s(session, camera_id), _answered_s(session, camera_id, now))
+        severity = Severity.WARNING if now.timestamp() - begun_s > limit_s else None
     return Silence(
         last_s=last_s,
         no_data=is_no_data(settings, None, last_s, now),
@@ -122,7 +125,7 @@ def _by_the_limit(
                 values={"silent_s": silent_s, "limit_s": limit_s},
             ),
         ),
-        severity=Severity.WARNING if now.timestamp() - begun_s > limit_s else None,
+        severity=severity,
     )
 
 
@@ -140,7 +143,7 @@ def _by_rhythm(
     limit_s = settings.no_data_after_h * _HOUR_S
     from_s = max(last_s, until_s - _LONGEST_S)
     missed, verdict = _expected(settings, known, from_s, until_s), SilenceVerdict.USUAL
-    if is_missed(rhythm, missed):  # at night, hundreds of cameras need no closer look
+    if is_missed(rhythm, missed):  # as above
         from_s = max(from_s, _answered_s(session, camera_id, now))
         verdict = judge_silence(
             rhythm,

@@ -46,9 +46,11 @@ class StaleWatch:
         }
         firing = alerts.firing_cameras(session, AlertKind.STALE)
         found: dict[str, str] = {}
-        for camera in cameras.every(session):
-            waiting = self._waiting.get(camera.id)
-            waits_s = 0.0 if waiting is None else now_s - waiting.since_s
+        waits = {camera_id: now_s - each.since_s for camera_id, each in self._waiting.items()}
+        long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}
+        # Of hundreds, twelve times a minute: nothing can be wrong with any other.
+        for camera in cameras.failing(session, besides=firing | long):
+            waits_s = waits.get(camera.id, 0.0)
             reason = _why_stale(camera, settings, waits_s)
             if reason is None and camera.id in firing:
                 if camera.estimate_failing_since is None:

@@ -3,14 +3,17 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
+from service.commands.settings_given import settings_given
 from service.logs import configure_logs
 from service.process.manners import be_private, end_like_ctrl_c
-from service.settings import Settings
+
+if TYPE_CHECKING:
+    from service.settings import Settings
 
 DataDir = Annotated[Path | None, typer.Option(help="Database and weights live here.")]
 
@@ -102,10 +105,10 @@ def rotate_key(
     _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
 
 
-def _begin(data_dir: Path | None) -> Settings:
+def _begin(data_dir: Path | None) -> "Settings":
     configure_logs()
     be_private()
-    return Settings() if data_dir is None else Settings(data_dir=data_dir)
+    return settings_given(data_dir=data_dir)
 
 
 @contextlib.contextmanager

@@ -31,6 +31,7 @@ from service.commands.demo_street import (
     street_people,
 )
 from service.commands.replay import post_tracks
+from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.formats.degrees import degrees
 from service.kinds import AlertState, ReferenceState
@@ -53,7 +54,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     end_like_ctrl_c()
     console.print("A street camera, people walking by; later somebody knocks the camera.")
     with demo_folder() as folder:
-        settings = Settings(
+        settings = settings_given(
             data_dir=folder,
             port=port,
             recipe="default",

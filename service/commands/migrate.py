@@ -4,8 +4,6 @@ import fcntl
 import logging
 from pathlib import Path
 
-import alembic.command
-
 from service.backup.before_migration import copy_before
 from service.backup.placing import finish_restore
 from service.data_dir import (
@@ -73,6 +71,8 @@ def _migrate_tables(settings: Settings) -> None:
     if found is not None and settings.copy_before_migration:
         copy = copy_before(path, head)
         log.info("database_copied", extra={"path": str(copy), "revision": found})
+    import alembic.command  # 0.1 s that a start with nothing to migrate needs not
+
     try:
         alembic.command.upgrade(alembic_config(settings.database_url), "head")
     except Exception as error:

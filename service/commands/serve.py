@@ -8,22 +8,25 @@ import socket
 import sys
 import threading
 import time
+from typing import TYPE_CHECKING
 
 import uvicorn
 
 from service.access.tokens import count_tokens
-from service.app import create_app
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.http.connections import ConnectionGuard, protocol_factory
 from service.http.reach import auth_on, is_loopback
 from service.process import exits
-from service.process.collector import settle_collector
+from service.process.collector import importing, settle_collector
 from service.process.listener import listen
 from service.process.local_workers import local_workers
 from service.process.memory import settle_allocator
 from service.settings import Settings
 from service.store.sqlite.database import Store
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
 
 log = logging.getLogger("surefoot.serve")
 
@@ -46,7 +49,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
-        app = create_app(settings)
+        app = _app(settings)
         guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
             app,
@@ -77,6 +80,14 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     log.info("stopped")
     if workers.refused:
         raise SystemExit(exits.REFUSED)
+
+
+def _app(settings: Settings) -> "FastAPI":
+    # Half of what is imported, and who is refused is told without it.
+    with importing():
+        from service.app import create_app
+
+    return create_app(settings)
 
 
 def _require_way_in(settings: Settings) -> None:

@@ -10,10 +10,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.errors import ServiceError
 from service.process.manners import be_private
-from service.settings import Settings
 
 if TYPE_CHECKING:
     from service.store.sqlite.database import Store
@@ -106,7 +106,7 @@ def _store(data_dir: Path | None) -> "Store":
     from service.store.sqlite.database import Store
 
     be_private()
-    settings = Settings() if data_dir is None else Settings(data_dir=data_dir)
+    settings = settings_given(data_dir=data_dir)
     migrate(settings)
     return Store(settings)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import and_, delete, exists, not_, select
+from sqlalchemy import and_, bindparam, delete, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertKind, AlertState, Outcome
@@ -16,6 +16,13 @@ POSE_KINDS = (
     AlertKind.OUT_OF_RANGE,
 )  # that hold a camera against its prior pose
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
+
+# Built once: each reconcile of a camera asks for it.
+_FIRING = select(AlertRecord).where(
+    AlertRecord.camera_id == bindparam("camera"),
+    AlertRecord.kind == bindparam("kind"),
+    AlertRecord.state == AlertState.FIRING,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +43,7 @@ def find(session: Session, alert_id: str) -> AlertRecord | None:
 
 def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert of a camera and kind, or None."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.camera_id == camera_id,
-            AlertRecord.kind == kind,
-            AlertRecord.state == AlertState.FIRING,
-        )
-    ).first()
+    return session.scalars(_FIRING, {"camera": camera_id, "kind": kind}).first()
 
 
 def firing_cameras(session: Session, kind: AlertKind) -> set[str]:

@@ -1,6 +1,6 @@
 """Statements on cameras and their prior poses."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import Connection, Integer, bindparam, delete, func, select, type_coerce
@@ -98,11 +98,6 @@ def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
     return session.scalars(query.order_by(CameraRecord.id).limit(limit)).all()
 
 
-def every(session: Session) -> Sequence[CameraRecord]:
-    """All cameras."""
-    return session.scalars(select(CameraRecord).order_by(CameraRecord.id)).all()
-
-
 def ids(session: Session) -> Sequence[str]:
     """The ids of all cameras, in order."""
     return session.scalars(select(CameraRecord.id).order_by(CameraRecord.id)).all()
@@ -159,10 +154,10 @@ def due(session: Session) -> Sequence[CameraRecord]:
     ).all()
 
 
-def failing(session: Session) -> Sequence[CameraRecord]:
-    """Cameras whose last look failed."""
+def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraRecord]:
+    """Cameras whose last look failed, and some others, by their ids."""
     return session.scalars(
         select(CameraRecord)
-        .where(CameraRecord.estimate_failing_since.is_not(None))
+        .where(CameraRecord.estimate_failing_since.is_not(None) | CameraRecord.id.in_(besides))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()

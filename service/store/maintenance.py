@@ -3,12 +3,19 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import bindparam, delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store.tables.attendance import MaintenanceRecord
 
 _UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
+
+# Built once: each reconcile of a camera asks for it.
+_JUST_OVER = select(MaintenanceRecord).where(
+    MaintenanceRecord.camera_id == bindparam("camera"),
+    MaintenanceRecord.to_at <= bindparam("now"),
+    MaintenanceRecord.ended_at.is_(None),
+)
 
 
 def find(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord | None:
@@ -42,13 +49,7 @@ def under_way(session: Session, camera_id: str, now: datetime) -> MaintenanceRec
 
 def just_over(session: Session, camera_id: str, now: datetime) -> Sequence[MaintenanceRecord]:
     """Windows that have come to their planned end, which nobody has noted yet."""
-    return session.scalars(
-        select(MaintenanceRecord).where(
-            MaintenanceRecord.camera_id == camera_id,
-            MaintenanceRecord.to_at <= now,
-            MaintenanceRecord.ended_at.is_(None),
-        )
-    ).all()
+    return session.scalars(_JUST_OVER, {"camera": camera_id, "now": now}).all()
 
 
 def forget(session: Session, camera_id: str, before: datetime, limit: int) -> int:

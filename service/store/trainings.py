@@ -10,12 +10,24 @@ from service.store.tables.trainings import ModelRecord, TrainingRecord
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 
-# Built once: each request for a pose asks for it.
+# Built once, which takes longer than to run them: each request for a pose asks for the one, and
+# each reconcile of a camera for the others.
 _NEWEST_MODEL = (
     select(ModelRecord)
     .where(ModelRecord.camera_id == bindparam("camera"))
     .order_by(ModelRecord.created_at.desc())
     .limit(1)
+)
+_OF_CAMERA = (
+    select(TrainingRecord)
+    .where(TrainingRecord.camera_id == bindparam("camera"))
+    .order_by(TrainingRecord.queued_at.desc())
+    .limit(bindparam("most"))
+)
+_UNFINISHED_OF_CAMERA = (
+    select(TrainingRecord)
+    .where(TrainingRecord.camera_id == bindparam("camera"), TrainingRecord.state.in_(UNFINISHED))
+    .order_by(TrainingRecord.queued_at)
 )
 
 
@@ -26,21 +38,12 @@ def find(session: Session, training_id: str) -> TrainingRecord | None:
 
 def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[TrainingRecord]:
     """A camera's trainings, newest first."""
-    return session.scalars(
-        select(TrainingRecord)
-        .where(TrainingRecord.camera_id == camera_id)
-        .order_by(TrainingRecord.queued_at.desc())
-        .limit(limit)
-    ).all()
+    return session.scalars(_OF_CAMERA, {"camera": camera_id, "most": limit}).all()
 
 
 def unfinished(session: Session, camera_id: str) -> Sequence[TrainingRecord]:
     """A camera's queued and running trainings, oldest first."""
-    return session.scalars(
-        select(TrainingRecord)
-        .where(TrainingRecord.camera_id == camera_id, TrainingRecord.state.in_(UNFINISHED))
-        .order_by(TrainingRecord.queued_at)
-    ).all()
+    return session.scalars(_UNFINISHED_OF_CAMERA, {"camera": camera_id}).all()
 
 
 def newest_model(session: Session, camera_id: str) -> ModelRecord | None:

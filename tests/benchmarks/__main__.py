@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, tuple[str, ...]] = {
     "joint": (),
     "registration": (),
     "requests": ("--json",),
+    "start": (),
     "idle": ("--cameras", "500", "--minutes", "1"),
     "fleet": (),
     "cameras": ("--cameras", "100", "--minutes", "3"),

@@ -39,7 +39,8 @@ def reconcile_camera(
     if camera is None:
         return []
     found = []
-    reason = _why_train(session, camera, steps or StepWatch())
+    by_themselves = settings.trainings != "off"
+    reason = _why_train(session, camera, steps or StepWatch()) if by_themselves else None
     if reason is not None and train_by_itself(session, queue, settings, camera_id) is not None:
         found.append(reason)
     if requeue_lost(session, queue, camera_id):

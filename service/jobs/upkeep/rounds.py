@@ -24,7 +24,7 @@ from service.jobs.upkeep.retention import run_retention
 
 log = logging.getLogger("surefoot.worker")
 
-_TICK_S = 0.25
+_SHORTEST_REST_S = 0.05
 _SWEEP_S = 0.5
 _CLOCK_S = 1.0
 _HOUR_S = 3600.0
@@ -77,9 +77,11 @@ def _go(context: JobContext) -> None:
 
 
 def _repeat(context: JobContext, rounds: list[Round]) -> None:
-    while not context.stopping.wait(_TICK_S):
+    rest_s = 0.0
+    while not context.stopping.wait(rest_s):
         for each in rounds:
             each.do_if_due(context)
+        rest_s = max(min(each.due_s for each in rounds) - time.monotonic(), _SHORTEST_REST_S)
 
 
 def _quick(context: JobContext, now_s: float) -> list[Round]:

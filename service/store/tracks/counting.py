@@ -1,6 +1,6 @@
 """Which of a camera's tracks count: those of the source that its reference is of."""
 
-from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy import BindParameter, ColumnElement, Select, func, select
 from sqlalchemy.orm import InstrumentedAttribute, aliased
 
 from service.store.tables.cameras import CameraRecord
@@ -10,6 +10,8 @@ from service.store.tables.tracks import TrackRecord
 # Made once: each alias has columns of its own, which take a millisecond to make.
 _Reference = aliased(SiteReferenceRecord)
 
+# A camera by its id, by that of an enclosing query, or by a value that is given later.
+CameraId = str | InstrumentedAttribute[str] | BindParameter[str]
 Spans = tuple[tuple[float, float], ...]  # times, from and to
 
 
@@ -22,18 +24,18 @@ def bytes_of_track() -> ColumnElement[int]:
     )
 
 
-def of_counting_source(camera_id: str | InstrumentedAttribute[str]) -> ColumnElement[bool]:
+def of_counting_source(camera_id: CameraId) -> ColumnElement[bool]:
     """Whether a track is of the source that counts; all are, as long as none does."""
     counting = counting_source(camera_id).scalar_subquery()
     return TrackRecord.source == func.coalesce(counting, TrackRecord.source)
 
 
-def counting(camera_id: str) -> list[ColumnElement[bool]]:
+def counting(camera_id: str | BindParameter[str]) -> list[ColumnElement[bool]]:
     """That a track is of a camera, and of the source that counts."""
     return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
 
 
-def counting_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str | None]:
+def counting_source(camera_id: CameraId) -> Select[str | None]:
     """The source of a camera's newest reference."""
     newest = (
         select(_Reference.source)
@@ -41,7 +43,9 @@ def counting_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str |
         .order_by(_Reference.id.desc())
         .limit(1)
     )
-    return newest if isinstance(camera_id, str) else newest.correlate(CameraRecord)
+    return (
+        newest.correlate(CameraRecord) if isinstance(camera_id, InstrumentedAttribute) else newest
+    )
 
 
 def newest_source_of(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:

@@ -16,6 +16,13 @@ _SEEN = Prepared(
     .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
 )
 
+# Built once: each reconcile of a camera asks for it.
+_OF_CAMERA = (
+    select(SourceRecord)
+    .where(SourceRecord.camera_id == bindparam("camera"))
+    .order_by(SourceRecord.first_seen_at, SourceRecord.name)
+)
+
 
 def note_seen(
     connection: Connection, camera_id: str, name: str, stored: int, now: datetime
@@ -32,8 +39,7 @@ def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:
 
 def of_camera(session: Session, camera_id: str) -> Sequence[SourceRecord]:
     """The sources of a camera, the first to post first."""
-    query = select(SourceRecord).where(SourceRecord.camera_id == camera_id)
-    return session.scalars(query.order_by(SourceRecord.first_seen_at, SourceRecord.name)).all()
+    return session.scalars(_OF_CAMERA, {"camera": camera_id}).all()
 
 
 def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, delete, func, select
+from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, delete, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -28,6 +28,11 @@ _ADDED = Prepared(
     insert(TrackRecord.__table__).on_conflict_do_nothing(),  # type: ignore[arg-type]
     [column for column in TrackRecord.__table__.columns.keys() if column != "id"],  # noqa: SIM118
 )
+# Built once: each reconcile of a camera asks for them.
+_NEWEST_END = select(func.max(TrackRecord.ended_s)).where(
+    *counting(bindparam("camera", type_=String))
+)
+_NEWEST_PK = select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == bindparam("camera"))
 _DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
 
 
@@ -50,7 +55,7 @@ def stored_bytes(session: Session, camera_id: str) -> int:
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
     """When the newest track ended."""
-    return session.scalar(select(func.max(TrackRecord.ended_s)).where(*counting(camera_id)))
+    return session.scalar(_NEWEST_END, {"camera": camera_id})
 
 
 def newest_received_at(session: Session, camera_id: str) -> datetime | None:
@@ -106,9 +111,7 @@ def cameras_fed_by(session: Session, source: str, received_after: datetime) -> s
 
 def newest_pk(session: Session, camera_id: str) -> int | None:
     """The track that was stored last."""
-    return session.scalar(
-        select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == camera_id)
-    )
+    return session.scalar(_NEWEST_PK, {"camera": camera_id})
 
 
 def count_between(session: Session, camera_id: str, from_s: float, to_s: float) -> int:

@@ -169,7 +169,8 @@ def test_a_stale_camera_is_told_though_somebody_is_at_it(newcomer):
     now = datetime.now(UTC)
     body = {"from": now.isoformat(), "to": (now + timedelta(hours=1)).isoformat()}
     newcomer.http.post("/cameras/corner/maintenance", json=body).raise_for_status()
-    spoil(newcomer, CameraRecord, estimate_tries=3, estimate_error="x", estimate_due_at=now)
+    spoil(newcomer, CameraRecord, estimate_tries=3, estimate_error="x",
+          estimate_failing_since=now, estimate_due_at=now)  # fmt: skip
     assert watch(newcomer, StaleWatch()) == {"corner": "opened"}
     assert newcomer.alerts()[0]["kind"] == "stale"
 

@@ -48,3 +48,27 @@ print(gc.get_stats()[2]["collections"] - before)
 def test_what_was_imported_does_not_put_off_the_next_collection_until_much_is_new():
     told = subprocess.run([sys.executable, "-c", SOON], capture_output=True, text=True, check=True)
     assert int(told.stdout) > 0
+
+
+IMPORTING = """
+import gc
+from service.process.collector import importing
+
+class Failed(Exception): pass
+
+before = gc.get_stats()
+try:
+    with importing():
+        imported = [[] for _ in range(50_000)]
+        print(gc.get_stats() == before)
+        raise Failed
+except Failed:
+    print(gc.isenabled(), gc.get_freeze_count() > 50_000)
+"""
+
+
+def test_nothing_is_looked_at_while_it_is_imported_nor_afterwards():
+    told = subprocess.run(
+        [sys.executable, "-c", IMPORTING], capture_output=True, text=True, check=True
+    )
+    assert told.stdout.split() == ["True"] * 3

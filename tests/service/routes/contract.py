@@ -124,7 +124,7 @@ class Ground:
     def refill(self) -> None:
         """Put back what requests have used up, and learn what there is now."""
         with self.store.read() as session:
-            there = {camera.id for camera in stored_cameras.every(session)}
+            there = set(stored_cameras.ids(session))
         for name, state in (("new", "learning"), ("ok", "ok"), ("moved", "ok"), ("busy", "ok")):
             if name not in there:
                 self.fleet.add(name, state=state, estimates=20, wanted=20)

@@ -1,0 +1,32 @@
+"""The settings that a command is given: its flags, above its environment."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+class WrongSettingsError(Exception):
+    """Settings that cannot be; `lines` say which, what is needed, and what was given."""
+
+    def __init__(self, lines: list[str]) -> None:
+        super().__init__("; ".join(lines))
+        self.lines = lines
+
+
+def settings_given(**flags: Any) -> "Settings":
+    """Settings of the environment, with the flags that are not None above them.
+
+    Raises:
+        WrongSettingsError: one of them cannot be.
+    """
+    # Pydantic takes two thirds of what the command line imports: `--help` does without.
+    from pydantic import ValidationError
+
+    from service.setting_values import wrong_settings
+    from service.settings import Settings
+
+    try:
+        return Settings(**{name: value for name, value in flags.items() if value is not None})
+    except ValidationError as error:
+        raise WrongSettingsError(wrong_settings(error)) from error
