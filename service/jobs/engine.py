@@ -24,8 +24,10 @@ from service.jobs.train import run_training
 
 log = logging.getLogger("surefoot.worker")
 
-# Each look at a queue is a transaction: a training, of minutes, is not looked for so often.
-_POLL_S, _POLL_DELIVERIES_S, _POLL_TRAININGS_S = 0.2, 0.5, 2.0
+# Each look at a queue takes 4 ms, whether or not there is anything in it. One for estimates starts
+# two of them, so less often would be too seldom for hundreds of cameras; a delivery job sends all
+# that its webhook is due, and a training takes minutes.
+_POLL_S, _POLL_DELIVERIES_S, _POLL_TRAININGS_S = 0.25, 1.0, 2.0
 _KEEP_FINISHED = timedelta(hours=1)
 _FORGET_AT_ONCE = 500
 _ESTIMATES_AT_ONCE = 2

@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from sqlalchemy import event
 
 from models.geometry.pose import CameraPose
 from service.cameras.cameras import add_prior_pose
@@ -13,7 +14,7 @@ from service.jobs.upkeep import reconciliation
 from service.store import trainings
 from service.store.sqlite.database import Store
 from service.store.tables.cameras import CameraRecord
-from service.store.tracks import windows
+from service.store.tracks import tracks, windows
 from service.store.tracks.windows import WindowBounds
 from service.training.steps import StepWatch
 from service.training.trainings import (
@@ -98,6 +99,20 @@ def test_where_trainings_are_off_none_is_missing(session, queue, settings):
     off = settings.model_copy(update={"trainings": "off"})
     assert reconciliation.reconcile_camera(session, queue, off, "corner") == []
     assert queue.trainings == []
+
+
+def test_of_a_camera_that_needs_nothing_little_is_asked(session, queue, settings):
+    """Each of hundreds is asked of once a minute, by night too."""
+    session.delete(trainings.unfinished(session, "corner")[0])
+    put_tracks(session, 2)  # an hour ago: a silence, but not as long as the limit
+    end_look(session, "corner", tracks.newest_pk(session, "corner"), rest_s=0.0, lacks=())
+    session.flush()
+    asked = []
+    connection = session.connection()
+    event.listen(connection, "before_cursor_execute", lambda *said: asked.append(said[2]))
+    off = settings.model_copy(update={"trainings": "off"})
+    assert reconciliation.reconcile_camera(session, queue, off, "corner") == []
+    assert 0 < len(asked) <= 9, asked
 
 
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
