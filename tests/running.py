@@ -34,7 +34,7 @@ class RunningService:
     """A real `surefoot serve`, which a test may kill and start again over the same data.
 
     Unless it is said otherwise, it is `forked` off a process that has imported it: each start
-    takes 2 s of computing less.
+    takes a second of computing less.
     """
 
     def __init__(self, settings: Settings, *, forked: bool = True) -> None:
