@@ -42,7 +42,6 @@ def make_private(folder: Path) -> None:
                 _narrow(path)
         if not strangers_in(folder):
             _narrow(folder)
-        make_file(folder / DATABASE)
 
 
 def strangers_in(folder: Path) -> list[str]:

@@ -1,6 +1,6 @@
 """The one place that knows the job engine: what the rest of the service says to it.
 
-Jobs are rows of the same SQLite file, so enqueueing is part of the caller's transaction. Nothing
+Jobs are rows of the same database, so enqueueing is part of the caller's transaction. Nothing
 here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs.
 """
 
@@ -15,6 +15,7 @@ from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
+from service.store.database.store import savepoint
 from service.store.operation import engine_jobs
 
 APPLICATION = "surefoot"
@@ -75,9 +76,8 @@ class JobQueue:
             "queue_name": ESTIMATE_QUEUE,
             "deduplication_id": camera_id,
         }
-        # On SQLite a refused insert leaves the caller's transaction as it was; another database
-        # would need a savepoint around it.
-        with contextlib.suppress(DBOSQueueDeduplicatedError):
+        # Outside the savepoint: one that is refused takes nothing of the caller's with it.
+        with contextlib.suppress(DBOSQueueDeduplicatedError), savepoint(session):
             self._enqueue(session, options, camera_id)
 
     def cameras_under_way(self, session: Session) -> set[str]:
@@ -123,14 +123,14 @@ def queue_of(session: Session) -> JobQueue:
 def migrate_engine_tables(settings: Settings) -> None:
     """Create or upgrade the engine's own tables; they are not Alembic's."""
     logging.getLogger("dbos").setLevel(logging.WARNING)
-    DBOS.migrate(settings.database_url)
+    DBOS.migrate(settings.store_url)
 
 
 def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
     """The engine's configuration in a worker process; its name finds its own jobs again."""
     return {
         "name": APPLICATION,
-        "system_database_url": settings.database_url,
+        "system_database_url": settings.store_url,
         "application_version": JOBS_VERSION,
         "executor_id": worker_name,
         "run_migrations": False,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from service.data_dir import StartError
 from service.logs import configure_logs
 from service.process.manners import be_private, end_like_ctrl_c
 from service.settings import Settings
@@ -21,7 +22,8 @@ def migrate(data_dir: DataDir = None) -> None:
 
     settings = _begin(data_dir)
     run_migrations(settings)
-    _say(f"{settings.database_path} is at the newest revision")
+    what = settings.database_path if settings.database_url is None else "the database"
+    _say(f"{what} is at the newest revision")
 
 
 def backup(
@@ -31,7 +33,7 @@ def backup(
     """Write database, weights and key to one checked archive, while the service runs."""
     from service.backup.writing import write_backup
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "backup")
     with _progress() as tell:
         manifest = write_backup(settings, file, tell)
     size = sum(member.size for member in manifest.members)
@@ -52,7 +54,7 @@ def restore(
     """Verify an archive and put it into a data directory that nothing uses."""
     from service.backup.restoring import restore_backup
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "restore")
     with _progress() as tell:
         done = restore_backup(settings, file, tell, force=force)
     made = f"made {done.manifest.made_at} by release {done.manifest.release}"
@@ -74,7 +76,7 @@ def check(
 
     from service.backup.checking import Verdict, check_data_dir, repair_weights
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "check")
     if repair:
         _say(f"{repair_weights(settings)} models deleted, to be trained anew")
     findings = check_data_dir(settings)
@@ -106,6 +108,17 @@ def _begin(data_dir: Path | None) -> Settings:
     configure_logs()
     be_private()
     return Settings() if data_dir is None else Settings(data_dir=data_dir)
+
+
+def _begin_on_file(data_dir: Path | None, command: str) -> Settings:
+    """Settings for a command that a server has better ones for."""
+    settings = _begin(data_dir)
+    if settings.database_url is not None:
+        raise StartError(
+            f"{command}: it is for SQLite files, and SUREFOOT_DATABASE_URL names a server; use its "
+            "own tools (pg_dump, pg_restore, pg_amcheck), and keep the key of the webhooks' secrets"
+        )
+    return settings
 
 
 @contextlib.contextmanager

@@ -23,7 +23,7 @@ from service.process.memory import give_back, resident_mb, settle_allocator
 from service.process.niceness import yield_to_others
 from service.process.workforce import Watch, heartbeat, register_worker
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.worker")
 

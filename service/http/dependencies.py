@@ -20,8 +20,8 @@ from service.http.direct.kept import Kept, KeptAnswer
 from service.http.instruments import Instruments
 from service.job_queue import JobQueue
 from service.settings import Settings
+from service.store.database.store import Store
 from service.store.operation.actor import Actor, set_actor
-from service.store.sqlite.database import Store
 from service.store.sqlite.turns import Turns
 
 

@@ -24,7 +24,7 @@ from service.http.reach import auth_on
 from service.http.scopes import need_of
 from service.kinds import TokenScope
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.access")
 

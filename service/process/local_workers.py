@@ -15,7 +15,7 @@ from service.errors import OverloadedError
 from service.process import exits
 from service.process.workforce import note_trouble
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.serve")
 

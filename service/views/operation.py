@@ -11,9 +11,9 @@ from sqlalchemy.orm import Session
 from service.errors import OverloadedError
 from service.settings import Settings
 from service.store import cameras
+from service.store.database.failures import failure_of
+from service.store.database.store import Store
 from service.store.operation import events, probes, workers
-from service.store.sqlite.database import Store
-from service.store.sqlite.failures import failure_of
 from service.store.tables.operation import EventRecord
 from service.store.tracks import unseen
 

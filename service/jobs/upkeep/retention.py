@@ -29,7 +29,8 @@ def run_retention(context: JobContext) -> None:
     with context.store.write() as session:
         for path in limits.unused_weights(session, settings.weights_dir):
             path.unlink(missing_ok=True)
-    _shrink(context)
+    if settings.database_url is None:  # a server sees to its own disk
+        _shrink(context)
 
 
 def _apply(context: JobContext, limit: Limit, camera_id: str | None) -> None:

@@ -18,8 +18,12 @@ def alembic_config(url: str) -> alembic.config.Config:
 
 def known_revisions() -> list[str]:
     """All revisions, the newest first."""
-    scripts = ScriptDirectory.from_config(alembic_config(""))
-    return [script.revision for script in scripts.walk_revisions()]
+    return [script.revision for script in scripts().walk_revisions()]
+
+
+def scripts() -> ScriptDirectory:
+    """The migrations themselves."""
+    return ScriptDirectory.from_config(alembic_config(""))
 
 
 def require_known(found: str | None, what: str) -> None:

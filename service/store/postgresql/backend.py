@@ -1,0 +1,109 @@
+"""A store on a PostgreSQL server: its connections, and who may write beside whom.
+
+Connections are sessions of the server: locks and settings belong to them, so a pooler in between
+has to pool sessions, not transactions.
+"""
+
+import hashlib
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, text
+
+# The first key of our advisory locks; the second tells what is locked.
+LOCKS = 0x5F007
+_ALL = 0  # the second key of the lock of everything
+# Together the shared lock of everything and the one of what a transaction is about: others write
+# about something else meanwhile, and who writes about everything waits for all of them.
+_UPON_ALL = text("SELECT pg_advisory_xact_lock(:locks, :all)")
+_UPON_ONE = text(
+    "SELECT pg_advisory_xact_lock_shared(:locks, :all), pg_advisory_xact_lock(:locks, :one)"
+)
+_ALSO = text("SELECT pg_advisory_xact_lock(:locks, :one)")
+# A server that is gone is noticed within about ten seconds.
+_LIVELINESS = {
+    "connect_timeout": 5,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 10_000,
+    "application_name": "surefoot",
+}
+# The engine's tables lie in a schema of their own and are asked by their bare names. Our statements
+# are small, and to compile them takes longer than to run them.
+_SETTINGS = """
+SELECT set_config('search_path', current_setting('search_path') || ', dbos', false),
+       set_config('lock_timeout', %s, false), set_config('jit', 'off', false),
+       set_config('timezone', 'UTC', false), set_config('idle_in_transaction_session_timeout', %s,
+       false)
+"""
+_IDLE_MS = 60_000  # of a transaction whose process was stopped
+
+
+class Postgresql:
+    """Whoever writes takes locks by what it writes about, at the beginning of its transaction."""
+
+    def __init__(self, url: str, patience_s: float, connections: int) -> None:
+        self.engine = postgresql_engine(url, patience_s, connections)
+        self.connections = connections
+
+    def turn(self) -> AbstractContextManager[None]:
+        """No turn is needed: the server has writers wait for one another."""
+        return nullcontext()
+
+    def begin(self, connection: Connection, about: str | None) -> None:
+        """Wait until nobody else writes about the same, and keep others from it until the end.
+
+        Raises:
+            OperationalError: somebody did for longer than the patience lasts.
+        """
+        values = {"locks": LOCKS, "all": _ALL}
+        if about is None:
+            connection.execute(_UPON_ALL, values)
+        else:
+            connection.execute(_UPON_ONE, {**values, "one": lock_key(about)})
+
+    def changes(self) -> "Unwatched":
+        """What tells whether anybody has changed the store."""
+        return Unwatched()
+
+
+class Unwatched:
+    """Nobody tells whether the store has changed: to ask the server takes as long as to read."""
+
+    def version(self) -> None:
+        """Never known."""
+        return
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def also_about(connection: Connection, about: str) -> None:
+    """Within a transaction that writes about something, write about something else as well."""
+    connection.execute(_ALSO, {"locks": LOCKS, "one": lock_key(about)})
+
+
+def lock_key(about: str) -> int:
+    """A name as an int4 above 0; two names of one key wait for each other, and no more."""
+    return int.from_bytes(hashlib.sha256(about.encode()).digest()[:4], "big") % (2**31 - 1) + 1
+
+
+def postgresql_engine(url: str, patience_s: float, connections: int) -> Engine:
+    """An engine whose connections are tried before they are used, and wait for locks so long."""
+    engine = create_engine(
+        url,
+        pool_size=connections,
+        max_overflow=0,
+        pool_timeout=patience_s,
+        pool_use_lifo=True,
+        pool_pre_ping=True,
+        connect_args=_LIVELINESS,
+    )
+
+    @event.listens_for(engine, "connect")
+    def prepare(connection: Any, _: Any) -> None:
+        connection.execute(_SETTINGS, (f"{round(patience_s * 1000)}ms", f"{_IDLE_MS}ms"))
+        connection.commit()
+
+    return engine
