@@ -60,13 +60,15 @@ def create_app(settings: Settings) -> FastAPI:
         await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
         changes = store.changes()
+        stream_polls = anyio.CapacityLimiter(STREAM_POLLS)
         state = AppState(
             settings=settings,
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
             quota=Quota(settings),
-            stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
+            stream_polls=stream_polls,
+            feed=events.feed_of(store, stream_polls),
             poses=Kept(changes),
         )
         yield {"app": state}

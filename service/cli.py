@@ -15,6 +15,7 @@ from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
 from service.process.manners import be_private
+from service.process.work import WorkKind
 from service.setting_values import wrong_settings
 from service.settings import Settings
 
@@ -56,9 +57,12 @@ def worker(
         str, typer.Option(help="Stable and its own: by it a worker finds its unfinished jobs.")
     ] = "standalone",
     data_dir: DataDir = None,
+    only: Annotated[
+        WorkKind | None, typer.Option(help="Trainings alone, or all but trainings.")
+    ] = None,
     follow_stdin: FollowStdin = False,
 ) -> None:
-    """Run a worker alone, beside an API that runs elsewhere on this machine."""
+    """Run a worker alone, beside an API that runs elsewhere: on this machine, with a file."""
     from service.commands.migrate import migrate as run_migrations
     from service.commands.worker import WorkerRunningError, run_worker
     from service.process import exits
@@ -69,7 +73,7 @@ def worker(
     if not follow_stdin:  # `serve` has migrated already
         run_migrations(settings)
     try:
-        run_worker(settings, name, follow_stdin)
+        run_worker(settings, name, follow_stdin, only)
     except WorkerRunningError as error:
         Console(stderr=True).print(f"[red]worker refused:[/] {error}")
         raise typer.Exit(exits.REFUSED) from error

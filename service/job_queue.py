@@ -22,6 +22,7 @@ APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
+_ENGINE_CONNECTIONS = 5  # to a server, of each worker
 _UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
 # Of the engine's tables those that nothing works without.
 ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
@@ -128,7 +129,7 @@ def migrate_engine_tables(settings: Settings) -> None:
 
 def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
     """The engine's configuration in a worker process; its name finds its own jobs again."""
-    return {
+    config: DBOSConfig = {
         "name": APPLICATION,
         "system_database_url": settings.store_url,
         "application_version": JOBS_VERSION,
@@ -138,3 +139,6 @@ def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
         "log_level": "WARNING",
         "scheduler_polling_interval_sec": 1.0,
     }
+    if settings.database_url is not None:
+        config["sys_db_pool_size"] = _ENGINE_CONNECTIONS
+    return config

@@ -34,6 +34,7 @@ OTHERS = {
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
+    ("process/work.py", "estimate"): "what a worker may be for alone, defined there",
     ("jobs/upkeep/housekeeping.py", "stale"): "the name of a log line",
     ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
     ("jobs/upkeep/rounds.py", "clock"): "the name of a round",

@@ -139,4 +139,28 @@ def _say(line: str) -> None:
     Console().print(line, soft_wrap=True, highlight=False)
 
 
-DATA_COMMANDS = (migrate, backup, restore, check, rotate_key)
+def migrate_data(
+    source: Annotated[str, typer.Option("--from", help="sqlite:///… of a stopped data directory.")],
+    target: Annotated[str, typer.Option("--to", help="postgresql://user:password@host/name")],
+    data_dir: DataDir = None,
+) -> None:
+    """Move a site to PostgreSQL, checked by counts and hashes; run again, it goes on."""
+    from service.commands.postgresql.moving import move
+    from service.setting_values import read_database_url
+
+    configure_logs()
+    be_private()
+    path = Path(source.removeprefix("sqlite:///"))
+    try:
+        url = read_database_url(target)
+    except ValueError as error:
+        raise StartError(f"--to: {error}") from error
+    settings = Settings(data_dir=data_dir or path.parent, database_url=url)
+    with _progress() as tell:
+        moved = move(path, settings, tell)
+    _say(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")
+    _say(f"{moved.weights} weights are there; {moved.missing_weights} were missing or damaged")
+    _say("Set SUREFOOT_DATABASE_URL to it, and SUREFOOT_SECRET_KEY on all machines but this one.")
+
+
+DATA_COMMANDS = (migrate, backup, restore, check, rotate_key, migrate_data)

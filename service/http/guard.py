@@ -125,7 +125,7 @@ class GuardMiddleware:
         self._used_s[token_id] = now_s
 
         def keep() -> None:
-            with store.write() as session:
+            with store.write(f"token/{token_id}") as session:
                 tokens.note_use(session, token_id)
 
         try:
@@ -150,7 +150,7 @@ def refuse(request: Request) -> None:
     if failure.worth_a_line:
         log.warning("login_refused", extra={"address": request.state.address})
         try:
-            with request.state.app.store.write() as session:
+            with request.state.app.store.write("refused/") as session:
                 sessions.note_refused(session, request.state.address)
         except (SQLAlchemyError, ServiceError) as error:
             log.warning("refusal_not_kept", extra={"error": str(error)})

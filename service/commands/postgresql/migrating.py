@@ -14,8 +14,9 @@ from service.job_queue import migrate_engine_tables
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known, scripts
 from service.store.database.store import Store
-from service.store.postgresql.backend import LOCKS, lock_key, postgresql_engine
+from service.store.postgresql.backend import postgresql_engine
 from service.store.postgresql.faults import telling_of_server
+from service.store.postgresql.keys import LOCKS, lock_key
 from service.store.postgresql.schema import make_schema, revision
 
 log = logging.getLogger("surefoot.migrate")

@@ -36,7 +36,10 @@ def run_retention(context: JobContext) -> None:
 def _apply(context: JobContext, limit: Limit, camera_id: str | None) -> None:
     deleted, bite = 0, BITE
     while bite >= BITE and not context.stopping.is_set():
-        with context.in_hand.task(UPKEEP, limit.name), context.store.write() as session:
+        with (
+            context.in_hand.task(UPKEEP, limit.name),
+            context.store.write(camera_id or "retention/") as session,
+        ):
             bite = limit.bite(session)
         deleted += bite
         if bite:

@@ -40,6 +40,19 @@ class Backend(Protocol):
     def changes(self) -> Watcher:
         """What tells whether anybody has changed the store."""
 
+    def lock(self, name: str) -> "Lock":
+        """A lock that one process of all has."""
+
+
+class Lock(Protocol):
+    """A lock that is let go of however its holder ends; for one thread."""
+
+    def held(self) -> bool:
+        """Whether it is ours, still or from now on."""
+
+    def close(self) -> None:
+        """Let go of it."""
+
 
 class Store:
     """The database of one installation. Nothing connects before the first session.
@@ -110,6 +123,10 @@ class Store:
         """What tells whether anybody has changed the store; for one thread."""
         return self._backend.changes()
 
+    def lock(self, name: str) -> Lock:
+        """A lock that one process of all that share the store has, as long as it lives."""
+        return self._backend.lock(name)
+
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
@@ -121,6 +138,14 @@ def joined(connection: Connection) -> Iterator[Session]:
     with Session(connection, join_transaction_mode="rollback_only") as session:
         yield session
         session.flush()
+
+
+def also_about(session: Session, about: str) -> None:
+    """Within a transaction that writes about something, write about something else as well."""
+    if not is_sqlite(session.get_bind()):
+        from service.store.postgresql.backend import wait_for
+
+        wait_for(session.connection(), about)
 
 
 def savepoint(session: Session) -> AbstractContextManager[Any]:

@@ -4,14 +4,14 @@ Connections are sessions of the server: locks and settings belong to them, so a 
 has to pool sessions, not transactions.
 """
 
-import hashlib
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
 
-# The first key of our advisory locks; the second tells what is locked.
-LOCKS = 0x5F007
+from service.store.postgresql.keys import LOCKS, lock_key
+from service.store.postgresql.server_lock import ServerLock
+
 _ALL = 0  # the second key of the lock of everything
 # Together the shared lock of everything and the one of what a transaction is about: others write
 # about something else meanwhile, and who writes about everything waits for all of them.
@@ -30,12 +30,17 @@ _LIVELINESS = {
     "application_name": "surefoot",
 }
 # The engine's tables lie in a schema of their own and are asked by their bare names. Our statements
-# are small, and to compile them takes longer than to run them.
+# are small, and to compile them takes longer than to run them. The server, too, has to notice that
+# we are gone: our locks go with our connections.
 _SETTINGS = """
 SELECT set_config('search_path', current_setting('search_path') || ', dbos', false),
-       set_config('lock_timeout', %s, false), set_config('jit', 'off', false),
-       set_config('timezone', 'UTC', false), set_config('idle_in_transaction_session_timeout', %s,
-       false)
+       set_config('lock_timeout', %s, false),
+       set_config('idle_in_transaction_session_timeout', %s, false),
+       set_config('jit', 'off', false),
+       set_config('timezone', 'UTC', false),
+       set_config('tcp_keepalives_idle', '5', false),
+       set_config('tcp_keepalives_interval', '2', false),
+       set_config('tcp_keepalives_count', '3', false)
 """
 _IDLE_MS = 60_000  # of a transaction whose process was stopped
 
@@ -67,6 +72,10 @@ class Postgresql:
         """What tells whether anybody has changed the store."""
         return Unwatched()
 
+    def lock(self, name: str) -> "ServerLock":
+        """A lock that one process of all machines has."""
+        return ServerLock(self.engine, name)
+
 
 class Unwatched:
     """Nobody tells whether the store has changed: to ask the server takes as long as to read."""
@@ -79,14 +88,9 @@ class Unwatched:
         """Nothing is open."""
 
 
-def also_about(connection: Connection, about: str) -> None:
-    """Within a transaction that writes about something, write about something else as well."""
+def wait_for(connection: Connection, about: str) -> None:
+    """Wait until nobody else writes about something, and keep others from it until the end."""
     connection.execute(_ALSO, {"locks": LOCKS, "one": lock_key(about)})
-
-
-def lock_key(about: str) -> int:
-    """A name as an int4 above 0; two names of one key wait for each other, and no more."""
-    return int.from_bytes(hashlib.sha256(about.encode()).digest()[:4], "big") % (2**31 - 1) + 1
 
 
 def postgresql_engine(url: str, patience_s: float, connections: int) -> Engine:

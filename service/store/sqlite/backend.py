@@ -8,6 +8,7 @@ from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 
 from service.data_dir import make_file
 from service.store.sqlite.changes import Changes
+from service.store.sqlite.file_lock import FileLock
 from service.store.sqlite.prepared import Prepared
 from service.store.sqlite.turns import Turns
 
@@ -41,6 +42,10 @@ class Sqlite:
     def changes(self) -> Changes:
         """What tells whether anybody has changed the store."""
         return Changes(self._path)
+
+    def lock(self, name: str) -> FileLock:
+        """A lock that one process of this machine has."""
+        return FileLock(self._path.with_name(f"{name}.lock"))
 
 
 def sqlite_engine(url: str, patience_s: float, connections: int) -> Engine:

@@ -1,7 +1,9 @@
 """What is PostgreSQL's own: who writes beside whom, order of what is followed, refusals."""
 
+import hashlib
+import socket
 import threading
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import text
@@ -12,10 +14,14 @@ from service.data_dir import StartError
 from service.errors import OverloadedError, StoreUnavailableError
 from service.job_queue import JobQueue
 from service.kinds import EventType
+from service.process.workforce import heartbeat, register_worker, take_setback, worker_name
 from service.setting_values import read_database_url
+from service.store import trainings
+from service.store.database.clock import now_in
 from service.store.database.failures import failure_of
 from service.store.database.store import Store
-from service.store.operation import events
+from service.store.operation import events, workers
+from service.training.weights import fetch_weights, share_weights
 from tests.stores import server
 
 pytestmark = pytest.mark.skipif(not server.wanted(), reason="PostgreSQL only")
@@ -157,3 +163,54 @@ def test_many_that_migrate_at_once_make_one_schema(settings, store):
     with store.write("a") as session:
         add(session, "works")
     assert said_after(store) == ["works"]
+
+
+def test_a_lock_is_one_holders_and_goes_with_its_connection(store):
+    first, second = store.lock("rounds"), store.lock("rounds")
+    assert first.held()
+    assert first.held()
+    assert not second.held()
+    first.close()
+    assert second.held()
+    third = store.lock("rounds")
+    assert not third.held()
+    second.close()
+    assert third.held()
+    third.close()
+
+
+def test_weights_of_another_machine_are_fetched_once(settings, store, tmp_path):
+    data = b"weights of a model"
+    sha256 = hashlib.sha256(data).hexdigest()
+    settings.weights_dir.mkdir(exist_ok=True)
+    (settings.weights_dir / f"{sha256}.safetensors").write_bytes(data)
+    for _ in range(2):
+        with store.write() as session:
+            share_weights(session, settings, sha256)
+    elsewhere = settings.model_copy(update={"data_dir": tmp_path / "elsewhere"})
+    fetch_weights(store, elsewhere, sha256)
+    fetch_weights(store, elsewhere, "0" * 64)
+    assert [path.read_bytes() for path in elsewhere.weights_dir.iterdir()] == [data]
+    with store.write() as session:  # no model names them
+        assert trainings.forget_weights(session, 10) == 1
+
+
+def test_workers_are_heard_of_by_the_servers_clock(store, monkeypatch):
+    with store.write() as session:
+        register_worker(session, "a", 1)
+    with store.read() as session:
+        begun = workers.find(session, "a").heartbeat_at
+        assert abs((now_in(session) - begun).total_seconds()) < 5
+    with monkeypatch.context() as patched, store.write() as session:
+        patched.setattr(
+            "service.store.database.clock.datetime", None
+        )  # this machine's says nothing
+        assert heartbeat(session, "a", 1)
+        assert take_setback(session) <= timedelta()
+
+
+def test_a_workers_name_has_its_machine_in_it(settings):
+    assert worker_name(settings, "local-0") == f"local-0@{socket.gethostname()}"
+    assert worker_name(settings, "a@b") == "a@b"
+    on_file = settings.model_copy(update={"database_url": None})
+    assert worker_name(on_file, "local-0") == "local-0"
