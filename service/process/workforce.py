@@ -1,5 +1,6 @@
 """Which workers live, by signs of life that no clock can set back."""
 
+import hashlib
 import socket
 import time
 from datetime import timedelta
@@ -15,10 +16,11 @@ _FORGET_LOST = timedelta(days=7)
 
 
 def worker_name(settings: Settings, name: str) -> str:
-    """The name of a worker among all of its store: on a server, the machine's is in it."""
+    """The name of a worker among all of its store: on a server, its machine's is in it."""
     if settings.database_url is None or "@" in name:
         return name
-    return f"{name}@{socket.gethostname()}"
+    folder = hashlib.sha256(str(settings.data_dir.absolute()).encode()).hexdigest()[:6]
+    return f"{name}@{socket.gethostname()}-{folder}"
 
 
 def register_worker(session: Session, name: str, pid: int) -> None:

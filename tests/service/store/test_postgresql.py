@@ -4,6 +4,7 @@ import hashlib
 import socket
 import threading
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 from sqlalchemy import text
@@ -210,7 +211,9 @@ def test_workers_are_heard_of_by_the_servers_clock(store, monkeypatch):
 
 
 def test_a_workers_name_has_its_machine_in_it(settings):
-    assert worker_name(settings, "local-0") == f"local-0@{socket.gethostname()}"
+    name = worker_name(settings, "local-0")
+    assert name.startswith(f"local-0@{socket.gethostname()}-")
+    assert name != worker_name(settings.model_copy(update={"data_dir": Path("b")}), "local-0")
     assert worker_name(settings, "a@b") == "a@b"
     on_file = settings.model_copy(update={"database_url": None})
     assert worker_name(on_file, "local-0") == "local-0"
