@@ -29,6 +29,7 @@ class Backend(Protocol):
     """What the two databases do each in its own way."""
 
     engine: Engine
+    reading: Engine  # the same connections, for who only reads
     connections: int
 
     def turn(self) -> AbstractContextManager[None]:
@@ -80,12 +81,12 @@ class Store:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session that only reads."""
-        with Session(self.engine) as session:
+        with Session(self._backend.reading) as session:
             yield session
 
     def look(self) -> AbstractContextManager[Connection]:
         """A connection that only reads, for statements that need no session."""
-        return self.engine.connect()
+        return self._backend.reading.connect()
 
     @contextmanager
     def write(self, about: str | None = None) -> Iterator[Session]:

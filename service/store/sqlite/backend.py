@@ -23,6 +23,7 @@ class Sqlite:
         self._path = Path(make_url(url).database or "")
         make_file(self._path)
         self.engine = sqlite_engine(url, patience_s, connections)
+        self.reading = self.engine
         self.connections = connections
         self._patience_s = patience_s
         self._turns = Turns("write")

@@ -62,7 +62,7 @@ def test_what_is_not_there_is_a_problem_document(http):
 def test_an_enqueued_job_lives_and_dies_with_its_transaction(settings):
     store = Store(settings)
     queue = JobQueue(store.engine)
-    with store.read() as session:
+    with store.write() as session:
         queue.enqueue_training(session, "corner", "a" * 32)
         session.rollback()
     with store.write() as session:
