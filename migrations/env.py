@@ -3,7 +3,7 @@
 from alembic import context
 
 from service.settings import Settings
-from service.store.sqlite.database import engine_for
+from service.store.database.store import engine_for
 from service.store.tables.record import Record, UtcDateTime, Word
 
 
@@ -19,23 +19,26 @@ def _render(kind: str, obj: object, autogen: object) -> str | bool:
     return "sa.DateTime()" if kind == "type" and isinstance(obj, UtcDateTime) else False
 
 
-url = context.config.attributes.get("url") or Settings().database_url
+url = context.config.attributes.get("url") or Settings().store_url
 engine = engine_for(url)
+on_sqlite = engine.dialect.name == "sqlite"
 with engine.connect() as connection:
-    # SQLite changes a table by making it anew: dropping the old one would delete, by cascade, all
-    # that refers to it.
-    connection.exec_driver_sql("PRAGMA foreign_keys=OFF")
-    connection.commit()
+    if on_sqlite:
+        # It changes a table by making it anew: dropping the old one would delete, by cascade, all
+        # that refers to it.
+        connection.exec_driver_sql("PRAGMA foreign_keys=OFF")
+        connection.commit()
     context.configure(
         connection=connection,
         target_metadata=Record.metadata,
-        render_as_batch=True,
+        render_as_batch=on_sqlite,
         compare_type=True,
         include_object=_ours,
         render_item=_render,
     )
     with context.begin_transaction():
         context.run_migrations()
-        broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
-        assert broken is None, broken
+        if on_sqlite:
+            broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+            assert broken is None, broken
 engine.dispose()

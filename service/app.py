@@ -38,8 +38,7 @@ from service.routes import (
 )
 from service.routes.ui import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings
-from service.store.sqlite.changes import Changes
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 _SPARE_THREADS = 8
 
@@ -60,14 +59,16 @@ def create_app(settings: Settings) -> FastAPI:
         # A request is in one thread at a time; some are left for what needs no turn.
         await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
-        changes = Changes(settings.database_path)
+        changes = store.changes()
+        stream_polls = anyio.CapacityLimiter(STREAM_POLLS)
         state = AppState(
             settings=settings,
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
             quota=Quota(settings),
-            stream_polls=anyio.CapacityLimiter(STREAM_POLLS),
+            stream_polls=stream_polls,
+            feed=events.feed_of(store, stream_polls),
             poses=Kept(changes),
         )
         yield {"app": state}

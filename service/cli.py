@@ -16,6 +16,7 @@ from service.data_dir import StartError
 from service.logs import configure_logs
 from service.process.collector import importing
 from service.process.manners import be_private
+from service.process.work import WorkKind
 
 if TYPE_CHECKING:
     from models.simulation.knocked import Knock
@@ -61,9 +62,12 @@ def worker(
         str, typer.Option(help="Stable and its own: by it a worker finds its unfinished jobs.")
     ] = "standalone",
     data_dir: DataDir = None,
+    only: Annotated[
+        WorkKind | None, typer.Option(help="Trainings alone, or all but trainings.")
+    ] = None,
     follow_stdin: FollowStdin = False,
 ) -> None:
-    """Run a worker alone, beside an API that runs elsewhere on this machine."""
+    """Run a worker alone, beside an API that runs elsewhere: on this machine, with a file."""
     configure_logs()
     be_private()
     settings = settings_given(data_dir=data_dir)
@@ -75,7 +79,7 @@ def worker(
     if not follow_stdin:  # `serve` has migrated already
         run_migrations(settings)
     try:
-        run_worker(settings, name, follow_stdin)
+        run_worker(settings, name, follow_stdin, only)
     except WorkerRunningError as error:
         Console(stderr=True).print(f"[red]worker refused:[/] {error}")
         raise typer.Exit(exits.REFUSED) from error

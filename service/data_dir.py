@@ -13,7 +13,8 @@ from typing import TextIO
 log = logging.getLogger("surefoot.data_dir")
 
 SERVE_LOCK, MIGRATE_LOCK, KEY_FILE = "serve.lock", "migrate.lock", "secret.key"
-ROUNDS_LOCK = "rounds.lock"  # of the worker that does the upkeep, which has one of its own
+ROUNDS = "rounds"  # of the worker that does the upkeep, which has a lock of its own
+ROUNDS_LOCK = f"{ROUNDS}.lock"
 DATABASE, WEIGHTS, COPIES = "surefoot.sqlite", "weights", "copies"
 COMPILED = "compiled"  # in the image: machine code of models/, where no other place can be written
 _OURS = (
@@ -42,7 +43,6 @@ def make_private(folder: Path) -> None:
                 _narrow(path)
         if not strangers_in(folder):
             _narrow(folder)
-        make_file(folder / DATABASE)
 
 
 def strangers_in(folder: Path) -> list[str]:

@@ -1,6 +1,6 @@
 """The one place that knows the job engine: what the rest of the service says to it.
 
-Jobs are rows of the same SQLite file, so enqueueing is part of the caller's transaction. Nothing
+Jobs are rows of the same database, so enqueueing is part of the caller's transaction. Nothing
 here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs.
 """
 
@@ -15,12 +15,14 @@ from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
+from service.store.database.store import savepoint
 from service.store.operation import engine_jobs
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
+_ENGINE_CONNECTIONS = 5  # to a server, of each worker
 _UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
 # Of the engine's tables those that nothing works without.
 ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
@@ -75,9 +77,8 @@ class JobQueue:
             "queue_name": ESTIMATE_QUEUE,
             "deduplication_id": camera_id,
         }
-        # On SQLite a refused insert leaves the caller's transaction as it was; another database
-        # would need a savepoint around it.
-        with contextlib.suppress(DBOSQueueDeduplicatedError):
+        # Outside the savepoint: one that is refused takes nothing of the caller's with it.
+        with contextlib.suppress(DBOSQueueDeduplicatedError), savepoint(session):
             self._enqueue(session, options, camera_id)
 
     def cameras_under_way(self, session: Session) -> set[str]:
@@ -123,14 +124,14 @@ def queue_of(session: Session) -> JobQueue:
 def migrate_engine_tables(settings: Settings) -> None:
     """Create or upgrade the engine's own tables; they are not Alembic's."""
     logging.getLogger("dbos").setLevel(logging.WARNING)
-    DBOS.migrate(settings.database_url)
+    DBOS.migrate(settings.store_url)
 
 
 def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
     """The engine's configuration in a worker process; its name finds its own jobs again."""
-    return {
+    config: DBOSConfig = {
         "name": APPLICATION,
-        "system_database_url": settings.database_url,
+        "system_database_url": settings.store_url,
         "application_version": JOBS_VERSION,
         "executor_id": worker_name,
         "run_migrations": False,
@@ -138,3 +139,6 @@ def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
         "log_level": "WARNING",
         "scheduler_polling_interval_sec": 1.0,
     }
+    if settings.database_url is not None:
+        config["sys_db_pool_size"] = _ENGINE_CONNECTIONS
+    return config

@@ -2,10 +2,13 @@
 
 import base64
 from ipaddress import IPv4Network, IPv6Network, ip_network
+from urllib.parse import urlsplit
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import ValidationError
 
-_SECRETS = ("secret_key", "proxy_secret")
+_SECRETS = ("secret_key", "proxy_secret", "database_url")
+_SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
 
 def wrong_settings(error: ValidationError) -> list[str]:
@@ -42,3 +45,32 @@ def read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
 def read_numbers(text: str) -> tuple[float, ...]:
     """The numbers of a text, with commas."""
     return tuple(float(part) for part in text.split(","))
+
+
+def read_zone(text: str) -> str:
+    """The name of a zone that this machine knows.
+
+    Raises:
+        ValueError: there is no such zone.
+    """
+    if text != "UTC":  # which needs no zone database
+        try:
+            ZoneInfo(text)
+        except (ZoneInfoNotFoundError, ValueError) as error:
+            raise ValueError(f"a zone such as Europe/Berlin is needed, got {text!r}") from error
+    return text
+
+
+def read_database_url(text: str) -> str:
+    """The URL of a PostgreSQL database, by the name that SQLAlchemy knows its driver by.
+
+    Raises:
+        ValueError: it names no such database; the message has no password.
+    """
+    scheme, _, rest = text.partition("://")
+    if scheme not in _SCHEMES or not urlsplit(f"//{rest}").path.strip("/"):
+        raise ValueError(
+            "postgresql://user:password@host:port/database is needed, or nothing for an SQLite "
+            f"file in the data directory, got {scheme[:20]}://"
+        )
+    return f"postgresql+psycopg://{rest}"

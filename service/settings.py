@@ -4,14 +4,20 @@ import os
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
-from typing import Literal
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from typing import Annotated, Literal
+from zoneinfo import ZoneInfo
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.data_dir import DATABASE, WEIGHTS
-from service.setting_values import read_key, read_networks, read_numbers
+from service.setting_values import (
+    read_database_url,
+    read_key,
+    read_networks,
+    read_numbers,
+    read_zone,
+)
 
 
 class Settings(BaseSettings):
@@ -20,6 +26,14 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="SUREFOOT_", frozen=True)
 
     data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
+    database_url: Annotated[str, AfterValidator(read_database_url)] | None = Field(
+        None,
+        repr=False,
+        description="postgresql://user:password@host/name; unset: an SQLite file in data_dir",
+    )
+    database_connections: int = Field(
+        10, ge=3, description="to PostgreSQL, of a process; a worker's job engine has five more"
+    )
     host: str = Field("127.0.0.1", description="address that the API listens on")
     port: int = Field(8080, ge=0, le=65535, description="port that the API listens on")
     allowed_hosts: str = Field(
@@ -28,9 +42,7 @@ class Settings(BaseSettings):
     auth: Literal["auto", "on", "off"] = Field(
         "auto", description="whether tokens are needed; auto: unless only this machine is served"
     )
-    session_hours: float = Field(
-        12.0, gt=0, le=8760, description="hours until a page has to log in again"
-    )
+    session_hours: float = Field(12.0, gt=0, le=8760, description="hours that a page's login holds")
     proxy_secret: str | None = Field(
         None,
         min_length=16,
@@ -86,7 +98,9 @@ class Settings(BaseSettings):
         1.0, gt=0, description="false no_data alerts of a camera in a year"
     )
     rhythm_days: int = Field(7, ge=1, description="days that a camera's rhythm is learned of first")
-    timezone: str = Field("UTC", description="IANA zone of the cameras: their hours and weekends")
+    timezone: Annotated[str, AfterValidator(read_zone)] = Field(
+        "UTC", description="IANA zone of the cameras: their hours and weekends"
+    )
 
     false_alarms_per_year: float = Field(
         1.0, gt=0, le=1000, description="drift alarms of a camera that stands still, a year"
@@ -223,18 +237,6 @@ class Settings(BaseSettings):
             read_key(value)
         return value
 
-    @field_validator("timezone")
-    @classmethod
-    def _zone_exists(cls, value: str) -> str:
-        if value != "UTC":
-            try:
-                ZoneInfo(value)
-            except (ZoneInfoNotFoundError, ValueError) as error:
-                raise ValueError(
-                    f"a zone such as Europe/Berlin is needed, got {value!r}"
-                ) from error
-        return value
-
     @property
     def zone(self) -> tzinfo:
         """The cameras' zone; UTC needs no zone database."""
@@ -277,13 +279,13 @@ class Settings(BaseSettings):
 
     @property
     def database_path(self) -> Path:
-        """The SQLite file of the application and its job engine."""
+        """The SQLite file of the application and its job engine, where no server is named."""
         return self.data_dir / DATABASE
 
     @property
-    def database_url(self) -> str:
-        """SQLAlchemy URL of the database."""
-        return f"sqlite:///{self.database_path.absolute()}"
+    def store_url(self) -> str:
+        """SQLAlchemy's URL of the database: the server's, or that of the SQLite file."""
+        return self.database_url or f"sqlite:///{self.database_path.absolute()}"
 
     @property
     def weights_dir(self) -> Path:

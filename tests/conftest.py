@@ -14,9 +14,9 @@ import pytest
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.running import RunningService, free_port
+from tests.stores import databases, server
 
 # The name that starlette's TestClient asks by.
 os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
@@ -49,6 +49,18 @@ def pose() -> CameraPose:
 
 
 Once = Callable[[str, Callable[[Path], None]], Path]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    databases.begin_run()
+    if server.wanted():
+        # Stores that a test leaves behind close with it, as SQLite's do without a word.
+        left = "ignore:<psycopg.Connection object:ResourceWarning"
+        config.addinivalue_line("filterwarnings", left)
+
+
+def pytest_unconfigure() -> None:
+    databases.end_run()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -140,17 +152,17 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 @pytest.fixture(scope="session")
 def migrated(once: Once) -> Path:
     """A data directory that was just migrated; migrating takes a second, a copy none."""
-    made = once("migrated", lambda folder: migrate(Settings(data_dir=folder / "data")))
-    return made / "data"
+    return once("migrated", databases.make_template) / "data"
 
 
 @pytest.fixture
-def settings(tmp_path: Path, migrated: Path) -> Settings:
-    shutil.copytree(migrated, tmp_path / "data")
+def settings(tmp_path: Path, migrated: Path) -> Iterator[Settings]:
+    """Of a migrated store of the test's own, on the database that the run is on."""
     # Beside other tests a training that yields as it should would hardly get on.
     # Beside other processes of a test run, who yields much hardly moves.
     nice = {"worker_nice": 0, "training_nice": 1}
-    return Settings(data_dir=tmp_path / "data", epochs=1, reconcile_s=1, **nice)
+    with databases.settled(migrated, tmp_path / "data", epochs=1, reconcile_s=1, **nice) as made:
+        yield made
 
 
 def track(track_id: str, start_s: float = 1_700_000_000.0, count: int = 20) -> dict[str, Any]:

@@ -17,11 +17,12 @@ from service.reason_words import in_words
 from service.settings import Settings
 from service.store import references
 from service.store.alerts import AlertFilter
-from service.store.sqlite.database import Store
-from service.store.sqlite.revisions import alembic_config, known_revisions
+from service.store.database.revisions import alembic_config, known_revisions
+from service.store.database.store import Store
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.record import Record
 from service.store.tracks import sources
+from tests.stores.databases import only_sqlite
 
 
 def test_migrating_twice_changes_nothing(settings):
@@ -29,7 +30,7 @@ def test_migrating_twice_changes_nothing(settings):
 
 
 def test_the_migrated_tables_are_the_declared_ones(settings):
-    alembic.command.check(alembic_config(settings.database_url))
+    alembic.command.check(alembic_config(settings.store_url))
 
 
 def test_the_known_revisions_are_alembics():
@@ -39,7 +40,7 @@ def test_the_known_revisions_are_alembics():
 
 def test_down_to_nothing_and_up_again(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "head")
     alembic.command.downgrade(config, "base")
     with sqlite3.connect(settings.database_path) as connection:
@@ -78,7 +79,7 @@ def put(connection, table, **values):
 @pytest.mark.parametrize(("origin", "learned_of"), [("registered", 7), ("accepted", 3)])
 def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, learned_of):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_21_first")
     with sqlite3.connect(settings.database_path) as connection:
         put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
@@ -113,7 +114,7 @@ def test_a_camera_of_before_there_were_references_begins_one(tmp_path, origin, l
 
 def test_the_newest_reference_is_bound_to_the_source_of_its_tracks(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_24_parent_indexes")
     with sqlite3.connect(settings.database_path) as connection:
         for name in ("fed", "empty"):
@@ -150,7 +151,7 @@ def nearly(drift):
 
 def test_what_was_kept_in_degrees_is_told_as_it_was(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_25_track_sources")
     raw = {"joint": {"height_m": 6.4, "tilt_deg": 22.123456789, "roll_deg": -1.7, "tracks": 40},
            "registered": {"height_m": 6.3, "tilt_deg": 21.9, "roll_deg": 1e-17,
@@ -193,7 +194,7 @@ def test_what_was_kept_in_degrees_is_told_as_it_was(tmp_path):
 
 def test_what_was_said_in_sentences_stays_readable(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_26_closed_words")
     source = 'byte\'s "own"'
     with sqlite3.connect(settings.database_path) as connection:
@@ -230,7 +231,7 @@ def test_what_was_said_in_sentences_stays_readable(tmp_path):
 
 def test_making_tables_anew_keeps_numbers_and_triggers(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_25_track_sources")
     with sqlite3.connect(settings.database_path) as connection:
         for number in (7, 8):
@@ -253,6 +254,7 @@ def test_making_tables_anew_keeps_numbers_and_triggers(tmp_path):
             assert (numbers, last) == ([9], 41)
 
 
+@only_sqlite("looks at the file")
 def test_the_file_is_in_wal_mode_with_foreign_keys(settings):
     with Store(settings).read() as session:
         assert session.scalar(text("PRAGMA journal_mode")) == "wal"
@@ -260,6 +262,7 @@ def test_the_file_is_in_wal_mode_with_foreign_keys(settings):
         assert session.scalar(text("PRAGMA busy_timeout")) == 30000
 
 
+@only_sqlite("looks at the file")
 def test_a_track_needs_its_camera(settings):
     insert = text(
         "INSERT INTO tracks (camera_id, source, track_id, started_s, ended_s, points, received_at)"

@@ -24,6 +24,7 @@ HOST = "http://127.0.0.1:8080"
 COMMANDS = (
     "serve", "worker", "migrate", "replay", "demo", "evaluate", "protocol", "centred",
     "alarm-study", "flow-study", "backup", "restore", "check", "rotate-key", "token",
+    "migrate-data",
 )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from models.flow.packing import flow_from_bytes, flow_to_bytes
 from models.packing import flattened
 from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.sqlite.revisions import alembic_config
+from service.store.database.revisions import alembic_config
 from tests.test_migrations import put
 
 BEFORE = "2026_11_26_radians_of_alerts"
@@ -66,7 +66,7 @@ def as_archived(values):
 def settings(tmp_path):
     """A database of before with learned models of two cameras, damaged ones, and none."""
     settings = Settings(data_dir=tmp_path)
-    alembic.command.upgrade(alembic_config(settings.database_url), BEFORE)
+    alembic.command.upgrade(alembic_config(settings.store_url), BEFORE)
     stored = {1: (SITE, FLOW, CHART), 2: (BARE, FLOW, None), 3: (DAMAGED, b"", DAMAGED),
               4: (None, None, None)}  # fmt: skip
     with sqlite3.connect(settings.database_path) as connection:
@@ -128,7 +128,7 @@ def test_what_is_damaged_or_not_there_stays_so(settings):
 def test_the_release_before_reads_what_it_wrote_after_a_way_back(settings):
     migrate(settings)
     migrated = stored(settings)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.downgrade(config, BEFORE)
     back = stored(settings)
     for n, index, data in ((1, 0, SITE), (2, 0, BARE), (1, 1, FLOW), (1, 2, CHART)):

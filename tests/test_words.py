@@ -10,6 +10,7 @@ from sqlalchemy import CheckConstraint
 
 from service import kinds
 from service.store.tables.record import Record, Word
+from tests.stores.databases import only_sqlite
 from tests.test_architecture import ROOT, sources
 
 VOCABULARIES = [
@@ -33,6 +34,7 @@ OTHERS = {
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
+    ("process/work.py", "estimate"): "what a worker may be for alone, defined there",
     ("jobs/upkeep/housekeeping.py", "stale"): "the name of a log line",
     ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
     ("jobs/upkeep/rounds.py", "clock"): "the name of a round",
@@ -103,6 +105,7 @@ def test_a_stray_word_is_found(tmp_path):
     assert found_words(path) == [("firing", 2), ("no_data", 2)]
 
 
+@only_sqlite("reads the file")
 def test_every_column_of_a_vocabulary_is_checked_in_the_store(settings):
     with sqlite3.connect(settings.database_path) as connection:
         rows = connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
@@ -124,6 +127,7 @@ def test_every_column_of_a_vocabulary_is_checked_in_the_store(settings):
         assert f"CONSTRAINT {name} CHECK ({check.sqltext})" in made[table.name]
 
 
+@only_sqlite("reads the file")
 def test_the_store_refuses_a_word_that_is_none(settings):
     insert = "INSERT INTO events (type, payload, created_at) VALUES (?, '{}', '2026-11-20')"
     with sqlite3.connect(settings.database_path) as connection:

@@ -12,6 +12,7 @@ from service.kinds import AlertKind, AlertSource, AlertState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts
+from service.store.database.store import also_about
 from service.store.tables.alerts import AlertRecord
 from service.store.tracks import tracks
 
@@ -34,6 +35,7 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     if kind is None or record.track_source is None or record.group_id is not None:
         return None
     source = record.track_source
+    also_about(session, f"source/{source}")  # cameras that move at the same moment see each other
     together = _together(
         alerts.firing_of_source(session, source, _CAUSES[kind]), record, settings.group_within_s
     )

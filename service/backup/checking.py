@@ -22,9 +22,9 @@ from service.delivery.keys import require_openable
 from service.delivery.sealing import is_sealed, sealer_of
 from service.job_queue import ENGINE_TABLES
 from service.settings import Settings
+from service.store.database.revisions import known_revisions, require_known
 from service.store.sqlite import files
 from service.store.sqlite.faults import telling_of_database
-from service.store.sqlite.revisions import known_revisions, require_known
 
 _LEAST_FREE = 200e6
 _HOUR_S = 3600.0

@@ -31,9 +31,9 @@ from service.data_dir import (
 from service.delivery.keys import require_openable
 from service.delivery.sealing import is_sealed, read_key_file, sealer_of
 from service.settings import Settings
+from service.store.database.revisions import require_known
 from service.store.sqlite import files
 from service.store.sqlite.faults import telling_of_database
-from service.store.sqlite.revisions import require_known
 
 _LARGEST_MANIFEST = 64 * 2**20
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from service.errors import QuotaError
 from service.formats.track import Batch
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.tracks import tracks
 
 _BEYOND = 1.5  # times `keep_mb` that may lie there until the next retention

@@ -21,7 +21,7 @@ from service.kinds import Activity, AlertKind, AlertSource, Origin, Outcome, Pos
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references
-from service.store.sqlite.database import joined
+from service.store.database.store import joined
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.tracks import SourceRecord
 from service.store.tracks import sources

@@ -12,8 +12,8 @@ from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
 from service.store import cameras, references
 from service.store.cameras import Picture
+from service.store.database.store import joined
 from service.store.packing import pack
-from service.store.sqlite.database import joined
 from service.store.tracks import tracks
 from service.windows.requests import request_estimate
 

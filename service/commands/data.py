@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from service.commands.settings_given import settings_given
+from service.data_dir import StartError
 from service.logs import configure_logs
 from service.process.manners import be_private, end_like_ctrl_c
 
@@ -24,7 +25,8 @@ def migrate(data_dir: DataDir = None) -> None:
 
     settings = _begin(data_dir)
     run_migrations(settings)
-    _say(f"{settings.database_path} is at the newest revision")
+    what = settings.database_path if settings.database_url is None else "the database"
+    _say(f"{what} is at the newest revision")
 
 
 def backup(
@@ -34,7 +36,7 @@ def backup(
     """Write database, weights and key to one checked archive, while the service runs."""
     from service.backup.writing import write_backup
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "backup")
     with _progress() as tell:
         manifest = write_backup(settings, file, tell)
     size = sum(member.size for member in manifest.members)
@@ -55,7 +57,7 @@ def restore(
     """Verify an archive and put it into a data directory that nothing uses."""
     from service.backup.restoring import restore_backup
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "restore")
     with _progress() as tell:
         done = restore_backup(settings, file, tell, force=force)
     made = f"made {done.manifest.made_at} by release {done.manifest.release}"
@@ -77,7 +79,7 @@ def check(
 
     from service.backup.checking import Verdict, check_data_dir, repair_weights
 
-    settings = _begin(data_dir)
+    settings = _begin_on_file(data_dir, "check")
     if repair:
         _say(f"{repair_weights(settings)} models deleted, to be trained anew")
     findings = check_data_dir(settings)
@@ -111,6 +113,17 @@ def _begin(data_dir: Path | None) -> "Settings":
     return settings_given(data_dir=data_dir)
 
 
+def _begin_on_file(data_dir: Path | None, command: str) -> "Settings":
+    """Settings for a command that a server has better ones for."""
+    settings = _begin(data_dir)
+    if settings.database_url is not None:
+        raise StartError(
+            f"{command}: it is for SQLite files, and SUREFOOT_DATABASE_URL names a server; use its "
+            "own tools (pg_dump, pg_restore, pg_amcheck), and keep the key of the webhooks' secrets"
+        )
+    return settings
+
+
 @contextlib.contextmanager
 def _progress() -> Iterator[Callable[[str, int, int], None]]:
     """A bar on stderr; an end by signal removes what was half done."""
@@ -129,4 +142,28 @@ def _say(line: str) -> None:
     Console().print(line, soft_wrap=True, highlight=False)
 
 
-DATA_COMMANDS = (migrate, backup, restore, check, rotate_key)
+def migrate_data(
+    source: Annotated[str, typer.Option("--from", help="sqlite:///… of a stopped data directory.")],
+    target: Annotated[str, typer.Option("--to", help="postgresql://user:password@host/name")],
+    data_dir: DataDir = None,
+) -> None:
+    """Move a site to PostgreSQL, checked by counts and hashes; run again, it goes on."""
+    from service.commands.postgresql.moving import move
+    from service.setting_values import read_database_url
+
+    configure_logs()
+    be_private()
+    path = Path(source.removeprefix("sqlite:///"))
+    try:
+        url = read_database_url(target)
+    except ValueError as error:
+        raise StartError(f"--to: {error}") from error
+    settings = Settings(data_dir=data_dir or path.parent, database_url=url)
+    with _progress() as tell:
+        moved = move(path, settings, tell)
+    _say(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")
+    _say(f"{moved.weights} weights are there; {moved.missing_weights} were missing or damaged")
+    _say("Set SUREFOOT_DATABASE_URL to it, and SUREFOOT_SECRET_KEY on all machines but this one.")
+
+
+DATA_COMMANDS = (migrate, backup, restore, check, rotate_key, migrate_data)

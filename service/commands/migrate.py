@@ -1,4 +1,4 @@
-"""Bring a data directory's database to the newest revision."""
+"""Bring the database to the newest revision: the SQLite file of a data directory, or a server's."""
 
 import fcntl
 import logging
@@ -17,10 +17,10 @@ from service.data_dir import (
 from service.delivery.keys import settle_key
 from service.job_queue import migrate_engine_tables
 from service.settings import Settings
+from service.store.database.revisions import alembic_config, known_revisions, require_known
+from service.store.database.store import Store
 from service.store.sqlite import files
-from service.store.sqlite.database import Store
 from service.store.sqlite.faults import telling_of_database
-from service.store.sqlite.revisions import alembic_config, known_revisions, require_known
 
 log = logging.getLogger("surefoot.migrate")
 
@@ -37,12 +37,18 @@ def migrate(settings: Settings) -> None:
     """
     folder = settings.data_dir
     make_private(folder)
+    if settings.database_url is not None:
+        from service.commands.postgresql.migrating import migrate_server
+
+        migrate_server(settings)
+        return
     with telling_of(folder):
         make_file(folder / MIGRATE_LOCK)
     with telling_of(folder), (folder / MIGRATE_LOCK).open("r+") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         finish_restore(folder)
         make_private(folder)
+        make_file(settings.database_path)
         with telling_of_database(settings.database_path):
             _require_sound(settings.database_path)
             _migrate_tables(settings)
@@ -74,7 +80,7 @@ def _migrate_tables(settings: Settings) -> None:
     import alembic.command  # 0.1 s that a start with nothing to migrate needs not
 
     try:
-        alembic.command.upgrade(alembic_config(settings.database_url), "head")
+        alembic.command.upgrade(alembic_config(settings.store_url), "head")
     except Exception as error:
         if copy is None:
             raise

@@ -23,7 +23,7 @@ from service.process.listener import listen
 from service.process.local_workers import local_workers
 from service.process.memory import settle_allocator
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 if TYPE_CHECKING:
     from fastapi import FastAPI

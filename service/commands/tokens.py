@@ -16,7 +16,7 @@ from service.errors import ServiceError
 from service.process.manners import be_private
 
 if TYPE_CHECKING:
-    from service.store.sqlite.database import Store
+    from service.store.database.store import Store
     from service.store.tables.access import TokenRecord
 
 app = typer.Typer(help="Tokens, by which programs and people are let in.", no_args_is_help=True)
@@ -103,7 +103,7 @@ def revoke(
 
 def _store(data_dir: Path | None) -> "Store":
     from service.commands.migrate import migrate
-    from service.store.sqlite.database import Store
+    from service.store.database.store import Store
 
     be_private()
     settings = settings_given(data_dir=data_dir)

@@ -21,9 +21,10 @@ from service.jobs.upkeep.rounds import start_rounds
 from service.process import exits
 from service.process.memory import give_back, resident_mb, settle_allocator
 from service.process.niceness import yield_to_others
-from service.process.workforce import Watch, heartbeat, register_worker
+from service.process.work import WorkKind
+from service.process.workforce import WORKERS, Watch, heartbeat, register_worker, worker_name
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.worker")
 
@@ -36,14 +37,18 @@ class WorkerRunningError(RuntimeError):
     """Another process works under this name; two would run each other's jobs."""
 
 
-def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
+def run_worker(
+    settings: Settings, name: str, follow_stdin: bool, only: WorkKind | None = None
+) -> None:
     """Run jobs until SIGTERM or SIGINT, or until stdin ends if that is to be followed.
 
-    The name must be stable: the engine finds a worker's unfinished jobs by it.
+    The name must be stable: the engine finds a worker's unfinished jobs by it. `only` says which
+    jobs it runs alone, and the others' are left to others.
 
     Raises:
         WorkerRunningError: a worker of this name is running already.
     """
+    name = worker_name(settings, name)
     lock = (settings.data_dir / f"worker-{name}.lock").open("w")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -64,10 +69,11 @@ def run_worker(settings: Settings, name: str, follow_stdin: bool) -> None:
         threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
     start_pulse(context, tells=follow_stdin)
     follow_clock_since_last_run(context)
-    with store.write() as session:
+    with store.write(WORKERS) as session:
         register_worker(session, name, os.getpid())
-    engine.launch(context, name)
-    start_rounds(context)
+    engine.launch(context, name, only)
+    if only is not WorkKind.TRAIN:
+        start_rounds(context)
     log.info("worker_started", extra={"worker": name, "pid": os.getpid()})
     status = _mind(context, name)
     log.info("worker_stopping", extra={"worker": name})
@@ -84,7 +90,7 @@ def _mind(context: JobContext, name: str) -> int:
     trimmed_s, draining = time.monotonic(), None
     while not context.stopping.wait(BEAT_S):
         try:
-            with context.store.write() as session:
+            with context.store.write(WORKERS) as session:
                 alive = heartbeat(session, name, os.getpid())
                 lost = watch.take_lost(session, settings.worker_lost_s) if alive else []
             if not alive:

@@ -16,12 +16,13 @@ from sqlalchemy.orm import Session
 from service.access.callers import Caller
 from service.cameras.quota import Quota
 from service.errors import PreconditionRequiredError
+from service.http.direct.feed import Feed
 from service.http.direct.kept import Kept, KeptAnswer
 from service.http.instruments import Instruments
 from service.job_queue import JobQueue
 from service.settings import Settings
+from service.store.database.store import Store
 from service.store.operation.actor import Actor, set_actor
-from service.store.sqlite.database import Store
 from service.store.sqlite.turns import Turns
 
 
@@ -31,7 +32,8 @@ class AppState:
 
     `poses` are the answers to who asks for the pose of a camera, by its id.
 
-    Event streams look for news by `stream_polls`; large bodies are read in `large_bodies`' turns.
+    Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
+    are read in `large_bodies`' turns.
     """
 
     settings: Settings
@@ -39,6 +41,7 @@ class AppState:
     queue: JobQueue
     quota: Quota
     stream_polls: anyio.CapacityLimiter
+    feed: Feed
     poses: Kept[KeptAnswer]
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
@@ -82,9 +85,12 @@ def name_of(actor: Actor | None, said: str | None = None) -> str | None:
     return said if actor is None else actor.name
 
 
-def write_session(state: StateDep, actor: ActorDep) -> Iterator[Session]:
-    """A session that commits before the answer is sent, or not at all."""
-    with state.store.write() as session:
+def write_session(request: Request, state: StateDep, actor: ActorDep) -> Iterator[Session]:
+    """A session that commits before the answer is sent, or not at all.
+
+    It writes about the camera that the path names, or about everything.
+    """
+    with state.store.write(request.path_params.get("camera_id")) as session:
         set_actor(session, actor)
         yield session
 

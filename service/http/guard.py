@@ -24,7 +24,7 @@ from service.http.reach import auth_on
 from service.http.scopes import need_of
 from service.kinds import TokenScope
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.access")
 
@@ -125,7 +125,7 @@ class GuardMiddleware:
         self._used_s[token_id] = now_s
 
         def keep() -> None:
-            with store.write() as session:
+            with store.write(f"token/{token_id}") as session:
                 tokens.note_use(session, token_id)
 
         try:
@@ -150,7 +150,7 @@ def refuse(request: Request) -> None:
     if failure.worth_a_line:
         log.warning("login_refused", extra={"address": request.state.address})
         try:
-            with request.state.app.store.write() as session:
+            with request.state.app.store.write("refused/") as session:
                 sessions.note_refused(session, request.state.address)
         except (SQLAlchemyError, ServiceError) as error:
             log.warning("refusal_not_kept", extra={"error": str(error)})

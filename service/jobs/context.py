@@ -8,7 +8,7 @@ from service.jobs.growth_rests import GrowthRests, GrowthTurns
 from service.jobs.in_hand import InHand
 from service.jobs.rota import Rota
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.training.steps import StepWatch
 
 

@@ -27,8 +27,9 @@ def run_deliver(context: JobContext, webhook_id: str) -> None:
     receivers know by it what they have seen.
     """
     store, settings = context.store, context.settings
+    about = f"webhook/{webhook_id}"
     end_s = time.monotonic() + _LONGEST_RUN_S
-    with store.write() as session:
+    with store.write(about) as session:
         begin_run(session, webhook_id)
     while time.monotonic() < end_s and not context.stopping.is_set():
         with store.read() as session:
@@ -36,15 +37,15 @@ def run_deliver(context: JobContext, webhook_id: str) -> None:
         if attempt is None:
             break
         outcome = _send(context, webhook_id, attempt.message)
-        with store.write() as session:
+        with store.write(about) as session:
             save_attempt(session, settings, attempt, outcome)
     with store.read() as session:
         refresh = load_refresh(session, settings, webhook_id)
     if refresh is not None:
         outcome = _send(context, webhook_id, refresh.message)
-        with store.write() as session:
+        with store.write(about) as session:
             save_refresh(session, settings, refresh, outcome)
-    with store.write() as session:
+    with store.write(about) as session:
         end_run(session, context.queue, webhook_id)
 
 

@@ -21,6 +21,7 @@ from service.jobs.context import JobContext
 from service.jobs.deliver import run_deliver
 from service.jobs.estimate import run_estimate
 from service.jobs.train import run_training
+from service.process.work import WorkKind
 
 log = logging.getLogger("surefoot.worker")
 
@@ -35,9 +36,17 @@ _DELIVERIES_AT_ONCE = 16  # they wait for other machines most of the time
 _ENDED = ["SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"]
 
 
-def launch(context: JobContext, name: str) -> None:
-    """Run jobs from now on; those that a process of this name left unfinished come first."""
+_QUEUES = {WorkKind.ESTIMATE: [ESTIMATE_QUEUE, DELIVER_QUEUE], WorkKind.TRAIN: [TRAIN_QUEUE]}
+
+
+def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None:
+    """Run jobs from now on; those that a process of this name left unfinished come first.
+
+    With `only`, trainings alone, or all but trainings.
+    """
     DBOS(config=engine_config(context.settings, name))
+    if only is not None:
+        DBOS.listen_queues(_QUEUES[only])
 
     # However often workers die of a training, it is ours to end it, and not the engine's.
     @DBOS.workflow(name=TRAIN_JOB, max_recovery_attempts=None)

@@ -30,7 +30,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     What fails beside the served estimate is said and stops nothing. Where that itself fails, the
     camera rests, longer each time, and the failure is told; others are not held up.
     """
-    with context.store.write() as session:
+    with context.store.write(camera_id) as session:
         if leave_poisoned(session, camera_id):
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
@@ -39,7 +39,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     try:
         _look(context, camera_id, newest_pk)
     except Exception as error:
-        with context.store.write() as session:
+        with context.store.write(camera_id) as session:
             fail_look(session, camera_id, repr(error))
         raise
 
@@ -58,7 +58,7 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     finding = None if evidence is None else compute_finding(evidence, settings.seed)
     if finding is not None:
         finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
-    with store.write() as session:
+    with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
@@ -78,7 +78,7 @@ def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
     if period is None:
         return
     learned = compute_reference(period, context.settings.seed)
-    with context.store.write() as session:
+    with context.store.write(camera_id) as session:
         save_reference(session, context.settings, camera_id, period, learned)
     log.info(
         "reference_learned" if learned else "reference_without_walkers",
@@ -93,7 +93,7 @@ def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) ->
     if days is None:
         return
     logged = compute_anchor_days(days)
-    with context.store.write() as session:
+    with context.store.write(camera_id) as session:
         save_anchor_days(session, days, logged)
     fields = {"camera_id": camera_id, "tracks": len(days.trajectories)}
     log.info("creep_logged", extra=fields)
@@ -110,7 +110,7 @@ def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None
         return
     begun_s = time.monotonic()
     learned = compute_growth(period, context.settings.seed)
-    with context.store.write() as session:
+    with context.store.write(camera_id) as session:
         grown = save_growth(session, camera_id, period, learned)
     context.growth_turns.spend(time.monotonic() - begun_s)
     if grown:
@@ -134,5 +134,5 @@ def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked)
     if lacks.said:
         said = tuple(lacks.said)
         context.growth_rests.begin(camera_id, said)
-        with context.store.write() as session:
+        with context.store.write(camera_id) as session:
             note_lacks(session, camera_id, said)

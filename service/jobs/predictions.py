@@ -5,6 +5,7 @@ import logging
 from models.errors import CheckpointError
 from service.jobs.context import JobContext
 from service.training.predictions import drop_model, load_pending, save_predictions
+from service.training.weights import fetch_weights
 from service.windows.unpacked import Unpacked
 
 log = logging.getLogger("surefoot.jobs")
@@ -35,13 +36,14 @@ def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
             pending = load_pending(session, context.settings, camera_id, _BATCH)
         if pending is None or not pending.tracks:
             return
+        fetch_weights(context.store, context.settings, pending.weights_sha256)
         from service.jobs.regressor import predict  # torch: 200 MB that not every worker needs
 
         try:
             rows = predict(context.settings.weights_dir, pending, unpacked)
         except CheckpointError:
-            with context.store.write() as session:
+            with context.store.write(camera_id) as session:
                 drop_model(session, pending.model_id)
             raise
-        with context.store.write() as session:
+        with context.store.write(camera_id) as session:
             save_predictions(session, pending.model_id, rows)

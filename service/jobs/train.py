@@ -17,6 +17,7 @@ from service.training.trainings import (
     publish_model,
     report_progress,
 )
+from service.training.weights import share_weights
 
 log = logging.getLogger("surefoot.jobs")
 _TRIES = 3  # of processes that die: by a lack of memory, say
@@ -40,7 +41,7 @@ def run_training(context: JobContext, training_id: str) -> None:
             fields = {"camera_id": attempt.camera_id, "job_id": training_id, "why": str(error)}
             log.error("training_died", extra=fields)
             if not left:
-                with context.store.write() as session:
+                with context.store.write(attempt.camera_id) as session:
                     end_training(session, attempt, TrainingState.FAILED, str(error))
 
 
@@ -55,7 +56,7 @@ def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
         trained = _train(context, attempt)
     except TrainingStoppedError:
         log.info("training_cancelled", extra=fields)
-        with context.store.write() as session:
+        with context.store.write(attempt.camera_id) as session:
             end_training(session, attempt, TrainingState.CANCELLED)
         return
     except TrainingDiedError:
@@ -68,10 +69,11 @@ def _carry_out(context: JobContext, attempt: TrainingAttempt) -> None:
             extra=fields,
             exc_info=None if foreseen else error,
         )
-        with context.store.write() as session:
+        with context.store.write(attempt.camera_id) as session:
             end_training(session, attempt, TrainingState.FAILED, str(error) or repr(error))
         return
-    with context.store.write() as session:
+    with context.store.write(attempt.camera_id) as session:
+        share_weights(session, context.settings, trained.weights_sha256)
         publish_model(
             session,
             context.queue,
@@ -122,7 +124,7 @@ def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[Progre
                 goes_on = is_wanted(session, attempt)
         else:
             written = progress
-            with context.store.write() as session:
+            with context.store.write(attempt.camera_id) as session:
                 goes_on = report_progress(
                     session, attempt, progress.step, progress.steps, progress.loss, progress.eta_s
                 )

@@ -13,9 +13,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import OverloadedError
 from service.process import exits
-from service.process.workforce import note_trouble
+from service.process.workforce import WORKERS, note_trouble, worker_name
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 log = logging.getLogger("surefoot.serve")
 
@@ -60,7 +60,9 @@ class LocalWorkers:
         self._store = Store(settings)
         self._stopping = threading.Event()
         self._threads = [
-            threading.Thread(target=self._keep, args=(f"local-{number}",), daemon=True)
+            threading.Thread(
+                target=self._keep, args=(worker_name(settings, f"local-{number}"),), daemon=True
+            )
             for number in range(settings.workers)
         ]
 
@@ -131,7 +133,7 @@ class LocalWorkers:
     def _say(self, name: str, trouble: str | None) -> None:
         """Have `/readyz` say what is wrong with a worker, or nothing."""
         try:
-            with self._store.write() as session:
+            with self._store.write(WORKERS) as session:
                 note_trouble(session, name, trouble)
         except (SQLAlchemyError, OverloadedError) as error:
             log.warning("trouble_not_noted", extra={"worker": name, "why": str(error)})

@@ -1,18 +1,31 @@
 """Which workers live, by signs of life that no clock can set back."""
 
+import hashlib
+import socket
 import time
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
+from service.settings import Settings
+from service.store.database.clock import now_in
 from service.store.operation import workers
 
+WORKERS = "workers/"  # what is written about
 _FORGET_LOST = timedelta(days=7)
+
+
+def worker_name(settings: Settings, name: str) -> str:
+    """The name of a worker among all of its store: on a server, its machine's is in it."""
+    if settings.database_url is None or "@" in name:
+        return name
+    folder = hashlib.sha256(str(settings.data_dir.absolute()).encode()).hexdigest()[:6]
+    return f"{name}@{socket.gethostname()}-{folder}"
 
 
 def register_worker(session: Session, name: str, pid: int) -> None:
     """Record that a worker's process has started."""
-    now = datetime.now(UTC)
+    now = now_in(session)
     record = workers.find(session, name) or workers.add(session, name, pid, now)
     record.pid, record.started_at, record.heartbeat_at = pid, now, now
     record.beats += 1
@@ -25,7 +38,7 @@ def take_setback(session: Session) -> timedelta:
 
     None of them saw that happen: each was ended before, or is only just being started.
     """
-    now = datetime.now(UTC)
+    now = now_in(session)
     ahead = workers.after(session, now)
     back = max((record.heartbeat_at - now for record in ahead), default=timedelta())
     for record in ahead:
@@ -38,7 +51,7 @@ def heartbeat(session: Session, name: str, pid: int) -> bool:
     record = workers.find(session, name)
     if record is None or record.lost or record.pid != pid:
         return False
-    record.heartbeat_at = datetime.now(UTC)
+    record.heartbeat_at = now_in(session)
     record.beats += 1
     return True
 
@@ -47,7 +60,7 @@ def note_trouble(session: Session, name: str, trouble: str | None) -> None:
     """Record what `serve` has to say of a worker that it cannot keep alive; None takes it back."""
     record = workers.find(session, name)
     if record is None and trouble is not None:
-        record = workers.add(session, name, 0, datetime.now(UTC))
+        record = workers.add(session, name, 0, now_in(session))
         record.lost = True  # it has never been heard of
     if record is not None:
         record.trouble = trouble
@@ -77,5 +90,5 @@ class Watch:
             else:
                 seen[record.name] = (record.beats, since_s)
         self._seen = seen
-        workers.forget_lost(session, datetime.now(UTC) - _FORGET_LOST)
+        workers.forget_lost(session, now_in(session) - _FORGET_LOST)
         return lost

@@ -1,6 +1,5 @@
 """`GET /events`: Server-Sent Events out of the store, with resume and heartbeat."""
 
-import asyncio
 import logging
 import re
 import time
@@ -15,12 +14,13 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.http.dependencies import AppState, StateDep
+from service.http.direct.feed import Feed, wait
 from service.http.guard import still_let_in
+from service.store.database.store import Store
 from service.store.tables.operation import EventRecord
 from service.views import operation
 
 router = APIRouter(tags=["events"])
-_POLL_S = 0.5
 _HEARTBEAT_S = 10.0
 _CHECK_S = 5.0
 _BATCH = 500
@@ -46,29 +46,55 @@ async def events(
     seen = min(int(given), _MAX_ID) if _ID.fullmatch(given) else after
     if seen is None:
         seen = await _ask(state, _newest, state)
-    silent_s = 0.0
-    checked_s = time.monotonic()
+    heard_s = checked_s = time.monotonic()
     yield ServerSentEvent(comment="connected", retry=2000)
-    while not state.stopping.is_set() and not await request.is_disconnected():
-        if time.monotonic() - checked_s > _CHECK_S:
-            checked_s = time.monotonic()
-            if not await _ask(state, still_let_in, request):
-                return  # logged out, or the token is over
-        try:
-            records = await _ask(state, _after, state, seen)
-        except SQLAlchemyError as error:
-            # The stream has begun; it goes on when the store can be read again.
-            log.warning("events_not_read", extra={"error": str(error)})
-            records = ()
-        for record in records:
-            seen = record.id
-            yield ServerSentEvent(id=str(record.id), event=record.type, data=record.payload)
-        silent_s = 0.0 if records else silent_s + _POLL_S
-        if silent_s >= _HEARTBEAT_S:
-            silent_s = 0.0
-            yield ServerSentEvent(comment="heartbeat")
-        if len(records) < _BATCH:
-            await asyncio.sleep(_POLL_S)
+    await state.feed.join()
+    try:
+        while not state.stopping.is_set() and not await request.is_disconnected():
+            now_s = time.monotonic()
+            if now_s - checked_s > _CHECK_S:
+                checked_s = now_s
+                if not await _ask(state, still_let_in, request):
+                    return  # logged out, or the token is over
+            news = state.feed.news
+            records = await _since(state, seen)
+            for record in records:
+                seen = record.id
+                yield ServerSentEvent(id=str(record.id), event=record.type, data=record.payload)
+            if records:
+                heard_s = now_s
+                continue
+            if now_s - heard_s >= _HEARTBEAT_S:
+                heard_s = now_s
+                yield ServerSentEvent(comment="heartbeat")
+            await wait(news)
+    finally:
+        state.feed.leave()
+
+
+async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
+    """What came after an event: out of the feed, or of the store where that was long ago."""
+    kept = state.feed.since(seen)
+    if kept is not None:
+        return kept
+    try:
+        return await _ask(state, _after, state, seen)
+    except SQLAlchemyError as error:
+        # The stream has begun; it goes on when the store can be read again.
+        log.warning("events_not_read", extra={"error": str(error)})
+        return ()
+
+
+def feed_of(store: Store, polls: anyio.CapacityLimiter) -> Feed:
+    """What the event streams of an application follow together."""
+
+    async def newest() -> int:
+        return await anyio.to_thread.run_sync(_newest_in, store, limiter=polls)
+
+    async def after(seen: int) -> Sequence[EventRecord]:
+        return await anyio.to_thread.run_sync(_after_in, store, seen, limiter=polls)
+
+    return Feed(newest, after)
 
 
 async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answer:
@@ -77,10 +103,18 @@ async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answ
 
 
 def _newest(state: AppState) -> int:
-    with state.store.read() as session:
-        return operation.newest_event_id(session)
+    return _newest_in(state.store)
 
 
 def _after(state: AppState, seen: int) -> Sequence[EventRecord]:
-    with state.store.read() as session:
+    return _after_in(state.store, seen)
+
+
+def _newest_in(store: Store) -> int:
+    with store.read() as session:
+        return operation.newest_event_id(session)
+
+
+def _after_in(store: Store, seen: int) -> Sequence[EventRecord]:
+    with store.read() as session:
         return operation.events_after(session, seen, _BATCH)

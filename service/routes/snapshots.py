@@ -36,7 +36,7 @@ def put(
     actor: ActorDep,
 ) -> SnapshotOut:
     """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
-    with state.store.write() as session:
+    with state.store.write(camera_id) as session:
         set_actor(session, actor)
         facts = snapshots.put_snapshot(session, camera_id, still)
     return SnapshotOut.model_validate(facts, from_attributes=True)

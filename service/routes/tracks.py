@@ -133,7 +133,7 @@ def _read(
 def _take(state: AppState, camera_id: str, came: Posted) -> Response:
     batch = read_batch(state, camera_id, came)
     state.quota.check(state.store, camera_id, batch)
-    with state.store.change() as connection:
+    with state.store.change(camera_id) as connection:
         receipt = tracks.receive_tracks(
             connection, state.queue, camera_id, batch, max_sources=state.settings.max_sources
         )

@@ -16,13 +16,13 @@ from sqlalchemy import (
     func,
     select,
     true,
-    type_coerce,
     values,
 )
 from sqlalchemy.orm import Session, aliased
 
 from models.drift.verdict import DriftLimits
 from service.kinds import AlertState
+from service.store.database.dialects import contains_word, largest
 from service.store.metrics import Ids, among, among_given, given, newest_of
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord
@@ -67,7 +67,7 @@ def drift_history(
         _ratio("height", e.drift_height_m, e.height_sd_m, limits, limits.floor_m),
     ]
     query = (
-        select(CameraRecord.id, e.id, func.nullif(func.max(*ratios), -1.0))
+        select(CameraRecord.id, e.id, func.nullif(largest(*ratios), -1.0))
         # Outer: cameras come first, and of each only its newest estimates are looked at.
         .outerjoin(e, (e.camera_id == CameraRecord.id) & (e.id >= func.coalesce(first, 0)))
         .where(among(CameraRecord.id, ids))
@@ -187,6 +187,6 @@ def _ratio(
     name: str, drift: Any, sd: Any, limits: DriftLimits, floor: float
 ) -> ColumnElement[float]:
     """A number's drift in units of its limit; -1 where it is not identifiable."""
-    identifiable = type_coerce(EstimateRecord.identifiable, String).contains(f'"{name}"')
-    limit = func.max(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
+    identifiable = contains_word(EstimateRecord.identifiable, name)
+    limit = largest(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
     return case((identifiable, func.abs(drift) / limit), else_=-1.0)

@@ -12,17 +12,16 @@ from typing import Any
 from sqlalchemy import (
     ColumnElement,
     Select,
-    String,
     bindparam,
     exists,
     func,
     select,
     true,
-    type_coerce,
 )
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.kinds import AlertState, DeliveryState, TrainingState
+from service.store.database.dialects import as_json
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
 from service.store.tables.cameras import CameraRecord
@@ -93,7 +92,7 @@ def newest_identifiable_estimates(
     newest = (
         select(EstimateRecord.id)
         .where(EstimateRecord.camera_id == CameraRecord.id)
-        .where(type_coerce(EstimateRecord.identifiable, String) != "[]")
+        .where(as_json(EstimateRecord.identifiable) != "[]")
         .order_by(EstimateRecord.id.desc())
         .limit(1)
         .correlate(CameraRecord)

@@ -1,12 +1,13 @@
 """Statements on trainings and models."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 
 from sqlalchemy import bindparam, delete, select
 from sqlalchemy.orm import Session
 
 from service.kinds import TrainingState
-from service.store.tables.trainings import ModelRecord, TrainingRecord
+from service.store.tables.trainings import ModelRecord, TrainingRecord, WeightsRecord
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 
@@ -88,6 +89,29 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
 def weights_in_use(session: Session) -> set[str]:
     """Hashes of all weights that a model names."""
     return set(session.scalars(select(ModelRecord.weights_sha256)))
+
+
+def has_weights(session: Session, sha256: str) -> bool:
+    """Whether weights are in the database."""
+    return session.scalar(select(WeightsRecord.sha256).filter_by(sha256=sha256)) is not None
+
+
+def weights(session: Session, sha256: str) -> bytes | None:
+    """Weights by their hash; None where they are not in the database."""
+    return session.scalar(select(WeightsRecord.data).filter_by(sha256=sha256))
+
+
+def keep_weights(session: Session, sha256: str, data: bytes) -> None:
+    """Put weights into the database."""
+    session.add(WeightsRecord(sha256=sha256, data=data, stored_at=datetime.now(UTC)))
+
+
+def forget_weights(session: Session, limit: int) -> int:
+    """Delete up to `limit` of the weights that no model names. Returns how many."""
+    unused = WeightsRecord.sha256.not_in(select(ModelRecord.weights_sha256))
+    bite = select(WeightsRecord.sha256).where(unused).limit(limit)
+    result = session.execute(delete(WeightsRecord).where(WeightsRecord.sha256.in_(bite)))
+    return int(result.rowcount)  # type: ignore[attr-defined]
 
 
 def model_exists(session: Session, model_id: str) -> bool:

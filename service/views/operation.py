@@ -11,9 +11,10 @@ from sqlalchemy.orm import Session
 from service.errors import OverloadedError
 from service.settings import Settings
 from service.store import cameras
+from service.store.database.clock import now_in
+from service.store.database.failures import failure_of
+from service.store.database.store import Store
 from service.store.operation import events, probes, workers
-from service.store.sqlite.database import Store
-from service.store.sqlite.failures import failure_of
 from service.store.tables.operation import EventRecord
 from service.store.tracks import unseen
 
@@ -41,10 +42,10 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     """Write something; look at the disk, the workers, the oldest unseen track, failing looks."""
     now = datetime.now(UTC)
     try:
-        with store.write() as session:
+        with store.write("probe/") as session:
             probes.write(session, now)
         with store.read() as session:
-            heartbeat = workers.newest_heartbeat(session)
+            heartbeat, asked = workers.newest_heartbeat(session), now_in(session)
             troubles = workers.troubles(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
@@ -62,7 +63,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
             problems=(said if said.startswith("store: ") else f"store: {said}",),
         )
     # A heartbeat of the future is one of before the clock was set back: no sign of life either.
-    silent_s = None if heartbeat is None else abs((now - heartbeat).total_seconds())
+    silent_s = None if heartbeat is None else abs((asked - heartbeat).total_seconds())
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     # Who fails is named below, and rests between its tries: it does not hold up the queue.
     waits_s = _oldest_s([at for camera, at in came.items() if camera not in failing], now)

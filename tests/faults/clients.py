@@ -11,7 +11,7 @@ import httpx
 from service.alerting import alerts
 from service.kinds import AlertKind, Severity
 from service.reasons import as_said
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand

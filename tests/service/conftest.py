@@ -1,5 +1,4 @@
 import pickle
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
 from tests.service.delivery.post_room import PostRoom
 from tests.service.street import Street
+from tests.stores import databases
 
 MakeStreet = Callable[[TestClient, Settings], Street]
 
@@ -46,24 +46,29 @@ def learned(settings: Settings, once: Once) -> Iterator[Callable[[str, MakeStree
     """
     opened: list[tuple[Street, TestClient]] = []
 
+    def kept_in(folder: Path) -> dict[str, Any]:
+        name = f"street_{folder.name.removesuffix('.unfinished')}"
+        url = databases.named_like(settings, name.lower().replace("-", "_")[:60])
+        return {"data_dir": folder / "data", "database_url": url}
+
     def begin(name: str, make: MakeStreet) -> Street:
         def build(folder: Path) -> None:
-            first = settings.model_copy(update={"data_dir": folder / "data"})
-            shutil.copytree(settings.data_dir, first.data_dir)
+            first = settings.model_copy(update=kept_in(folder))
+            databases.copy_store(settings, first)
             with TestClient(create_app(first)) as http:
                 made = make(http, first)
                 made.close()
             (folder / "street").write_bytes(pickle.dumps(made))
 
         kept = once(name, build)
-        shutil.rmtree(settings.data_dir)
-        shutil.copytree(kept / "data", settings.data_dir)
+        databases.copy_store(settings.model_copy(update=kept_in(kept)), settings)
         street: Street = pickle.loads((kept / "street").read_bytes())
         http = TestClient(create_app(settings)).__enter__()
         opened.append((street, http))
         # The job may have settings of its own, beside those of the application.
         changed = vars(street).pop("settings")
-        street.go_on(http, changed.model_copy(update={"data_dir": settings.data_dir}))
+        mine = {name: getattr(settings, name) for name in ("data_dir", "database_url")}
+        street.go_on(http, changed.model_copy(update=mine))
         return street
 
     yield begin

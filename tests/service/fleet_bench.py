@@ -16,8 +16,8 @@ from service.job_queue import JobQueue
 from service.reasons import as_said
 from service.settings import Settings
 from service.store import references, trainings
+from service.store.database.store import Store
 from service.store.packing import pack
-from service.store.sqlite.database import Store
 from service.store.tables.attendance import MaintenanceRecord
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.tracks import TrackRecord

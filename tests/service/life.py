@@ -32,7 +32,7 @@ from service.jobs.upkeep.housekeeping import run_reconcile
 from service.jobs.upkeep.retention import run_retention
 from service.settings import Settings
 from service.store import trainings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.tracks import tracks
 from service.training.trainings import begin_training, end_training, publish_model
 from service.windows.looking import begin_look, end_look

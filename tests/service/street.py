@@ -18,7 +18,7 @@ from models.trajectory import Trajectory
 from service.job_queue import JobQueue
 from service.jobs.context import JobContext
 from service.jobs.estimate import run_estimate
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Generic, TypeVar
 
-from service.store.sqlite.changes import Changes
+from service.store.database.store import Watcher
 
 Value = TypeVar("Value")
 
@@ -26,7 +26,7 @@ class Kept(Generic[Value]):
     is for who asks to see to.
     """
 
-    def __init__(self, changes: Changes) -> None:
+    def __init__(self, changes: Watcher) -> None:
         self._changes = changes
         self._version: int | None = None
         self._values: dict[str, Value] = {}

@@ -29,6 +29,6 @@ def _learn(context: JobContext, camera_id: str) -> bool:
     if arrivals is None:
         return False
     rhythm, counts = compute_rhythm(arrivals, context.settings, now)
-    with context.store.write() as session:
+    with context.store.write(camera_id) as session:
         save_rhythm(session, camera_id, rhythm, counts, now)
     return rhythm is not None

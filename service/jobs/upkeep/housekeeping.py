@@ -51,7 +51,7 @@ def run_sweep(context: JobContext) -> None:
     with context.store.read() as session:
         overlooked = reconciliation.overlooked(session, context.queue)
     if overlooked:
-        with context.store.write() as session:
+        with context.store.write("sweep/") as session:
             reconciliation.queue_overlooked(session, context.queue, overlooked)
 
 
@@ -64,12 +64,12 @@ def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
         ids = reconciliation.camera_ids(session)
         webhook_ids = deliveries.awaited(session, context.settings)
     for webhook_id in webhook_ids:
-        with context.store.write() as session:
+        with context.store.write(f"webhook/{webhook_id}") as session:
             deliveries.reconcile_webhook(session, context.queue, webhook_id)
     most = _CAMERAS_HZ * context.settings.reconcile_s
     for camera_id in context.reconciled.take(ids, most):
         # One transaction a camera, so that posts never wait long for the write lock.
-        with context.store.write() as session:
+        with context.store.write(camera_id) as session:
             found = reconciliation.reconcile_camera(
                 session, context.queue, context.settings, camera_id, context.steps
             )

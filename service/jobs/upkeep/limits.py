@@ -75,6 +75,7 @@ def limits_of_all(settings: Settings) -> Iterator[Limit]:
     yield Limit(
         name="events", bite=lambda session: events.forget(session, settings.keep_events, BITE)
     )
+    yield Limit(name="weights", bite=lambda session: trainings.forget_weights(session, BITE))
     yield Limit(name="alerts", bite=lambda session: alerts.forget(session, resolved, BITE))
     yield Limit(name="activity", bite=lambda session: activity.forget(session, done, BITE))
     yield Limit(

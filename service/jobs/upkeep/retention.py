@@ -29,13 +29,17 @@ def run_retention(context: JobContext) -> None:
     with context.store.write() as session:
         for path in limits.unused_weights(session, settings.weights_dir):
             path.unlink(missing_ok=True)
-    _shrink(context)
+    if settings.database_url is None:  # a server sees to its own disk
+        _shrink(context)
 
 
 def _apply(context: JobContext, limit: Limit, camera_id: str | None) -> None:
     deleted, bite = 0, BITE
     while bite >= BITE and not context.stopping.is_set():
-        with context.in_hand.task(UPKEEP, limit.name), context.store.write() as session:
+        with (
+            context.in_hand.task(UPKEEP, limit.name),
+            context.store.write(camera_id or "retention/") as session,
+        ):
             bite = limit.bite(session)
         deleted += bite
         if bite:

@@ -1,30 +1,30 @@
 """The periodic work of the workers: one of them does it, by the monotonic clock.
 
-Which one is told by a lock on a file, that the system lets go of however its holder ends: no clock
-has a say in it. What is done each hour has a thread of its own: it may take minutes, and alerts
-and deliveries do not wait for it.
+Which one is told by a lock, that is let go of however its holder ends: no clock has a say in it.
+What is done each hour has a thread of its own: it may take minutes, and alerts and deliveries do
+not wait for it.
 """
 
-import fcntl
 import logging
 import threading
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 
 from service.alerting.staleness import StaleWatch
-from service.data_dir import ROUNDS_LOCK
+from service.data_dir import ROUNDS
 from service.jobs import engine
 from service.jobs.context import JobContext
 from service.jobs.in_hand import UPKEEP
 from service.jobs.upkeep.arrival_rates import run_rhythms
 from service.jobs.upkeep.housekeeping import ClockWatch, run_reconcile, run_sweep
 from service.jobs.upkeep.retention import run_retention
+from service.store.database.store import Lock
 
 log = logging.getLogger("surefoot.worker")
 
-_SHORTEST_REST_S = 0.05
+_SHORTEST_REST_S, _ASK_S = 0.05, 1.0
 _SWEEP_S = 0.5
 _CLOCK_S = 1.0
 _HOUR_S = 3600.0
@@ -62,26 +62,36 @@ def start_rounds(context: JobContext) -> None:
 
 
 def _go(context: JobContext) -> None:
-    with (context.settings.data_dir / ROUNDS_LOCK).open("w") as lock:
-        while not _taken(lock.fileno()):
-            if context.stopping.wait(1.0):
-                return
-        log.info("rounds_taken")
-        now_s = time.monotonic()
-        hourly = threading.Thread(
-            target=_repeat, args=(context, _hourly(context, now_s)), name="hourly", daemon=True
-        )
-        hourly.start()
-        _repeat(context, _quick(context, now_s))
-        hourly.join()  # the lock is held until nobody does a round
+    with closing(context.store.lock(ROUNDS)) as lock:
+        while not context.stopping.is_set():
+            if lock.held():
+                _go_round(context, lock)
+            context.stopping.wait(_ASK_S)
 
 
-def _repeat(context: JobContext, rounds: list[Round]) -> None:
+def _go_round(context: JobContext, lock: Lock) -> None:
+    """Do the rounds until the process is to end, or the lock is another's."""
+    log.info("rounds_taken")
+    now_s, over = time.monotonic(), threading.Event()
+    hourly = threading.Thread(
+        target=_repeat,
+        args=(context, _hourly(context, now_s), lambda: not over.is_set()),
+        name="hourly",
+        daemon=True,
+    )
+    hourly.start()
+    _repeat(context, _quick(context, now_s), lock.held)
+    over.set()
+    hourly.join()  # the lock is held until nobody does a round
+
+
+def _repeat(context: JobContext, rounds: list[Round], goes_on: Callable[[], bool]) -> None:
     rest_s = 0.0
-    while not context.stopping.wait(rest_s):
+    while not context.stopping.wait(rest_s) and goes_on():
         for each in rounds:
             each.do_if_due(context)
-        rest_s = max(min(each.due_s for each in rounds) - time.monotonic(), _SHORTEST_REST_S)
+        due_s = min(each.due_s for each in rounds) - time.monotonic()
+        rest_s = max(min(due_s, _ASK_S), _SHORTEST_REST_S)
 
 
 def _quick(context: JobContext, now_s: float) -> list[Round]:
@@ -106,11 +116,3 @@ def _hourly(context: JobContext, now_s: float) -> list[Round]:
         Round("retention", _HOUR_S, lambda: run_retention(context), hourly_s, steps=True),
         Round("finished_jobs", _HOUR_S, engine.forget_finished, hourly_s),
     ]
-
-
-def _taken(lock: int) -> bool:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

@@ -6,11 +6,13 @@ from datetime import datetime
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
+from service.store.database.following import mark_entry, settled
 from service.store.tables.activity import ActivityRecord
 
 
 def add(session: Session, record: ActivityRecord) -> None:
     """Append an entry in the transaction of what it tells of."""
+    mark_entry(session, ActivityRecord)
     session.add(record)
 
 
@@ -18,7 +20,9 @@ def after(
     session: Session, camera_id: str | None, entry_id: int, limit: int
 ) -> Sequence[ActivityRecord]:
     """Entries after one, oldest first; of a camera, or of everything."""
-    query = select(ActivityRecord).where(ActivityRecord.id > entry_id)
+    query = select(ActivityRecord).where(
+        ActivityRecord.id > entry_id, *settled(session, ActivityRecord)
+    )
     if camera_id is not None:
         query = query.where(ActivityRecord.camera_id == camera_id)
     return session.scalars(query.order_by(ActivityRecord.id).limit(limit)).all()

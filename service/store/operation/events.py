@@ -4,32 +4,35 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from service.kinds import EventType
+from service.store.database.following import mark_entry, newest_settled, settled
 from service.store.tables.operation import EventRecord
 
 
 def add(session: Session, type_: EventType, payload: dict[str, Any], now: datetime) -> None:
     """Append an event in the transaction of what it tells of."""
+    mark_entry(session, EventRecord)
     session.add(EventRecord(type=type_, payload=payload, created_at=now))
 
 
 def after(session: Session, event_id: int, limit: int) -> Sequence[EventRecord]:
     """Events after one, oldest first."""
-    query = select(EventRecord).where(EventRecord.id > event_id)
+    query = select(EventRecord).where(EventRecord.id > event_id, *settled(session, EventRecord))
     return session.scalars(query.order_by(EventRecord.id).limit(limit)).all()
 
 
 def newest_id(session: Session) -> int:
-    """The id of the newest event; 0 without any."""
-    return session.scalar(select(func.max(EventRecord.id))) or 0
+    """The id that all events so far have or are below; 0 without any."""
+    return newest_settled(session, EventRecord)
 
 
 def forget(session: Session, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many, oldest first. Returns how many."""
-    surplus = select(EventRecord.id).where(EventRecord.id <= newest_id(session) - keep)
+    newest = select(EventRecord.id).order_by(EventRecord.id.desc()).offset(keep).limit(1)
+    surplus = select(EventRecord.id).where(EventRecord.id <= newest.scalar_subquery())
     bite = surplus.order_by(EventRecord.id).limit(limit)
     result = session.execute(delete(EventRecord).where(EventRecord.id.in_(bite)))
     return int(result.rowcount)  # type: ignore[attr-defined]

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy import insert, update
 from sqlalchemy.orm import Session
 
 from service.store.tables.operation import ProbeRecord
@@ -10,5 +10,6 @@ from service.store.tables.operation import ProbeRecord
 
 def write(session: Session, now: datetime) -> None:
     """Write something. Taking the write lock alone succeeds on a full disk."""
-    row = insert(ProbeRecord).values(id=1, written_at=now)
-    session.execute(row.on_conflict_do_update(index_elements=["id"], set_={"written_at": now}))
+    known = update(ProbeRecord).where(ProbeRecord.id == 1).values(written_at=now)
+    if not session.execute(known).rowcount:  # type: ignore[attr-defined]
+        session.execute(insert(ProbeRecord).values(id=1, written_at=now))

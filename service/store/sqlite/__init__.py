@@ -1,1 +1,1 @@
-"""The database itself: its engine and sessions, its file, its errors, whose turn it is."""
+"""The database as an SQLite file: its engine, its errors, whose turn it is, copies."""

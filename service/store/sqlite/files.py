@@ -157,8 +157,12 @@ def wipe_log(path: Path, patience_ms: int = _BUSY_MS) -> None:
 
 
 def overwrite_deleted(session: Session) -> None:
-    """What this session's connection deletes or changes from now on is overwritten with zeros."""
-    session.execute(text("PRAGMA secure_delete=ON"))
+    """What this session's connection deletes or changes from now on is overwritten with zeros.
+
+    A server keeps what was deleted until it vacuums, and in its logs: so its operator has to know.
+    """
+    if session.get_bind().dialect.name == "sqlite":
+        session.execute(text("PRAGMA secure_delete=ON"))
 
 
 def free_pages(path: Path) -> int:

@@ -1,7 +1,8 @@
 """Statements written out once, for the few that every post of tracks makes.
 
-The driver takes some microseconds to run one. What SQLAlchemy adds each time, looking up how it is
-written and wrapping what comes back, is several times that.
+SQLite's driver takes some microseconds to run one. What SQLAlchemy adds each time, looking up how
+it is written and wrapping what comes back, is several times that. A server takes longer than
+either: there, SQLAlchemy runs them.
 """
 
 import sqlite3
@@ -9,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import ClauseElement, Connection, Dialect, Select
+from sqlalchemy import ClauseElement, Connection, CursorResult, Dialect, Executable, Select
 from sqlalchemy.dialects.sqlite import pysqlite
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.sql.compiler import SQLCompiler
@@ -31,6 +32,7 @@ class Prepared:
     """
 
     def __init__(self, statement: ClauseElement, columns: Sequence[str] | None = None) -> None:
+        self._statement = statement
         compiled = statement.compile(dialect=_DIALECT, column_keys=columns)
         assert isinstance(compiled, SQLCompiler)
         self._sql = str(compiled)
@@ -52,6 +54,9 @@ class Prepared:
 
     def row(self, connection: Connection, values: Values) -> tuple[Any, ...] | None:
         """The first row; None where there is none."""
+        if connection.dialect.name != _DIALECT.name:
+            found = self._executed(connection, values).first()
+            return None if found is None else tuple(found)
         with self._cursor(connection) as cursor:
             cursor.execute(self._sql, self._in_order(values))
             row: tuple[Any, ...] | None = cursor.fetchone()
@@ -59,9 +64,17 @@ class Prepared:
 
     def change(self, connection: Connection, *values: Values) -> int:
         """Change what is stored, by each of some values; how many rows that changed."""
+        if connection.dialect.name != _DIALECT.name:
+            return self._executed(connection, list(values)).rowcount
         with self._cursor(connection) as cursor:
             cursor.executemany(self._sql, [self._in_order(each) for each in values])
         return cursor.rowcount
+
+    def _executed(self, connection: Connection, values: Any) -> CursorResult[Any]:
+        assert isinstance(self._statement, Executable)
+        return connection.execute(
+            self._statement, values, execution_options={"preserve_rowcount": True}
+        )
 
     @contextmanager
     def _cursor(self, connection: Connection) -> Iterator[sqlite3.Cursor]:

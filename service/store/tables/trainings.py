@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Index, String
+from sqlalchemy import Index, LargeBinary, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.kinds import (
@@ -48,7 +48,10 @@ class TrainingRecord(Record):
 
 
 class ModelRecord(Record):
-    """A published model; its weights are the file `<weights_sha256>.safetensors`."""
+    """A published model; its weights are the file `<weights_sha256>.safetensors`.
+
+    On a server, whose workers have no disk in common, a `WeightsRecord` has them, too.
+    """
 
     __tablename__ = "models"
 
@@ -64,3 +67,13 @@ class ModelRecord(Record):
     created_at: Mapped[datetime]
 
     __table_args__ = (Index(None, "camera_id", "created_at"),)
+
+
+class WeightsRecord(Record):
+    """The weights of models by their hash, where several machines share a database."""
+
+    __tablename__ = "weights"
+
+    sha256: Mapped[str] = mapped_column(String(64), primary_key=True)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+    stored_at: Mapped[datetime]

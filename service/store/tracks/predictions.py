@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
+from service.store.database.dialects import new_rows
 from service.store.tables.tracks import PredictionRecord, TrackRecord
 from service.store.tracks.stored import StoredTrack, read, select_tracks
 from service.store.tracks.windows import WindowBounds, window_ids
@@ -35,7 +35,7 @@ def without_prediction(
 def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
     """Insert predictions; a second run of the same job changes nothing."""
     if rows:
-        session.execute(insert(PredictionRecord).on_conflict_do_nothing(), rows)
+        session.execute(new_rows(PredictionRecord.__table__), rows)
 
 
 def predictions(

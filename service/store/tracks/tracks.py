@@ -9,9 +9,9 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, delete, func, select
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
+from service.store.database.dialects import new_rows
 from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.tracks import TrackRecord
@@ -25,7 +25,7 @@ from service.store.tracks.counting import (
 from service.store.tracks.stored import StoredTrack, read, select_tracks
 
 _ADDED = Prepared(
-    insert(TrackRecord.__table__).on_conflict_do_nothing(),  # type: ignore[arg-type]
+    new_rows(TrackRecord.__table__),
     [column for column in TrackRecord.__table__.columns.keys() if column != "id"],  # noqa: SIM118
 )
 # Built once: each reconcile of a camera asks for them.

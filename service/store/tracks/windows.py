@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, Integer, Select, and_, cast, func, select
+from sqlalchemy import ColumnElement, Select, and_, func, select
 from sqlalchemy.orm import Session
 
+from service.store.database.dialects import whole
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import Spans, counting, outside, started_from
 from service.store.tracks.stored import StoredTrack, read, select_tracks
@@ -136,7 +137,7 @@ def of_days(
 
     However many tracks and days the bounds allow; of each day no more than so many, evenly.
     """
-    day = cast(TrackRecord.ended_s / _DAY_S, Integer)
+    day = whole(TrackRecord.ended_s / _DAY_S)
     place = func.row_number().over(partition_by=day, order_by=(TrackRecord.ended_s, TrackRecord.id))
     each = (
         select(

@@ -12,7 +12,7 @@ from service.access.tokens import TokenSpec
 from service.app import create_app
 from service.http.reach import auth_on
 from service.http.scopes import NEEDS, need_of
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

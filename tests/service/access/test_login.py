@@ -9,7 +9,7 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.app import create_app
 from service.http.guard import COOKIE
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.tables.access import SessionRecord
 from tests.service.conftest import problem
 

@@ -1,15 +1,15 @@
 """Pages of others and names of others: what a browser sends for them is refused."""
 
-import contextlib
 import re
-import sqlite3
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.http.scopes import NEEDS
+from service.store.tables.record import Record
 from tests.service.conftest import problem
+from tests.stores.databases import ask
 
 FORM = {"Content-Type": "text/plain"}
 ACTS = [
@@ -125,5 +125,5 @@ def test_looking_changes_nothing(corner, settings):
 
 
 def dump(settings):
-    with contextlib.closing(sqlite3.connect(settings.database_path)) as connection:
-        return list(connection.iterdump())
+    tables = [table.name for table in Record.metadata.sorted_tables]
+    return {name: sorted(map(repr, ask(settings, f"SELECT * FROM {name}"))) for name in tables}

@@ -19,7 +19,7 @@ from service.commands.replay import client_of
 from service.data_dir import StartError
 from service.http.scopes import NEEDS
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 from tests.service.access.test_access import bearer, filled, routes_of

@@ -10,9 +10,9 @@ from numpy.testing import assert_array_equal
 from sqlalchemy import select
 
 from service.settings import Settings
+from service.store.database.revisions import alembic_config
+from service.store.database.store import Store
 from service.store.packing import intrinsics_of, seen_of, trajectory_of, unpack
-from service.store.sqlite.database import Store
-from service.store.sqlite.revisions import alembic_config
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks import tracks
@@ -122,7 +122,7 @@ def test_not_a_number_is_refused(corner):
 
 def test_tracks_of_a_database_of_before_have_no_heads(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_28_anchors")
     with sqlite3.connect(settings.database_path) as connection:
         put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]")

@@ -13,6 +13,9 @@ from service.settings import Settings
 from tests.service.bench import moved
 from tests.service.conftest import problem
 from tests.service.shifted_clock import ShiftedClock
+from tests.stores.databases import only_sqlite
+
+pytestmark = only_sqlite("nothing is kept on PostgreSQL")
 
 URL = "/cameras/corner/pose"
 

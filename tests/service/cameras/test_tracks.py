@@ -12,8 +12,8 @@ from sqlalchemy import select
 from service.app import create_app
 from service.jobs.upkeep.limits import limits_of_camera
 from service.settings import Settings
+from service.store.database.store import Store
 from service.store.packing import unpack
-from service.store.sqlite.database import Store
 from service.store.tables.tracks import TrackRecord
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem

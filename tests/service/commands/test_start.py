@@ -18,6 +18,7 @@ import pytest
 
 from tests.running import free_port, pid_exists, wait_for
 from tests.service.commands import forked
+from tests.stores.databases import only_sqlite
 
 
 def start(command, data_dir, *flags, code=1, **variables):
@@ -78,6 +79,7 @@ def test_a_data_directory_that_is_a_file(tmp_path):
     assert "is a file" in start("migrate", tmp_path / "data" / "below")
 
 
+@only_sqlite("damages the file")
 @pytest.mark.parametrize("command", ["serve", "worker", "migrate"])
 def test_a_newer_schema_is_not_touched(settings, command):
     with sqlite3.connect(settings.database_path) as connection:
@@ -87,6 +89,7 @@ def test_a_newer_schema_is_not_touched(settings, command):
     assert "install the release that wrote it" in line
 
 
+@only_sqlite("damages the file")
 def test_a_database_that_is_none_or_damaged(settings):
     whole = settings.database_path.read_bytes()
     settings.database_path.write_bytes(b"not a database at all" * 1000)
@@ -95,6 +98,7 @@ def test_a_database_that_is_none_or_damaged(settings):
     assert "surefoot.sqlite is damaged" in start("migrate", settings.data_dir)
 
 
+@only_sqlite("damages the file")
 @pytest.mark.parametrize("table", ["tracks", "deliveries", "workflow_status"])
 def test_a_table_that_is_damaged_is_not_served(settings, table):
     with contextlib.closing(sqlite3.connect(settings.database_path)) as connection:

@@ -13,7 +13,7 @@ from service.jobs.context import JobContext
 from service.jobs.deliver import run_deliver
 from service.reasons import as_said
 from service.store import webhooks
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA
 
 

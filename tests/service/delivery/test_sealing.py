@@ -18,7 +18,8 @@ from service.delivery.webhooks import WebhookSpec, create_webhook, rotate_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
+from tests.stores.databases import ask, only_sqlite
 
 SPEC = WebhookSpec(
     url="https://example.org/hook", name="hook", kinds=None, format="webhook", enabled=True
@@ -43,13 +44,11 @@ def read(settings, webhook_id):
 
 
 def put_plain(settings, webhook_id, secret):
-    with sqlite3.connect(settings.database_path) as connection:
-        connection.execute(
-            "UPDATE webhooks SET secret = ?, old_secret = ? WHERE id = ?",
-            (secret, secret, webhook_id),
-        )
+    said = f"secret = '{secret}', old_secret = '{secret}'"
+    ask(settings, f"UPDATE webhooks SET {said} WHERE id = '{webhook_id}'")
 
 
+@only_sqlite("reads the file")
 def test_a_secret_is_in_the_answer_and_not_in_the_file(settings):
     webhook_id, secret = hook(settings)
     assert secret.startswith("whsec_")
@@ -60,6 +59,7 @@ def test_a_secret_is_in_the_answer_and_not_in_the_file(settings):
     assert b"whsec_" not in everything(settings)
 
 
+@only_sqlite("there were none on PostgreSQL")
 def test_secrets_of_earlier_releases_are_sealed_and_leave_nothing_behind(settings):
     webhook_id, _ = hook(settings)
     plain = new_secret()

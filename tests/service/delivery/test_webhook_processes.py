@@ -7,7 +7,7 @@ import pytest
 
 from service.alerting import alerts
 from service.reasons import as_said
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.delivery.receiver import receiver

@@ -18,8 +18,8 @@ from service.estimation.anchoring import (
 from service.estimation.growth import load_growth
 from service.settings import Settings
 from service.store import flow_maps, references
-from service.store.sqlite.database import Store
-from service.store.sqlite.revisions import alembic_config
+from service.store.database.revisions import alembic_config
+from service.store.database.store import Store
 from service.store.tables.references import AnchorRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
@@ -208,7 +208,7 @@ def test_a_false_alarm_has_the_log_begin_anew(known):
 
 def test_a_store_of_before_has_its_present_maps_for_first_ones(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_26_stored_models")
     store = Store(settings)
     with store.engine.begin() as connection:

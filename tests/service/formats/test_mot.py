@@ -5,8 +5,8 @@ import pytest
 from sqlalchemy import select
 
 from service.formats import mot
+from service.store.database.store import Store
 from service.store.packing import unpack
-from service.store.sqlite.database import Store
 from service.store.tables.tracks import TrackRecord
 from tests.service.conftest import problem
 

@@ -9,8 +9,8 @@ from sqlalchemy.exc import OperationalError
 from service.jobs.upkeep.housekeeping import ClockWatch, follow_clock_since_last_run
 from service.process.workforce import register_worker
 from service.store import webhooks
+from service.store.database.store import Store
 from service.store.operation import workers
-from service.store.sqlite.database import Store
 from service.windows.waiting import lies_ahead
 from tests.running import free_port
 

@@ -4,9 +4,7 @@ import subprocess
 import sys
 
 PROGRAM = """
-import sys
 from datetime import timedelta
-from pathlib import Path
 
 from dbos import DBOS
 
@@ -14,7 +12,7 @@ from service.job_queue import engine_config
 from service.jobs import engine
 from service.settings import Settings
 
-settings = Settings(data_dir=Path(sys.argv[1]))
+settings = Settings()
 DBOS(config=engine_config(settings, "w"))
 
 @DBOS.workflow(name="noop")
@@ -36,7 +34,8 @@ DBOS.destroy()
 
 def test_jobs_that_ended_a_while_ago_are_forgotten(settings):
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(settings.data_dir)],
+        [sys.executable, "-c", PROGRAM],
+        env=settings.as_environment(),
         capture_output=True,
         text=True,
         check=False,

@@ -10,6 +10,7 @@ import psutil
 import pytest
 
 from service.process import exits
+from service.process.workforce import worker_name
 from tests.conftest import CAMERA, path_to_changed, track
 from tests.faults.clock import Clock
 from tests.running import RunningService, free_port, pid_exists, wait_for
@@ -56,7 +57,8 @@ def test_a_worker_that_is_stopped_cold_is_ended_and_replaced(start):
     wait_for(service.ready)
     assert service.worker_pid() != stopped
     text = service.http.get("/metrics").text
-    assert 'surefoot_worker_restarts_total{worker="local-0"} 1.0' in text
+    name = worker_name(service.settings, "local-0")
+    assert f'surefoot_worker_restarts_total{{worker="{name}"}} 1.0' in text
 
 
 HANGS = """
@@ -80,7 +82,8 @@ def test_a_look_that_never_ends_ends_its_worker_and_leaves_others_their_turn(sta
 
 
 def test_a_worker_refused_for_its_name_ends_the_service_with_one_line(start, settings):
-    lock = (settings.data_dir / "worker-local-0.lock").open("w")
+    name = worker_name(settings, "local-0")
+    lock = (settings.data_dir / f"worker-{name}.lock").open("w")
     fcntl.flock(lock, fcntl.LOCK_EX)
     service = start()
     assert service.process.wait(60) == exits.REFUSED

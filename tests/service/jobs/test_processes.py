@@ -192,7 +192,7 @@ def test_a_lost_workers_training_is_taken_over(service):
         wait_for(lambda: states(service) == ["running"])
         second = subprocess.Popen([*command, "two"], env=environment, stderr=log)
         try:
-            wait_for(lambda: 'worker_started worker="two"' in service.log.read_text())
+            wait_for(lambda: 'worker_started worker="two' in service.log.read_text())
             first.kill()
             begun = service.log.read_text().count("training_started")
             assert begun == 1

@@ -12,7 +12,7 @@ from service.job_queue import JobQueue
 from service.jobs.context import JobContext
 from service.jobs.train import may_go_on
 from service.jobs.training_child import Progress, train_apart
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 
 _RESTS = 6  # ticks, each of half a second: no step of this training takes that long
 

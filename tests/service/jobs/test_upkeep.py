@@ -12,7 +12,7 @@ from service.cameras.tracks import receive_tracks
 from service.formats.track import Batch, Clock, Limits, read_track
 from service.jobs.upkeep import reconciliation
 from service.store import trainings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import tracks, windows
 from service.store.tracks.windows import WindowBounds

@@ -9,8 +9,8 @@ import pytest
 from service.jobs.in_hand import InHand
 from service.process.local_workers import pause_s
 from service.process.workforce import Watch, heartbeat, note_trouble, register_worker
+from service.store.database.store import Store
 from service.store.operation import workers
-from service.store.sqlite.database import Store
 
 LOST_S = 0.2
 

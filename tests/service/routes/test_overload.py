@@ -1,7 +1,6 @@
 """More than can be done: who is refused is told so at once, and all is well right after."""
 
 import asyncio
-import sqlite3
 import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +13,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.errors import OverloadedError
 from service.http.lanes import Lane
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.sqlite.turns import Turns
 from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
@@ -30,11 +29,10 @@ def client_of(settings, **changes):
 
 @contextmanager
 def somebody_writing(settings):
-    """Another process that keeps the write lock."""
-    with sqlite3.connect(settings.database_path, isolation_level=None) as other:
-        other.execute("BEGIN IMMEDIATE")
+    """Somebody who keeps everybody else from writing."""
+    with Store(settings).write() as session:
         yield
-        other.execute("ROLLBACK")
+        session.rollback()
 
 
 def test_a_request_has_one_connection_at_a_time(settings):

@@ -27,8 +27,8 @@ from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone
 from service.delivery.keys import secret_of
 from service.store import webhooks
-from service.store.sqlite.database import Store
-from service.store.sqlite.revisions import known_revisions
+from service.store.database.revisions import known_revisions
+from service.store.database.store import Store
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
 from tests.service.delivery.test_sealing import hook

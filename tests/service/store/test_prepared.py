@@ -8,8 +8,8 @@ from sqlalchemy import bindparam, select, update
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from service.errors import OverloadedError
-from service.store.sqlite.database import Store, joined
-from service.store.sqlite.failures import failure_of
+from service.store.database.failures import failure_of
+from service.store.database.store import Store, joined
 from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord
 from tests.conftest import CAMERA

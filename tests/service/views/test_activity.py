@@ -14,7 +14,7 @@ from service.commands.migrate import alembic_config, migrate
 from service.jobs.upkeep.limits import limits_of_all
 from service.kinds import Activity
 from service.settings import Settings
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from service.store.tables.activity import ActivityRecord
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
@@ -106,7 +106,7 @@ def test_only_age_ends_an_entry(settings):
 
 def test_what_is_known_of_the_past_is_carried_over(tmp_path):
     settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.database_url)
+    config = alembic_config(settings.store_url)
     alembic.command.upgrade(config, "2026_11_22_snapshots")
     with sqlite3.connect(settings.database_path) as connection:
         put(connection, "cameras", id="c", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)

@@ -16,6 +16,7 @@ from service.web.rows import rows_of
 from service.web.wording.words import ago, duration, height_change
 from tests.service.bench import moved
 from tests.service.fleet_bench import Fleet, afternoon
+from tests.stores.databases import only_sqlite
 
 
 @pytest.fixture
@@ -127,6 +128,7 @@ def test_names_are_text_and_never_run(http, fleet):
     assert "unsafe" not in policy
 
 
+@only_sqlite("explains its plans")
 def test_no_statement_reads_through_what_grows(http, fleet, settings):
     """Tracks and estimates are millions: of each camera, a few are looked up."""
     afternoon(fleet, 12)

@@ -3,9 +3,10 @@ import sqlite3
 
 from service.job_queue import JobQueue
 from service.process.workforce import register_worker
-from service.store.sqlite.database import Store
+from service.store.database.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
+from tests.stores.databases import ask, only_sqlite
 
 
 def test_health_is_the_process(http):
@@ -23,6 +24,7 @@ def test_ready_needs_a_worker(http, settings):
     assert body.json()["status"] == "ready"
 
 
+@only_sqlite("takes the file away")
 def test_ready_needs_a_store(http, settings):
     for path in settings.data_dir.glob("surefoot.sqlite*"):
         path.unlink()
@@ -60,18 +62,16 @@ def test_what_is_not_there_is_a_problem_document(http):
 def test_an_enqueued_job_lives_and_dies_with_its_transaction(settings):
     store = Store(settings)
     queue = JobQueue(store.engine)
-    with store.read() as session:
+    with store.write() as session:
         queue.enqueue_training(session, "corner", "a" * 32)
         session.rollback()
     with store.write() as session:
         queue.enqueue_training(session, "corner", "b" * 32)
-    with sqlite3.connect(settings.database_path) as connection:
-        rows = connection.execute("SELECT workflow_uuid FROM workflow_status").fetchall()
+    rows = ask(settings, "SELECT workflow_uuid FROM workflow_status")
     assert rows == [("train-" + "b" * 32,)]
 
 
 def test_a_refused_registration_queues_nothing(http, settings):
     http.post("/cameras", json=CAMERA)
     http.post("/cameras", json=CAMERA)
-    with sqlite3.connect(settings.database_path) as connection:
-        assert connection.execute("SELECT count(*) FROM workflow_status").fetchone() == (1,)
+    assert ask(settings, "SELECT count(*) FROM workflow_status") == [(1,)]

@@ -1,0 +1,1 @@
+"""The database on a PostgreSQL server: its engine and locks, its errors, its first schema."""

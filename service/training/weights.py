@@ -1,0 +1,40 @@
+"""Weights that several machines share: in the database, and on each disk once it has used them."""
+
+import hashlib
+import logging
+import os
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from service.settings import Settings
+from service.store import trainings
+from service.store.database.store import Store
+
+log = logging.getLogger("surefoot.jobs")
+
+
+def share_weights(session: Session, settings: Settings, sha256: str) -> None:
+    """Keep weights beside the model that is published with them, where there is a server."""
+    if settings.database_url is not None and not trainings.has_weights(session, sha256):
+        trainings.keep_weights(session, sha256, _path(settings, sha256).read_bytes())
+
+
+def fetch_weights(store: Store, settings: Settings, sha256: str) -> None:
+    """See that weights are on this machine's disk, if they are anywhere; whole or not at all."""
+    path = _path(settings, sha256)
+    if settings.database_url is None or path.exists():
+        return
+    with store.read() as session:
+        data = trainings.weights(session, sha256)
+    if data is None or hashlib.sha256(data).hexdigest() != sha256:
+        return  # who reads the file says that it cannot
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.fetched")
+    partial.write_bytes(data)
+    partial.replace(path)
+    log.info("weights_fetched", extra={"sha256": sha256, "bytes": len(data)})
+
+
+def _path(settings: Settings, sha256: str) -> Path:
+    return settings.weights_dir / f"{sha256}.safetensors"
