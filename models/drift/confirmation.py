@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.drift.chart import HABITS
+from models.drift.chart import HABITS_OF_DAYS
 from models.estimation.parameters import PLANE_PARAMETERS
 from models.flow.fusion import FusedEstimate
 from models.geometry.pose_parameters import PARAMETERS
@@ -12,7 +12,12 @@ _BY_CHANCE = 1e-4  # of windows that are suspected already
 _BY_HABIT = 1e-5
 # What people of one hour do otherwise than those of another (variances by the four parameters): a
 # pace that is 3 % off is a height that is 3 % off.
-_HABITS = np.append(HABITS[:2], [np.hypot(HABITS[2], HABITS[4]), HABITS[3]]) ** 2
+_HABITS = (
+    np.append(
+        HABITS_OF_DAYS[:2], [np.hypot(HABITS_OF_DAYS[2], HABITS_OF_DAYS[4]), HABITS_OF_DAYS[3]]
+    )
+    ** 2
+)
 _FEWEST_GROUPS = 7  # more than there are parameters, for a covariance to be known at all
 
 

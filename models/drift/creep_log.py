@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.drift.chart import HABITS, OTHER_PEOPLE, DriftChart, slope_of
+from models.drift.chart import HABITS_OF_DAYS, OTHER_PEOPLE, DriftChart, slope_of
 from models.drift.group_scores import GroupScores
 from models.geometry.rotation import Array
 
@@ -116,7 +116,7 @@ def noise_of(log: CreepLog, weeks: Weeks) -> Array:
     apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
     people = np.diag(1 / weeks.groups) + OTHER_PEOPLE / log.reference_groups
     habits = np.exp(-apart / _SLOW_DAYS) + np.diag(1 / weeks.days)
-    return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS**2)))
+    return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS_OF_DAYS**2)))
 
 
 def _group_tells(log: CreepLog) -> Array:
