@@ -129,8 +129,8 @@ class Watch(threading.Thread):
         }
 
     def memory(self) -> dict[str, float]:
-        """MB of each."""
-        return {name: p.memory_info().rss / 2**20 for name, p in self.processes().items()}
+        """MB of each; of what it shares with others, its part."""
+        return {name: p.memory_full_info().pss / 2**20 for name, p in self.processes().items()}
 
     def cpu_s(self) -> dict[str, float]:
         """Seconds of each so far."""

@@ -17,7 +17,7 @@ from models.drift.chart import (
     trace,
 )
 from models.drift.chart import read_chart as read_chart_by
-from models.drift.chart_learning import learn_chart
+from models.drift.chart_learning import drawn_blocks, learn_chart
 from models.drift.chart_packing import chart_from_bytes, chart_to_bytes
 from models.drift.clock import may_be_clock
 from models.drift.group_scores import SCORES, GroupScores, Usual, score_groups
@@ -255,3 +255,12 @@ def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
     assert not may_be_clock(reading)  # by now a pose can tell
     early = read_chart(chart, score_groups(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
     assert may_be_clock(early)
+
+
+@pytest.mark.parametrize(("groups", "together"), [(1000, 24), (100, 9), (13, 2)])
+def test_people_of_a_quarter_of_an_hour_stay_together_where_the_reference_has_several(
+    groups, together
+):
+    drawn = drawn_blocks(np.random.default_rng(0), groups, 40 * together).reshape(40, together)
+    assert (np.diff(drawn, axis=1) % groups == 1).all()
+    assert ((drawn[1:, 0] - drawn[:-1, -1]) % groups != 1).sum() > 20  # the next begins anywhere
