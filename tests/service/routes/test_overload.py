@@ -1,10 +1,11 @@
 """More than can be done: who is refused is told so at once, and all is well right after."""
 
 import asyncio
+import sqlite3
 import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import httpx
 import pytest
@@ -29,10 +30,19 @@ def client_of(settings, **changes):
 
 @contextmanager
 def somebody_writing(settings):
-    """Somebody who keeps everybody else from writing."""
-    with Store(settings).write() as session:
+    """Another process that keeps the write lock; on a server, another connection."""
+    if settings.database_url is None:
+        # Foreign: it knows nothing of the turns that our own writers take.
+        with closing(sqlite3.connect(settings.database_path, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            yield
+            other.execute("ROLLBACK")
+        return
+    store = Store(settings)
+    with store.write() as session:
         yield
         session.rollback()
+    store.close()
 
 
 def test_a_request_has_one_connection_at_a_time(settings):
