@@ -35,6 +35,7 @@ def worker_for(only, settings, folder):
         process.wait(10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("only", WorkKind)
 def test_a_worker_for_one_kind_begins_that_and_leaves_the_rest(corner, settings, tmp_path, only):
     answer = corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]})
