@@ -10,6 +10,7 @@ from models.geometry.rotation import Array, Mask
 
 _NEWTON_STEPS = 30
 _NO_DISTORTION = 1e-9  # a coefficient that moves no pixel
+_BORDER_PX, _BORDER_SHARE = 2.0, 0.003  # of the image's height
 _CONVERGED = 1e-10  # normalised units; 1e-7 px on a long lens
 
 
@@ -112,6 +113,14 @@ class Intrinsics:
         u, v = uv[..., 0], uv[..., 1]
         across = (u >= -0.5 - margin_px) & (u <= self.width - 0.5 + margin_px)
         return np.asarray(across & (v >= -0.5 - margin_px) & (v <= self.height - 0.5 + margin_px))
+
+    def shows_foot(self, uv: Array) -> Mask:
+        """Which pixels (..., 2) can be feet: inside the image, and not at its lower border.
+
+        There boxes end whose feet are beyond it: within two pixels, or 0.3 % of the height.
+        """
+        lowest = self.height - 0.5 - max(_BORDER_PX, _BORDER_SHARE * self.height)
+        return np.asarray(self.contains(uv) & (uv[..., 1] < lowest))
 
     def _undistorted_share(self, distorted: Array) -> Array:
         """About how much longer (..., 1) the undistorted rays are, by the radial terms alone.

@@ -64,8 +64,8 @@ class Uprights:
 def observe_uprights(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Uprights:
     """The uprights of trajectories, one for each 1.5 s in which a head was seen twice.
 
-    Points whose foot or head is outside the image, or whose head is cut by its border, below the
-    foot, or less than 8 pixels from it, are left out.
+    Points whose foot or head is outside the image or cut by its border, or whose head is below the
+    foot or less than 8 pixels from it, are left out.
     """
     pieces: list[Array] = []
     owners: list[int] = []
@@ -90,7 +90,7 @@ def _of_one(trajectory: Trajectory, intrinsics: Intrinsics) -> Array:
     if trajectory.head_uv is None:
         return np.empty((0, 5, 3))
     feet, heads = trajectory.uv, trajectory.head_uv
-    known = np.asarray(np.isfinite(heads).all(axis=1) & intrinsics.contains(feet))
+    known = np.asarray(np.isfinite(heads).all(axis=1) & intrinsics.shows_foot(feet))
     up = np.where(known[:, None], feet - heads, 0.0)
     known = known & uncut(intrinsics, np.nan_to_num(heads)) & (up[:, 1] > 0)
     known = known & (np.hypot(up[:, 0], up[:, 1]) >= _SHORTEST_PX)

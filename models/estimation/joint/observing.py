@@ -25,11 +25,11 @@ _FEWEST_POINTS = 3
 def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:
     """Steps and box tops of trajectories.
 
-    Each run of points inside the image without a gap is smoothed by a local straight line at nodes
+    Each run of feet inside the image without a gap is smoothed by a local straight line at nodes
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
     points = points_of(trajectories)
-    inside = intrinsics.contains(points.uv)
+    inside = intrinsics.shows_foot(points.uv)
     runs = runs_of_tracks(points.time_s, inside, points.bounds, _LONGEST_GAP_S, _FEWEST_POINTS)
     firsts, nodes_s, feet, tops = nodes_of_runs(
         points.time_s, points.uv, points.top_v, runs, STEP_S, _KERNEL_S

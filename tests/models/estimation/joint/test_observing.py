@@ -1,5 +1,7 @@
 """What is read of tracks: runs without a gap, nodes smoothed by straight lines, steps between."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from models.estimation.joint.observing import observe
@@ -59,6 +61,19 @@ def test_a_gap_and_the_edge_of_the_picture_part_a_track():
     found = observe([beyond], LENS).steps.rows
     assert 18 < found.time_s[-1] < 21
     assert found.owner_idx.tolist() == [0] * found.owner_idx.size
+
+
+def test_feet_that_a_box_has_lost_below_the_picture_are_not_where_it_ends():
+    time_s = np.arange(0.0, 30.1, 0.4)
+    goes = Trajectory(time_s=time_s, uv=np.column_stack([400 + 0 * time_s, 300 + 20 * time_s]))
+    in_view = goes.part(np.flatnonzero(goes.uv[:, 1] < 717))  # two pixels and a half above 719.5
+    stays = np.minimum(goes.uv, [np.inf, 719.0])  # from 21 s on the box ends with the picture
+    cut = observe([replace(goes, uv=stays)], LENS).steps
+    for field in ("start_rays", "end_rays", "seconds"):
+        np.testing.assert_array_equal(
+            getattr(cut, field), getattr(observe([in_view], LENS).steps, field)
+        )
+    assert len(cut.rows) == 13
 
 
 def test_boxes_are_smoothed_as_heights_and_may_be_missing():
