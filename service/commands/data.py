@@ -107,10 +107,10 @@ def rotate_key(
     _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
 
 
-def _begin(data_dir: Path | None) -> "Settings":
+def _begin(data_dir: Path | None, database_url: str | None = None) -> "Settings":
     configure_logs()
     be_private()
-    return settings_given(data_dir=data_dir)
+    return settings_given(data_dir=data_dir, database_url=database_url)
 
 
 def _begin_on_file(data_dir: Path | None, command: str) -> "Settings":
@@ -151,14 +151,12 @@ def migrate_data(
     from service.commands.postgresql.moving import move
     from service.setting_values import read_database_url
 
-    configure_logs()
-    be_private()
     path = Path(source.removeprefix("sqlite:///"))
     try:
         url = read_database_url(target)
     except ValueError as error:
         raise StartError(f"--to: {error}") from error
-    settings = Settings(data_dir=data_dir or path.parent, database_url=url)
+    settings = _begin(data_dir or path.parent, url)
     with _progress() as tell:
         moved = move(path, settings, tell)
     _say(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")

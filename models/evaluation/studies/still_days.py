@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drift.chart import KNOCKS, RUN, DriftChart, ratios_of, slope_of, trace
+from models.drift.chart import KNOCKS, RUN, DriftChart, Ratios, ratios_of, slope_of, trace
 from models.drift.group_scores import score_groups, scores_at
 from models.estimation.joint.observations import of_tracks
 from models.evaluation.protocol.partings import first_seen
@@ -89,7 +89,8 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
         groups_a_year = len(scores.last) * _YEAR_S / (float(rest[-1].time_s[0]) - learned_s)
         level = chart.level(RUN * alarms_a_year / groups_a_year)
         apart = chart.bounded(scores.values) - chart.mean
-        path = trace(ratios_of(chart), apart)
+        ratios = ratios_of(chart)
+        path = trace(ratios, apart)
         highest = int(path.statistic.argmax())
         over = np.flatnonzero(path.statistic > level)
         first = of_tracks(seen, np.arange(min(seen.tracks, _MOVED)))
@@ -98,7 +99,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
         for name, (parameter, size) in MOVES.items():
             # A camera that has moved on sees people as one that stays would from a little back.
             moved = scores_at(first, walkers, usual, -size * np.eye(4)[parameter])
-            delays[name] = list(_delays(chart, apart, chart.bounded(moved) - chart.mean, level))
+            delays[name] = list(_delays(ratios, apart, chart.bounded(moved) - chart.mean, level))
         yield StillDay(
             camera=scene.scene_id,
             begin=begin,
@@ -111,9 +112,8 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
         )
 
 
-def _delays(chart: DriftChart, still: Array, moved: Array, level: float) -> Iterator[float]:
+def _delays(ratios: Ratios, still: Array, moved: Array, level: float) -> Iterator[float]:
     """How many walking groups a move takes at some moments, after others before a still camera."""
-    ratios = ratios_of(chart)
     for begin in np.linspace(0, max(len(moved) - _WAIT, 0), _MOMENTS).astype(int):
         lead = still[max(begin - _LEAD, 0) : begin]
         both = np.concatenate([lead, moved[begin : begin + _WAIT]])

@@ -205,3 +205,11 @@ def _answers(port):
         return httpx.get(f"http://127.0.0.1:{port}/healthz").status_code == 200
     except httpx.TransportError:
         return False
+
+
+def test_a_site_is_moved_from_a_data_directory_to_a_server(tmp_path):
+    from_, to = ("--from", f"sqlite:///{tmp_path}/none"), "postgresql://localhost:1/site"
+    line = start("migrate-data", tmp_path, *from_, "--to", to)
+    assert line == f"--from: {tmp_path}/none is no surefoot.sqlite of a data directory"
+    line = start("migrate-data", tmp_path, *from_, "--to", "mysql://localhost/site")
+    assert line.startswith("--to: postgresql://user:password@host:port/database is needed")
