@@ -1,6 +1,5 @@
 """The worker process: runs the engine's jobs until it is told to stop, or should start anew."""
 
-import fcntl
 import logging
 import os
 import signal
@@ -25,6 +24,7 @@ from service.process.work import WorkKind
 from service.process.workforce import WORKERS, Watch, heartbeat, register_worker, worker_name
 from service.settings import Settings
 from service.store.database.store import Store
+from service.store.sqlite.file_lock import FileLock
 
 log = logging.getLogger("surefoot.worker")
 
@@ -49,11 +49,9 @@ def run_worker(
         WorkerRunningError: a worker of this name is running already.
     """
     name = worker_name(settings, name)
-    lock = (settings.data_dir / f"worker-{name}.lock").open("w")
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        raise WorkerRunningError(f"name: worker {name!r} is running already") from error
+    lock = FileLock(settings.data_dir / f"worker-{name}.lock")
+    if not lock.held():
+        raise WorkerRunningError(f"name: worker {name!r} is running already")
     settle_allocator()
     yield_to_others(settings.worker_nice)
     store = Store(settings)
