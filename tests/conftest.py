@@ -64,23 +64,16 @@ def pytest_unconfigure() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Trace few for the coverage; where some processes run, mix slow tests into each's share.
-
-    Traced is the first case of each test that is not slow: others hardly reach what it does not,
-    and tracing takes two fifths more. What is said to be covered is the least that is.
+    """Where some processes run, mix slow tests into each's share.
 
     Each process is given its share of the list, and steals from another's end: what takes long
     must not be what is left. Slow tests wait much, for processes and browsers, and fast ones hardly
     ever: beside one another they keep the processor busy. Slow tests of a file stay together, with
     what they share.
     """
-    slow = [item for item in items if item.get_closest_marker("slow")]
-    traced = {item.nodeid.partition("[")[0]: item for item in reversed(items)}
-    for item in items:
-        if item.get_closest_marker("slow") or traced[item.nodeid.partition("[")[0]] is not item:
-            item.add_marker("no_cover")
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return
+    slow = [item for item in items if item.get_closest_marker("slow")]
     fast = [item for item in items if not item.get_closest_marker("slow")]
     files = list(dict.fromkeys(item.path for item in slow))
     processes = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])

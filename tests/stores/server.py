@@ -11,6 +11,8 @@ import psycopg
 
 SWITCH, SERVER = "SUREFOOT_TEST_DATABASE", "SUREFOOT_TEST_SERVER"
 _NOBODY = "nobody"
+# In memory a new database takes 20 ms, on a disk 300: it is some 600 files, and each test has one.
+_IN_MEMORY, _NEEDED_B = Path("/dev/shm"), 4 << 30
 # Nothing of it outlives the run: what makes a database survive a power cut is left off.
 _OPTIONS = {
     "fsync": "off",
@@ -41,6 +43,13 @@ def programs() -> Path | None:
     return None if on_path is None else Path(on_path).parent
 
 
+def _where() -> Path | None:
+    """A folder in memory, if there is one with room enough; else None, for a temporary one."""
+    if _IN_MEMORY.is_dir() and shutil.disk_usage(_IN_MEMORY).free > _NEEDED_B:
+        return _IN_MEMORY
+    return None
+
+
 class Server:
     """A cluster that is made, started, and thrown away."""
 
@@ -49,7 +58,7 @@ class Server:
         if bin_folder is None:
             raise RuntimeError("no PostgreSQL here: apt-get install postgresql")
         self._bin = bin_folder
-        self.folder = Path(tempfile.mkdtemp(prefix="surefoot-postgresql-"))
+        self.folder = Path(tempfile.mkdtemp(prefix="surefoot-postgresql-", dir=_where()))
         self._user = _NOBODY if os.getuid() == 0 else None
         if self._user is not None:
             who = pwd.getpwnam(self._user)
