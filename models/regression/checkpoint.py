@@ -10,6 +10,7 @@ from safetensors.torch import load, save
 from models.errors import CheckpointError
 from models.regression.network import PoseRegressor, network_for
 from models.regression.recipe import Recipe
+from models.regression.weights_files import weights_path
 
 
 def save_weights(network: PoseRegressor, folder: Path) -> str:
@@ -48,8 +49,3 @@ def load_weights(folder: Path, digest: str, recipe: Recipe) -> PoseRegressor:
         raise CheckpointError(f"weights {digest}: not of recipe {recipe.name}: {error}") from error
     network.eval()
     return network
-
-
-def weights_path(folder: Path, digest: str) -> Path:
-    """Where the weights of a hash lie."""
-    return folder / f"{digest}.safetensors"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from models.regression.weights_files import weights_path
 from service.backup.manifest import hash_file
 from service.backup.placing import READY
 from service.data_dir import (
@@ -80,7 +81,7 @@ def repair_weights(settings: Settings) -> int:
         broken = _broken_models(settings)
         files.drop_models(settings.database_path, list(broken))
         for digest in set(broken.values()):
-            (settings.weights_dir / f"{digest}.safetensors").unlink(missing_ok=True)
+            weights_path(settings.weights_dir, digest).unlink(missing_ok=True)
     return len(broken)
 
 
@@ -141,7 +142,7 @@ def _broken_models(settings: Settings) -> dict[str, str]:
     sound = {
         digest
         for digest in set(named.values())
-        if (path := settings.weights_dir / f"{digest}.safetensors").is_file()
+        if (path := weights_path(settings.weights_dir, digest)).is_file()
         and hash_file(path).sha256 == digest
     }
     return {model_id: digest for model_id, digest in named.items() if digest not in sound}

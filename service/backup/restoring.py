@@ -6,6 +6,7 @@ import tarfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from models.regression.weights_files import weights_path
 from service.backup.manifest import (
     MANIFEST,
     Manifest,
@@ -146,7 +147,7 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         raise StartError("restore: the database of the backup is damaged; take another backup")
     require_known(files.revision(database), "the backup")
     for digest in set(files.weights_of_models(database).values()) - set(manifest.missing_weights):
-        path = folder / WEIGHTS / f"{digest}.safetensors"
+        path = weights_path(folder / WEIGHTS, digest)
         if not path.exists() or hash_file(path).sha256 != digest:
             raise StartError(f"restore: weights {digest} of the backup are missing or damaged")
     secrets = files.webhook_secrets(database)

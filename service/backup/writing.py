@@ -11,6 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from models.regression.weights_files import weights_path
 from service.backup.manifest import (
     FORMAT,
     MANIFEST,
@@ -107,10 +108,9 @@ def _gather(settings: Settings, scratch: Path, on_progress: Progress) -> list[st
 def _copy_weights(settings: Settings, scratch: Path) -> list[str]:
     missing = []
     for digest in sorted(set(files.weights_of_models(scratch / DATABASE).values())):
-        name = f"{digest}.safetensors"
-        target = scratch / WEIGHTS / name
+        target = weights_path(scratch / WEIGHTS, digest)
         try:
-            shutil.copyfile(settings.weights_dir / name, target)
+            shutil.copyfile(weights_path(settings.weights_dir, digest), target)
         except FileNotFoundError:
             missing.append(digest)
             continue

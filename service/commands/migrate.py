@@ -14,11 +14,10 @@ from service.data_dir import (
     require_space,
     telling_of,
 )
-from service.delivery.keys import settle_key
+from service.delivery.key_settling import settle_keys
 from service.job_queue import migrate_engine_tables
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known
-from service.store.database.store import Store
 from service.store.sqlite import files
 from service.store.sqlite.faults import telling_of_database
 
@@ -53,7 +52,7 @@ def migrate(settings: Settings) -> None:
             _require_sound(settings.database_path)
             _migrate_tables(settings)
             migrate_engine_tables(settings)
-            _settle_key(settings)
+            settle_keys(settings)
             _make_shrinkable(settings.database_path)
 
 
@@ -91,19 +90,6 @@ def _migrate_tables(settings: Settings) -> None:
             "a copy of it: install the release that ran before, and report this"
         ) from error
     log.info("migrated", extra={"from": found, "to": head})
-
-
-def _settle_key(settings: Settings) -> None:
-    store = Store(settings)
-    try:
-        with store.write() as session:
-            files.overwrite_deleted(session)
-            sealed = settle_key(session, settings)
-    finally:
-        store.close()
-    if sealed:
-        files.wipe_log(settings.database_path)
-        log.info("secrets_sealed", extra={"secrets": sealed})
 
 
 def _make_shrinkable(path: Path) -> None:

@@ -3,10 +3,10 @@
 import hashlib
 import logging
 import os
-from pathlib import Path
 
 from sqlalchemy.orm import Session
 
+from models.regression.weights_files import weights_path
 from service.settings import Settings
 from service.store import trainings
 from service.store.database.store import Store
@@ -17,12 +17,14 @@ log = logging.getLogger("surefoot.jobs")
 def share_weights(session: Session, settings: Settings, sha256: str) -> None:
     """Keep weights beside the model that is published with them, where there is a server."""
     if settings.database_url is not None and not trainings.has_weights(session, sha256):
-        trainings.keep_weights(session, sha256, _path(settings, sha256).read_bytes())
+        trainings.keep_weights(
+            session, sha256, weights_path(settings.weights_dir, sha256).read_bytes()
+        )
 
 
 def fetch_weights(store: Store, settings: Settings, sha256: str) -> None:
     """See that weights are on this machine's disk, if they are anywhere; whole or not at all."""
-    path = _path(settings, sha256)
+    path = weights_path(settings.weights_dir, sha256)
     if settings.database_url is None or path.exists():
         return
     with store.read() as session:
@@ -34,7 +36,3 @@ def fetch_weights(store: Store, settings: Settings, sha256: str) -> None:
     partial.write_bytes(data)
     partial.replace(path)
     log.info("weights_fetched", extra={"sha256": sha256, "bytes": len(data)})
-
-
-def _path(settings: Settings, sha256: str) -> Path:
-    return settings.weights_dir / f"{sha256}.safetensors"

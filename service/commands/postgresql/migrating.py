@@ -10,11 +10,10 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, text
 
 from service.data_dir import StartError
-from service.delivery.keys import settle_key
+from service.delivery.key_settling import settle_keys
 from service.job_queue import migrate_engine_tables
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known
-from service.store.database.store import Store
 from service.store.postgresql.backend import postgresql_engine
 from service.store.postgresql.faults import telling_of_server
 from service.store.postgresql.keys import LOCKS, lock_key
@@ -47,7 +46,7 @@ def migrate_server(settings: Settings) -> None:
         if found != head:
             log.info("migrated", extra={"from": found, "to": head})
         migrate_engine_tables(settings)
-        _settle_key(settings)
+        settle_keys(settings)
 
 
 @contextmanager
@@ -87,14 +86,3 @@ def _require_fit(connection: Connection) -> None:
         raise StartError(f"database: PostgreSQL 13 or newer is needed, got {version // 10_000}")
     if encoding != "UTF8":
         raise StartError(f"database: the encoding UTF8 is needed, got {encoding}; createdb -E UTF8")
-
-
-def _settle_key(settings: Settings) -> None:
-    store = Store(settings)
-    try:
-        with store.write() as session:
-            sealed = settle_key(session, settings)
-    finally:
-        store.close()
-    if sealed:
-        log.info("secrets_sealed", extra={"secrets": sealed})

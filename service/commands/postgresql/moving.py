@@ -9,6 +9,7 @@ from typing import Any
 
 import psycopg
 
+from models.regression.weights_files import weights_path
 from service.commands.postgresql.migrating import migrate_server
 from service.data_dir import DATABASE, StartError, held_alone, require_stopped
 from service.settings import Settings
@@ -92,7 +93,7 @@ def _moved(
 
 
 def _keep(written: psycopg.Connection[Any], folder: Path, sha256: str) -> bool:
-    path = folder / f"{sha256}.safetensors"
+    path = weights_path(folder, sha256)
     data = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(data).hexdigest() != sha256:
         return False  # its camera is trained anew
