@@ -11,7 +11,7 @@ import multiprocessing
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -97,26 +97,26 @@ KINDS = (
 )
 
 
-async def ask(port: int, kind: Kind, requests: int) -> None:
-    """So many requests, by so many clients."""
+async def ask(ports: Sequence[int], kind: Kind, requests: int) -> None:
+    """So many requests, by so many clients, each of one of the services."""
     asks, left = kind.asks(), iter(range(requests))
 
-    async def client() -> None:
-        connection = Connection("127.0.0.1", port)
+    async def client(number: int) -> None:
+        connection = Connection("127.0.0.1", ports[number % len(ports)])
         for _ in left:
             path, body = next(asks)
             answer = await connection.ask(kind.method, path, body)
             assert answer.status in (200, 202), f"{path}: {answer}"
         connection.close()
 
-    await asyncio.gather(*(client() for _ in range(kind.clients)))
+    await asyncio.gather(*(client(number) for number in range(kind.clients)))
 
 
 def cpu_ms(process: psutil.Process, port: int, kind: Kind, requests: int) -> float:
     """What one of so many requests costs a process, once it knows them."""
-    asyncio.run(ask(port, kind, 50))
+    asyncio.run(ask([port], kind, 50))
     before = sum(process.cpu_times()[:2])
-    asyncio.run(ask(port, kind, requests))
+    asyncio.run(ask([port], kind, requests))
     return 1000 * (sum(process.cpu_times()[:2]) - before) / requests
 
 

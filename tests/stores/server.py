@@ -13,16 +13,18 @@ SWITCH, SERVER = "SUREFOOT_TEST_DATABASE", "SUREFOOT_TEST_SERVER"
 _NOBODY = "nobody"
 # In memory a new database takes 20 ms, on a disk 300: it is some 600 files, and each test has one.
 _IN_MEMORY, _NEEDED_B = Path("/dev/shm"), 4 << 30
-# Nothing of it outlives the run: what makes a database survive a power cut is left off.
-_OPTIONS = {
-    "fsync": "off",
-    "synchronous_commit": "off",
-    "full_page_writes": "off",
-    "autovacuum": "off",
+_FOUND = {
     "shared_buffers": "64MB",
     "max_connections": "300",
     "listen_addresses": "",
     "log_min_messages": "fatal",
+}
+# Nothing of it outlives the run: what makes a database survive a power cut is left off.
+_HASTE = {
+    "fsync": "off",
+    "synchronous_commit": "off",
+    "full_page_writes": "off",
+    "autovacuum": "off",
 }
 
 
@@ -51,14 +53,20 @@ def _where() -> Path | None:
 
 
 class Server:
-    """A cluster that is made, started, and thrown away."""
+    """A cluster that is made, started, and thrown away.
 
-    def __init__(self) -> None:
+    One that is `durable` lies on a disk and makes sure of each commit, as servers usually do.
+    """
+
+    def __init__(self, *, durable: bool = False) -> None:
         bin_folder = programs()
         if bin_folder is None:
             raise RuntimeError("no PostgreSQL here: apt-get install postgresql")
         self._bin = bin_folder
-        self.folder = Path(tempfile.mkdtemp(prefix="surefoot-postgresql-", dir=_where()))
+        self.folder = Path(
+            tempfile.mkdtemp(prefix="surefoot-postgresql-", dir=None if durable else _where())
+        )
+        self._options = dict(_FOUND if durable else {**_FOUND, **_HASTE})
         self._user = _NOBODY if os.getuid() == 0 else None
         if self._user is not None:
             who = pwd.getpwnam(self._user)
@@ -68,6 +76,10 @@ class Server:
     def data(self) -> Path:
         return self.folder / "data"
 
+    @property
+    def pid(self) -> int:
+        return int((self.data / "postmaster.pid").read_text().split()[0])
+
     def url(self, name: str = "postgres") -> str:
         return f"postgresql://postgres@/{name}?host={self.folder}"
 
@@ -75,7 +87,7 @@ class Server:
         if not self.data.exists():
             self._run("initdb", "-D", self.data, "-U", "postgres", "-A", "trust", "--no-sync",
                       "-E", "UTF8", "--locale=C.UTF-8")  # fmt: skip
-            lines = [f"{name} = '{value}'" for name, value in _OPTIONS.items()]
+            lines = [f"{name} = '{value}'" for name, value in self._options.items()]
             lines.append(f"unix_socket_directories = '{self.folder}'")
             with (self.data / "postgresql.auto.conf").open("a") as file:
                 file.write("\n".join(lines) + "\n")
