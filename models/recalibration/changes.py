@@ -63,6 +63,7 @@ def posed(tracks: Observations, site: CameraSite, near: LastPose | None = None) 
             site.speed_reference,
             site.flow,
             () if near is None else tuple(near.fused.ends),
+            None if near is None else near.around,
         )
     return Posed(joint=joint, fused=fused)
 

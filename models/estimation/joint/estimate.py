@@ -41,6 +41,14 @@ _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Near:
+    """Where a fit ended: `raw` (3,), and the coefficients of its fields there."""
+
+    raw: Array
+    means: tuple[Array, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
@@ -67,6 +75,11 @@ class JointEstimate:
     verticals: VerticalEstimate | None = None
     by_speeds: PlaneEstimate | None = None
     means: tuple[Array, ...] = ()
+
+    @property
+    def near(self) -> Near:
+        """Where a fit of almost the same tracks may begin."""
+        return Near(raw=self.raw, means=self.means)
 
     @property
     def raw_parameters(self) -> PoseParameters:
@@ -100,7 +113,7 @@ def joint_estimate(
     """The pose that explains all tracks best, whatever it was before.
 
     Where it is known to be `near` one of the `ends` (3,) of an estimate of almost the same tracks,
-    with about its `means`, no other poses are looked at.
+    with about its `means`, no other poses are looked at, and this one roughly.
     """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
@@ -110,7 +123,7 @@ def joint_estimate(
         first = _distinct([fit_pose(few, start, hold) for start in begin])
         ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     else:
-        ends = _distinct([fit_pose(channels, start, hold, means) for start in near])
+        ends = _distinct([fit_pose(channels, start, hold, means, roughly=True) for start in near])
     verticals = vertical_estimate(observations.uprights, reference.verticals)
     return _said_of(observations, channels, ends, reference, verticals)
 
@@ -121,16 +134,21 @@ def joint_near(
     reference: SpeedReference,
     candidate: Array,
     joint: JointEstimate | None = None,
+    near: Near | None = None,
 ) -> JointEstimate:
     """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
 
     How fast people are where, and which way, is another question once a camera has been panned.
-    What their heads say, the joint estimate's `verticals`, is not.
+    What their heads say, the joint estimate's `verticals`, is not. Where it is known what almost
+    the same tracks said, it is looked for `near` that, roughly.
     """
     verticals, means = (None, ()) if joint is None else (joint.verticals, joint.means)
+    start = candidate[:3] + reference.offset
+    if near is not None:
+        start, means = near.raw, near.means
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
-    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior), means)
+    fit = fit_pose(channels, start, pose_prior(prior), means, roughly=near is not None)
     return _said_of(observations, channels, [fit], reference, verticals)
 
 
