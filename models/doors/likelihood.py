@@ -20,7 +20,7 @@ def door_values(moments: Moments, doors: DoorMap, candidates: Array) -> Array:
 
 
 def door_likelihood(moments: Moments, doors: DoorMap, candidate: Array) -> tuple[Array, Array]:
-    """The same (tracks,) of one (4,), with slopes (tracks, 4) by tilt, roll, log height, heading."""
+    """The same (tracks,) of one (4,), with slopes (tracks, 4) by the four parameters."""
     values, scores = _terms(moments, doors, candidate[None], _turns(candidate[None]))
     return values[0], scores[0]
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.joint.estimate import JointEstimate, Near, joint_near
+from models.estimation.joint.estimate import JointEstimate, joint_near
+from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.likelihood import Walkers

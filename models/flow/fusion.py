@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.estimation.joint.estimate import JointEstimate, Near
+from models.estimation.joint.estimate import JointEstimate
+from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.speed_reference import SpeedReference
 from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of

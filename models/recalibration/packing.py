@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from models.errors import CheckpointError
-from models.estimation.joint.estimate import Near
+from models.estimation.joint.fit import Near
 from models.flow.fusion import Around
 from models.geometry.rotation import Array
 from models.packing import Format, flattened, pack, restored, unpack

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.joint.fit import Channel, Fit, fit_pose
+from models.estimation.joint.fit import Channel, Fit, Near, fit_pose
 from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.speed_reference import (
@@ -38,14 +38,6 @@ _START_TRACKS = 80
 _FEWEST_GROUPS = 5
 _HOPELESS = 12.0  # of that log likelihood, for another end to be named
 _SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Near:
-    """Where a fit ended: `raw` (3,), and the coefficients of its fields there."""
-
-    raw: Array
-    means: tuple[Array, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

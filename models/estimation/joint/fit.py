@@ -76,6 +76,14 @@ class PosePrior:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Near:
+    """Where a fit ended: `raw` (3,), and the coefficients of its fields there."""
+
+    raw: Array
+    means: tuple[Array, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
     """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
@@ -89,6 +97,11 @@ class Fit:
     bound: Array
     score: float
     means: tuple[Array, ...]
+
+    @property
+    def near(self) -> Near:
+        """Where a fit of almost the same tracks may begin."""
+        return Near(raw=self.candidate, means=self.means)
 
 
 def assumed(field: Field, spread: Spread) -> Learned:
