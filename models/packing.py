@@ -12,6 +12,7 @@ import json
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
@@ -98,7 +99,7 @@ def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
         CheckpointError: fields are missing, or there are others.
     """
     made, known = dict(given), set()
-    hints = get_type_hints(kind)
+    hints = _hints_of(cast(Any, kind))
     for each in fields(cast(Any, kind)):
         if each.name in given:
             continue
@@ -117,6 +118,11 @@ def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
     if strange := sorted(values.keys() - known):
         raise CheckpointError(f"{kind.__name__}: has no {', '.join(strange)}")
     return kind(**made)
+
+
+@cache
+def _hints_of(kind: type[Any]) -> dict[str, Any]:
+    return get_type_hints(kind)
 
 
 def _plain(value: Any) -> Any:

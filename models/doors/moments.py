@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.ground import ground_from_pixel
+from models.geometry.ground import ground_of_rays
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
+from models.geometry.vectors import norm
 from models.trajectory import Trajectory, points_of
 
 BEGINS, ENDS = 0, 1
@@ -107,13 +108,12 @@ def observe_moments(
     behind = np.minimum(np.arange(nodes.time_s.size) + _AROUND, nodes.last)
     span_s = np.maximum(nodes.time_s[behind] - nodes.time_s[before], 1e-3)
     velocity = (nodes.uv[behind] - nodes.uv[before]) / span_s[:, None]
-    ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, nodes.uv)
-    ground = np.where(on_ground[:, None], ground, 0.0)
-    pace = np.linalg.norm(ground[behind] - ground[before], axis=1) / span_s
-    far_m = np.hypot(np.linalg.norm(ground - pose.centre_m[:2], axis=1), pose.height_m)
-    size_px = intrinsics.fy * _STATURE_M / far_m
-    rays, on_ray = intrinsics.rays(nodes.uv)
-    walked = on_ray & on_ground & on_ground[before] & on_ground[behind] & (pace > _STANDING_MPS)
+    rays, _ = intrinsics.rays(nodes.uv)
+    ground, on_ground = ground_of_rays(rays, pose.rotation, beyond=0.0)
+    ground = pose.height_m * ground
+    pace = norm(ground[behind] - ground[before]) / span_s
+    size_px = intrinsics.fy * _STATURE_M / np.hypot(norm(ground), pose.height_m)
+    walked = on_ground & on_ground[before] & on_ground[behind] & (pace > _STANDING_MPS)
     in_sight = np.stack(
         [
             walked & _inside(intrinsics, nodes.uv + sign * _AHEAD_S * velocity, size_px)

@@ -43,6 +43,13 @@ class Camera(NamedTuple):
     height_m: float
 
 
+class Cameras(NamedTuple):
+    """`camera_from_world` (K, 3, 3) of each, and heights (K,) in metres."""
+
+    rotation: Array
+    height_m: Array
+
+
 @compiled
 def known_at(nodes: Nodes, place: Landing, height_m: float) -> float:
     """How well a place is known, 0 to 1; 0 off the grid."""
@@ -78,12 +85,12 @@ def terms_of(
     tracks: int,
     nodes: Nodes,
     rates: Rates,
-    camera: Camera,
+    cameras: Cameras,
     turns: Array,
     anchor: Camera,
     anchored: bool,
 ) -> tuple[Array, Array]:
-    """Values (tracks,) and scores (tracks, 4), zeros where no slopes are asked for.
+    """Values (K, tracks) and scores (K, tracks, 4); (0, tracks, 4) if no slopes are asked for.
 
     The rate of a kind is the usual one times a r + b, where r is the map's ratio. If there are
     fewer events than usual, all doors are used less, a < 1; if there are more, the tracker loses
@@ -98,12 +105,12 @@ def terms_of(
         tracks: how many there are.
         nodes: the door map.
         rates: what is usual.
-        camera: at the candidate.
-        turns: of tilt and roll (2, 3, 3), as of `rotation_and_turns`; (0, 3, 3) for no slopes.
+        cameras: at the K candidates.
+        turns: of tilt and roll (K, 2, 3, 3), as of `rotation_and_turns`; (0, 2, 3, 3): no slopes.
         anchor: another camera.
         anchored: whether moments count by how well their places, seen from there, are known.
     """
-    count, scored = len(rays), len(turns) > 0
+    count, tried = len(rays), len(cameras.height_m)
     share, usual = np.ones(count), np.zeros((count, 2))
     events, expected = np.full(2, _USUAL_EVENTS), np.full(2, _USUAL_EVENTS)
     for number in range(count):
@@ -120,45 +127,48 @@ def terms_of(
     often = events / expected
     doors, anywhere = np.minimum(often, 1.0), np.maximum(often - 1.0, 0.0)
     columns, rows = nodes.known.shape
-    ratio, height_m = nodes.ratio, camera.height_m
-    values, scores = np.zeros(tracks), np.zeros((tracks, 4))
-    for number in range(count):
-        if share[number] == 0.0:
-            continue
-        owner = owner_idx[number]
-        place = landing(rays, number, camera.rotation)
-        x = (place.x * height_m - nodes.corner[0]) * nodes.nodes_per_m
-        y = (place.y * height_m - nodes.corner[1]) * nodes.nodes_per_m
-        inside = place.valid and 0 <= x < columns - _LAST and 0 <= y < rows - _LAST
-        column, row = (int(x), int(y)) if inside else (0, 0)
-        x, y = x - column, y - row
-        down_x, down_y = 0.0, 0.0  # the slopes of the value by place
-        for kind in range(2):
-            happens = event[number] == kind
-            if not happens and usual[number, kind] == 0.0:
+    ratio = nodes.ratio
+    values, scores = np.zeros((tried, tracks)), np.zeros((len(turns), tracks, 4))
+    for tried_idx in range(tried):
+        rotation, height_m = cameras.rotation[tried_idx], cameras.height_m[tried_idx]
+        for number in range(count):
+            if share[number] == 0.0:
                 continue
-            value, by_x, by_y = 1.0, 0.0, 0.0
-            if inside:
-                left = ratio[column, row + 1, kind] - ratio[column, row, kind]
-                right = ratio[column + 1, row + 1, kind] - ratio[column + 1, row, kind]
-                low = ratio[column, row, kind] + left * y
-                by_x = ratio[column + 1, row, kind] + right * y - low
-                by_y = left + (right - left) * x
-                value = low + by_x * x
-            counted = -doors[kind] * usual[number, kind]
-            values[owner] += counted * value
-            if happens:
-                rate = doors[kind] * value + anywhere[kind]
-                values[owner] += share[number] * math.log(rate)
-                counted += share[number] * doors[kind] / rate
-            down_x, down_y = down_x + counted * by_x, down_y + counted * by_y
-        if scored and inside:
-            down_x *= height_m * nodes.nodes_per_m
-            down_y *= height_m * nodes.nodes_per_m
-            for turn in range(2):
-                flow = ground_flow(place.x, place.y, turns[turn])
-                scores[owner, turn] += down_x * flow.x + down_y * flow.y
-            scores[owner, 2] += down_x * place.x + down_y * place.y
-            # A camera that turns clockwise takes its ground along.
-            scores[owner, 3] += down_x * place.y - down_y * place.x
+            owner = owner_idx[number]
+            place = landing(rays, number, rotation)
+            x = (place.x * height_m - nodes.corner[0]) * nodes.nodes_per_m
+            y = (place.y * height_m - nodes.corner[1]) * nodes.nodes_per_m
+            inside = place.valid and 0 <= x < columns - _LAST and 0 <= y < rows - _LAST
+            column, row = (int(x), int(y)) if inside else (0, 0)
+            x, y = x - column, y - row
+            down_x, down_y = 0.0, 0.0  # the slopes of the value by place
+            for kind in range(2):
+                happens = event[number] == kind
+                if not happens and usual[number, kind] == 0.0:
+                    continue
+                value, by_x, by_y = 1.0, 0.0, 0.0
+                if inside:
+                    left = ratio[column, row + 1, kind] - ratio[column, row, kind]
+                    right = ratio[column + 1, row + 1, kind] - ratio[column + 1, row, kind]
+                    low = ratio[column, row, kind] + left * y
+                    by_x = ratio[column + 1, row, kind] + right * y - low
+                    by_y = left + (right - left) * x
+                    value = low + by_x * x
+                counted = -doors[kind] * usual[number, kind]
+                values[tried_idx, owner] += counted * value
+                if happens:
+                    rate = doors[kind] * value + anywhere[kind]
+                    values[tried_idx, owner] += share[number] * math.log(rate)
+                    counted += share[number] * doors[kind] / rate
+                down_x, down_y = down_x + counted * by_x, down_y + counted * by_y
+            if len(turns) and inside:
+                score = scores[tried_idx, owner]
+                down_x *= height_m * nodes.nodes_per_m
+                down_y *= height_m * nodes.nodes_per_m
+                for turn in range(2):
+                    flow = ground_flow(place.x, place.y, turns[tried_idx, turn])
+                    score[turn] += down_x * flow.x + down_y * flow.y
+                score[2] += down_x * place.x + down_y * place.y
+                # A camera that turns clockwise takes its ground along.
+                score[3] += down_x * place.y - down_y * place.x
     return values, scores

@@ -8,6 +8,7 @@ import numpy as np
 from models.estimation.joint.fit import (
     Channel,
     Fit,
+    Near,
     fit_pose,
     per_track,
     track_log_likelihoods,
@@ -24,6 +25,7 @@ FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their
 # window has a few hundred places to cut, which are far from independent.
 _BY_CHANCE = 1e-3
 _ROUNDS = 2
+_NOT_FAR = 0.8  # of the limit: looked at roughly, it is the same within a few hundredths
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +37,10 @@ class ChangePoint:
 
 
 def find_change(
-    observations: Observations, prior: CameraPose, reference: SpeedReference
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: Near | None = None,
 ) -> ChangePoint | None:
     """The move within tracks; None where one pose explains them all.
 
@@ -44,17 +49,37 @@ def find_change(
     better, and the cut moves to where that is most so. The two poses must then differ beyond
     doubt, by their own covariances.
 
+    Args:
+        observations: of the tracks.
+        prior: where the camera was, with the heading that it has by now.
+        reference: how people walk at the site.
+        near: the fit of all tracks with that heading, where a change is hardly suspected: both
+            sides are looked at roughly from there, and as without it if they are somewhat apart.
+
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
     check_in_time(observations)
     if observations.tracks < 2 * FEWEST_BESIDE:
         return None
-    cut = _first_cut(observations, prior, reference)
+    if near is not None and _likeliest(observations, prior, reference, near).excess < _NOT_FAR:
+        return None
+    found = _likeliest(observations, prior, reference)
+    return found if found.excess > 1 else None
+
+
+def _likeliest(
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: Near | None = None,
+) -> ChangePoint:
+    """The likeliest move, whatever its excess."""
+    cut = _first_cut(observations, prior, reference, near)
     before = after = None
     for _ in range(_ROUNDS):
-        before = _fit(observations, np.arange(cut), prior, reference)
-        after = _fit(observations, np.arange(cut, observations.tracks), prior, reference)
+        before = _fit(observations, np.arange(cut), prior, reference, near)
+        after = _fit(observations, np.arange(cut, observations.tracks), prior, reference, near)
         channels = channels_of(observations, reference, prior)
         gain = track_log_likelihoods(channels, after.candidate) - track_log_likelihoods(
             channels, before.candidate
@@ -69,7 +94,7 @@ def find_change(
     covariance = (before.covariance + after.covariance) * reference.pose_variance_inflation
     limit = chi_squared_above(_BY_CHANCE, 3)
     excess = float(apart @ np.linalg.solve(covariance, apart)) / limit
-    return ChangePoint(track_idx=cut, excess=excess) if excess > 1 else None
+    return ChangePoint(track_idx=cut, excess=excess)
 
 
 def suspicion(
@@ -88,16 +113,18 @@ def suspicion(
     return float(ratio[_best_cut(ratio)]) / limit
 
 
-def _first_cut(observations: Observations, prior: CameraPose, reference: SpeedReference) -> int:
+def _first_cut(
+    observations: Observations, prior: CameraPose, reference: SpeedReference, near: Near | None
+) -> int:
     """The cut with the highest likelihood ratio, by scores at the prior pose or at one for all.
 
     The first is the better one for a small move, the second where most tracks are after it.
     """
     channels = channels_of(observations, reference, prior)
     at_prior = plane_parameters_of(prior) + reference.offset
-    whole = fit_pose(channels, at_prior, pose_prior(prior)).candidate
+    whole = near or fit_pose(channels, at_prior, pose_prior(prior)).near
     best, place = -np.inf, FEWEST_BESIDE
-    for candidate in (at_prior, whole):
+    for candidate in (at_prior, whole.raw):
         ratio = _ratios_at(channels, candidate)
         cut = _best_cut(ratio)
         if ratio[cut] > best:
@@ -132,8 +159,14 @@ def _best_cut(gain: Array) -> int:
 
 
 def _fit(
-    observations: Observations, chosen: np.ndarray, prior: CameraPose, reference: SpeedReference
+    observations: Observations,
+    chosen: np.ndarray,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: Near | None,
 ) -> Fit:
-    part = of_tracks(observations, chosen)
-    start = plane_parameters_of(prior) + reference.offset
-    return fit_pose(channels_of(part, reference, prior), start, pose_prior(prior))
+    channels = channels_of(of_tracks(observations, chosen), reference, prior)
+    hold = pose_prior(prior)
+    if near is not None:
+        return fit_pose(channels, near.raw, hold, near.means, roughly=True)
+    return fit_pose(channels, plane_parameters_of(prior) + reference.offset, hold)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate, joint_near
+from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.likelihood import Walkers
@@ -29,12 +30,13 @@ _SHARED = 3  # parameters that speeds and places both determine
 class End:
     """A peak, with the posterior that it is one of.
 
-    `score` is how much better the speeds are explained with its heading than with the prior
-    pose's; it is part of the peak's value.
+    `told` is what the speeds say with its heading, and `score` how much better they are explained
+    so than with the prior pose's; that is part of the peak's value.
     """
 
     peak: Peak
     posterior: Posterior
+    told: JointEstimate
     score: float
 
     @property
@@ -62,6 +64,7 @@ def ends_of(
     prior: CameraPose,
     speed_reference: SpeedReference,
     near: Sequence[Array] = (),
+    told_near: Near | None = None,
 ) -> list[End]:
     """The ends of climbs from several headings, and poses by speeds; the likeliest first.
 
@@ -76,6 +79,7 @@ def ends_of(
         prior: where the camera was.
         speed_reference: how people walk at the site.
         near: candidates (4,) to climb from; several headings are tried unless they are given.
+        told_near: what the speeds say at the only one of them, of almost the same tracks.
     """
     first = Posterior(
         walkers=walkers,
@@ -88,14 +92,15 @@ def ends_of(
         begin = _from_afar(first, joint)
     ends = []
     for start, rounds in begin:
-        peak, posterior, score = start, first, 0.0
+        peak, posterior, score, told = start, first, 0.0, joint
         for _ in range(rounds):
-            told = joint_near(observations, prior, speed_reference, peak.candidate, joint)
+            at = peak.candidate
+            told = joint_near(observations, prior, speed_reference, at, joint, told_near)
             posterior = replace(first, belief=_belief(told, prior))
             score = told.score - joint.score
             peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
-        ends.append(End(peak=peak, posterior=posterior, score=score))
+        ends.append(End(peak=peak, posterior=posterior, told=told, score=score))
     ends = not_far_above(ends, float(joint.values[2]))
     kept = distinct([end.peak for end in ends])
     return [next(end for end in ends if end.peak is peak) for peak in kept]

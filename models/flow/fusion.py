@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.estimate import JointEstimate
+from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations
 from models.estimation.joint.speed_reference import SpeedReference
 from models.estimation.parameters import IDENTIFIABLE_SD, identifiable_of
@@ -37,10 +38,27 @@ from models.reasons import Reason, TracksCode
 _FEWEST_GROUPS = 5
 _EDGE_RAD = math.radians(2.0)
 _FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
+_LITTLE = 0.1  # of a variance
 _NOT_FAR = 0.5  # of that: what is less is far from it, looked at roughly
 _BY_CHANCE = 0.01  # tilt and roll of a camera that stands are so far off in so many cases
 _RIVAL = 0.05  # how likely, against the best, another pose must be to be named
 _NO_RIVAL = 1e-6  # and as unlikely as this, it has nothing to do with the covariance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Around:
+    """What was found around an end, and is about the same of almost the same tracks.
+
+    `told` is what the speeds say with its heading. `wider` (4, 4) was added to the covariance for
+    other ends, for a posterior that is no Gaussian, and for halves that tell other headings.
+    """
+
+    told: Near
+    wider: Array
+
+    def narrow(self, covariance: Array) -> bool:
+        """Whether so little of a covariance (4, 4) was added that it need not be asked anew."""
+        return float(self.wider[3, 3]) < _LITTLE * float(covariance[3, 3])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +72,7 @@ class FusedEstimate:
     `rivals` are headings (radians) of other poses that explain the tracks about as well. `ends`
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `fit` is the sum over walking groups of how well they fit the map at `raw`, in logs.
+    `around` is what else was found there; None where the map had no part.
     """
 
     values: Array
@@ -64,6 +83,7 @@ class FusedEstimate:
     rivals: tuple[float, ...] = ()
     ends: tuple[Array, ...] = ()
     fit: float = 0.0
+    around: Around | None = None
 
     @property
     def registered(self) -> bool:
@@ -94,6 +114,7 @@ def fused_estimate(
     speed_reference: SpeedReference,
     reference: FlowReference,
     near: Sequence[Array] = (),
+    around: Around | None = None,
 ) -> FusedEstimate:
     """The pose by speeds and places together.
 
@@ -110,14 +131,24 @@ def fused_estimate(
         reference: where they do.
         near: the `ends` (4,) of almost the same tracks, where it is known to be near them; else
             poses all around are tried.
+        around: what was found there of them, where there was a single end; else it is asked anew.
     """
     walkers = walkers_of(observations, np.append(joint.values, prior.heading_rad))
     if walkers.walking_groups < _FEWEST_GROUPS:
         return by_speeds_alone(joint, prior)
     site = reference.site(intrinsics)
     variance_inflation = reference.variance_inflation_for(walkers.people)
+    told_near = None if around is None else around.told
     ends = ends_of(
-        walkers, site, variance_inflation, joint, observations, prior, speed_reference, near
+        walkers,
+        site,
+        variance_inflation,
+        joint,
+        observations,
+        prior,
+        speed_reference,
+        near,
+        told_near,
     )
     best = ends[0]
     shape = shape_at(walkers, site, best.candidate)
@@ -131,7 +162,14 @@ def fused_estimate(
     known = reference.precision(shape, walkers.people, move)
     known = known / reference.fit.variance_inflation(fits)
     values, covariance = settled(
-        walkers, site, best.belief, best.peak, shape, known, reference.bias
+        walkers,
+        site,
+        best.belief,
+        best.peak,
+        shape,
+        known,
+        reference.bias,
+        roughly=around is not None,
     )
     if _out_of_reach(values, prior) or not on_known_ground(walkers, site, values):
         untold = {"heading_sd_rad": HEADING_SD}
@@ -140,9 +178,13 @@ def fused_estimate(
         )
     covariance = covariance * apart(best.belief, known, values)
     odds = odds_of(walkers, site, ends)
-    covariance = covariance + elsewhere([end.peak for end in ends], odds)
-    covariance = covariance + flatter(best, covariance)
-    covariance = covariance + _unrepeated(best.posterior, values, covariance, afar=not near)
+    if around is not None and around.narrow(covariance):
+        wider = around.wider
+    else:
+        wider = elsewhere([end.peak for end in ends], odds)
+        wider = wider + flatter(best, covariance + wider)
+        wider = wider + _unrepeated(best.posterior, values, covariance + wider, afar=not near)
+    covariance = covariance + wider
     rivals = tuple(
         float(end.candidate[3])
         for end, against_best in zip(ends, odds, strict=True)
@@ -168,6 +210,7 @@ def fused_estimate(
             if end is best or against_best > _NO_RIVAL
         ),
         fit=float(fits.sum()),
+        around=Around(told=best.told.near, wider=wider),
     )
 
 

@@ -162,29 +162,33 @@ def anchored_scores(
     flow: FlowMap,
     coverage: Coverage,
     intrinsics: Intrinsics,
-    candidate: Array,
+    candidates: Array,
     anchor: Array,
 ) -> Array:
-    """The scores (N, 4) of people in those parts of the picture that see known ground.
+    """Scores (..., N, 4) at candidates (..., 4) of people in parts of the picture that are known.
 
-    Which these are is decided at an anchor (4,), about where the candidate is, and stays so. Unlike
-    the whole likelihood's, the mean of these scores is nothing at the truth whatever people do on
-    ground that the reference did not see.
+    Which see known ground is decided at an anchor (4,), about where the candidates are, and stays
+    so. Unlike the whole likelihood's, the mean of these scores is nothing at the truth whatever
+    people do on ground that the reference did not see.
     """
-    shares = known_shares(coverage, flow, intrinsics, candidate + _AROUND, anchor)
-    return known_scores_of_tracks(
+    flat = candidates.reshape(-1, 4)
+    shares = known_shares(coverage, flow, intrinsics, flat[:, None] + _AROUND, anchor)
+    turned = [_rotation(candidate) for candidate in flat]
+    scores = known_scores_of_tracks(
         *_rays(walkers),
         np.ascontiguousarray(walkers.weight),
         np.ascontiguousarray(walkers.steps.rows.owner_idx),
         flow.slot_of(walkers.steps.rows.time_s),
         flow.grid,
-        *_rotation(candidate),
-        math.exp(candidate[2]),
+        np.array([rotation for rotation, _ in turned]),
+        np.array([turns for _, turns in turned]),
+        np.exp(flat[:, 2]),
         rotation_from_angles(anchor[0], anchor[1], anchor[3]),
         math.exp(anchor[2]),
-        np.ascontiguousarray(_slopes(np.log(np.maximum(shares, _LEAST_SEEN)))),
+        np.array([_slopes(np.log(np.maximum(around, _LEAST_SEEN))) for around in shares]),
         walkers.tracks,
     )
+    return scores.reshape(*candidates.shape[:-1], walkers.tracks, 4)
 
 
 def _rays(walkers: Walkers) -> tuple[Array, Array]:

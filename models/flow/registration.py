@@ -29,6 +29,7 @@ _HOPELESS = 40.0  # of the log posterior: a start so far below another ends belo
 _LONGEST_MOVE = 0.05
 _MOST_ROUNDS = 25
 _SETTLING_ROUNDS = 4
+_ROUGHLY = 0.03  # standard deviations
 CONVERGED = 1e-3  # of the log likelihood
 _SHORTEST_SHARE = 1e-3
 _SAME_END = np.radians(0.3)
@@ -62,14 +63,14 @@ class Site:
             return values
         return values + door_values(walkers.moments, self.doors, candidates)
 
-    def scores(self, walkers: Walkers, candidate: Array, anchor: Array) -> Array:
-        """Scores (N, 4) at a candidate (4,) of who is on known ground, seen from an anchor (4,)."""
+    def scores(self, walkers: Walkers, candidates: Array, anchor: Array) -> Array:
+        """Scores (..., N, 4) at candidates (..., 4) of who is on ground that an anchor knows."""
         scores = anchored_scores(
-            walkers, self.flow, self.coverage, self.intrinsics, candidate, anchor
+            walkers, self.flow, self.coverage, self.intrinsics, candidates, anchor
         )
         if self.doors is None or walkers.moments is None:
             return scores
-        return scores + anchored_door_scores(walkers.moments, self.doors, candidate, anchor)
+        return scores + anchored_door_scores(walkers.moments, self.doors, candidates, anchor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,6 +186,8 @@ def settled(
     shape: Shape,
     precision: Array,
     bias: Array,
+    *,
+    roughly: bool = False,
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
@@ -199,8 +202,10 @@ def settled(
         shape: what the map says there.
         precision: what the map's part knows (4, 4).
         bias: a person's mean score at the truth (4,).
+        roughly: whether it ends once hardly anything moves.
     """
-    covariance = np.linalg.inv(precision + belief.precision)
+    known = precision + belief.precision
+    covariance = np.linalg.inv(known)
     gain = precision @ np.linalg.inv(shape.curvature)
     candidate = peak.candidate
     for _ in range(_SETTLING_ROUNDS):
@@ -208,6 +213,8 @@ def settled(
         slope = scores.sum(axis=0) - bias * scores.any(axis=1).sum()
         move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
         candidate = candidate + move * min(1.0, _LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
+        if roughly and float(move @ known @ move) < _ROUGHLY**2:
+            break
     return candidate, np.asarray(covariance)
 
 
@@ -230,12 +237,10 @@ def _curvature(walkers: Walkers, site: Site, candidate: Array, scores: Array) ->
     Where it bends less than the scores scatter, halfway between what is found in each direction
     and what is found on average: a map of some hundred people is rough, and so is how it bends.
     """
-    slopes = [
-        site.scores(walkers, candidate - step, candidate).sum(axis=0)
-        - site.scores(walkers, candidate + step, candidate).sum(axis=0)
-        for step in _DIFFERENCE * np.eye(4)
-    ]
-    bent = np.array(slopes) / (2 * _DIFFERENCE)
+    steps = _DIFFERENCE * np.eye(4)
+    around = np.concatenate([candidate - steps, candidate + steps])
+    back, on = np.split(site.scores(walkers, around, candidate).sum(axis=1), 2)
+    bent = (back - on) / (2 * _DIFFERENCE)
     scatter = _scatter(scores)
     lower = np.linalg.cholesky(scatter + (1e-6 + 1e-6 * np.trace(scatter)) * np.eye(4))
     back = np.linalg.inv(lower)

@@ -74,7 +74,7 @@ class Intrinsics:
         in_front = depth > 1e-9
         rays = points_camera[..., :2] / np.where(in_front, depth, 1.0)[..., None]
         valid = in_front & (np.hypot(rays[..., 0], rays[..., 1]) < self.max_radius)
-        distorted, _ = self._distort(rays)
+        distorted = self._distorted(rays)
         uv = distorted * (self.fx, self.fy) + (self.cx, self.cy)
         return np.where(valid[..., None], uv, np.nan), valid
 
@@ -102,9 +102,10 @@ class Intrinsics:
                 # A long step leaves the region where the polynomial is a lens.
                 length = np.linalg.norm(step, axis=-1, keepdims=True)
                 estimate = estimate - step * np.minimum(1.0, 0.25 / np.maximum(length, 1e-300))
-        value, _ = self._distort(estimate)
-        near = np.abs(value - target).max(-1) < _CONVERGED
-        valid = near & (np.hypot(estimate[..., 0], estimate[..., 1]) < self.max_radius)
+            near = np.abs(self._distorted(estimate) - target).max(-1) < _CONVERGED
+            valid = near & (np.hypot(estimate[..., 0], estimate[..., 1]) < self.max_radius)
+        else:
+            valid = np.isfinite(target).all(axis=-1)
         directions = np.concatenate([estimate, np.ones_like(estimate[..., :1])], axis=-1)
         return np.where(valid[..., None], directions, np.nan), valid
 
@@ -140,21 +141,30 @@ class Intrinsics:
         s = squared_radius
         return 1 + s * (k1 + s * (k2 + s * k3))
 
-    def _distort(self, rays: Array) -> tuple[Array, Array]:
-        """Distorted rays (..., 2) and the Jacobian (..., 2, 2)."""
-        k1, k2, p1, p2, k3 = self.distortion
+    def _distorted(self, rays: Array) -> Array:
+        """Distorted rays (..., 2)."""
+        _, _, p1, p2, _ = self.distortion
         x, y = rays[..., 0], rays[..., 1]
         s = x * x + y * y
         with np.errstate(over="ignore", invalid="ignore"):
             radial = self._radial(s)
-            slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))  # d radial / d(s) times 2
-            value = np.stack(
+            return np.stack(
                 [
                     x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x),
                     y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y,
                 ],
                 axis=-1,
             )
+
+    def _distort(self, rays: Array) -> tuple[Array, Array]:
+        """Distorted rays (..., 2) and the Jacobian (..., 2, 2)."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = rays[..., 0], rays[..., 1]
+        s = x * x + y * y
+        value = self._distorted(rays)
+        with np.errstate(over="ignore", invalid="ignore"):
+            radial = self._radial(s)
+            slope = 2 * (k1 + s * (2 * k2 + s * 3 * k3))  # d radial / d(s) times 2
             cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
             jacobian = np.stack(
                 [

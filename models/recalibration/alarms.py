@@ -55,7 +55,8 @@ def read_alarm_chart(
     for asked in (every[every >= first], every):
         if not asked.size:
             continue
-        scores = score_groups(of_tracks(tracks, asked), usual)
+        seen = tracks if asked.size == tracks.tracks else of_tracks(tracks, asked)
+        scores = score_groups(seen, usual)
         groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
         reading = read_chart(
             site.chart,

@@ -8,6 +8,7 @@ import numpy as np
 from models.drift.change_point import find_change, suspicion
 from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.reference import FEWEST_WALKERS
 from models.flow.after_change import widened
@@ -26,6 +27,7 @@ from models.recalibration.doubts import (
 )
 from models.recalibration.site import CameraSite
 
+_SUSPECTED = 1.0  # of the limit, by scores: it is twice that wherever a cut is confirmed
 _SUSPECT_RATE = 0.01  # of windows of a camera that stands are looked at twice
 
 
@@ -63,6 +65,7 @@ def posed(tracks: Observations, site: CameraSite, near: LastPose | None = None) 
             site.speed_reference,
             site.flow,
             () if near is None else tuple(near.fused.ends),
+            None if near is None else near.around,
         )
     return Posed(joint=joint, fused=fused)
 
@@ -128,7 +131,9 @@ def _still_there(tracks: Observations, site: CameraSite, last: LastPose) -> Sear
         return None
     search, suspected = last.search, _suspicion(tracks, site, found)
     if not is_calm(suspected, last):
-        if _hurried(tracks, site, found.fused) is not None:
+        around = found.fused.around
+        near = None if around is None or suspected > _SUSPECTED else around.told
+        if _hurried(tracks, site, found.fused, near) is not None:
             return None
         search = replace(search, suspicion=suspected)
     begin = last_pose(found, site.prior, search)
@@ -153,10 +158,12 @@ def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> 
             yield moved
 
 
-def _hurried(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+def _hurried(
+    tracks: Observations, site: CameraSite, whole: FusedEstimate, near: Near | None = None
+) -> int | None:
     """Where the camera may have moved by speeds; None where it did not."""
     turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
-    found = find_change(tracks, turned, site.speed_reference)
+    found = find_change(tracks, turned, site.speed_reference, near)
     return None if found is None else found.track_idx
 
 

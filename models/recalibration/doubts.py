@@ -13,7 +13,7 @@ import numpy as np
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.observations import Observations
 from models.estimation.parameters import PLANE_PARAMETERS
-from models.flow.fusion import FusedEstimate
+from models.flow.fusion import Around, FusedEstimate
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
@@ -73,8 +73,9 @@ class LastPose:
 
     `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
     their fields. `fused` is by places too, where they are `registered`: what they determine
-    together is `identifiable`, and `said` is the code of what was to be said of the map. `search`
-    is when all other poses were looked at.
+    together is `identifiable`, and `said` is the code of what was to be said of the map. `around`
+    is what else was found at its end, where there was a single one. `search` is when all other
+    poses were looked at.
     """
 
     prior: CameraPose
@@ -85,6 +86,7 @@ class LastPose:
     identifiable: tuple[str, ...]
     said: str | None
     search: FullSearch
+    around: Around | None = None
 
 
 def last_pose(found: Posed, prior: CameraPose, search: FullSearch) -> LastPose | None:
@@ -103,6 +105,7 @@ def last_pose(found: Posed, prior: CameraPose, search: FullSearch) -> LastPose |
         identifiable=fused.identifiable,
         said=_code(fused),
         search=search,
+        around=fused.around if len(fused.ends) == 1 else None,
     )
 
 

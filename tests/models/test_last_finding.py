@@ -13,6 +13,7 @@ from models.estimation.joint.observations import of_tracks
 from models.evaluation.recordings import load_recording
 from models.geometry.pose import CameraPose
 from models.recalibration import (
+    doubts,
     estimate_pose,
     last_pose_from_bytes,
     last_pose_to_bytes,
@@ -24,7 +25,8 @@ from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import by_end
 from tests.models.sites import LENS, PRIOR
 
-LONG = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve().parent / "long"
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
+LONG = SCENES.parent / "long"
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 WINDOW, STEP = 160, 10
 SAME = 0.05  # of a standard deviation
@@ -144,6 +146,38 @@ def test_a_last_pose_that_was_stored_is_the_same_start(site, people):
     assert second.last.search.to_s == last.search.to_s  # no other poses were tried
     with pytest.raises(CheckpointError, match="last_pose"):
         last_pose_from_bytes(data[:-9])
+
+
+def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, people):
+    every = observe(people, LENS, PRIOR)
+    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).last
+    near = of_tracks(every, np.arange(10, WINDOW + 10))
+    variance = last.fused.covariance[3, 3]
+
+    def added(share):
+        wider = np.diag([0.0, 0.0, 0.0, share * variance])
+        begin = replace(last, around=replace(last.around, wider=wider))
+        found = estimate_pose(near, site, last=begin)
+        assert found.last.search.to_s == last.search.to_s  # no other poses were tried
+        return found.last.around.wider[3, 3] / variance
+
+    assert added(0.05) == pytest.approx(0.05)
+    assert added(0.2) != pytest.approx(0.2)
+
+
+@pytest.mark.skipif(not SCENES.is_dir(), reason="recorded scenes are not at hand")
+@pytest.mark.parametrize("knock", [None, LARGE])
+def test_recorded_people_come_to_the_same(monkeypatch, knock):
+    """The scene with the most people: as many as a window is refined with are in none of them."""
+    monkeypatch.setattr(doubts, "_FEWEST", 100)
+    scene = load_recording(SCENES / "wildtrack_c6")[0]
+    tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
+    lens, pose, half = scene.intrinsics, scene.true_pose, len(tracks) // 2
+    site = learn_site(observe(tracks[:half], lens, pose), lens, pose, chart=False)
+    every = observe(knocked(tracks[half:], lens, pose, knock), lens, pose)
+    looks = list(follow(of_tracks(every, np.arange(120)), site, 108, 6))
+    assert any(refined for _, _, refined in looks)
+    assert max(apart(full, found) for full, found, _ in looks) < SAME
 
 
 @pytest.fixture(scope="module", params=["atc_20121024", "lincoln_corridor"])

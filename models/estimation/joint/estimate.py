@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.estimation.joint.fit import Channel, Fit, fit_pose
+from models.estimation.joint.fit import Channel, Fit, Near, fit_pose
 from models.estimation.joint.groups import count_walking_groups
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.joint.speed_reference import (
@@ -69,6 +69,11 @@ class JointEstimate:
     means: tuple[Array, ...] = ()
 
     @property
+    def near(self) -> Near:
+        """Where a fit of almost the same tracks may begin."""
+        return Near(raw=self.raw, means=self.means)
+
+    @property
     def raw_parameters(self) -> PoseParameters:
         """What `raw` is, named; it knows no heading."""
         return PoseParameters.of_array(self.raw)
@@ -100,7 +105,7 @@ def joint_estimate(
     """The pose that explains all tracks best, whatever it was before.
 
     Where it is known to be `near` one of the `ends` (3,) of an estimate of almost the same tracks,
-    with about its `means`, no other poses are looked at.
+    with about its `means`, no other poses are looked at, and this one roughly.
     """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
@@ -110,7 +115,7 @@ def joint_estimate(
         first = _distinct([fit_pose(few, start, hold) for start in begin])
         ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
     else:
-        ends = _distinct([fit_pose(channels, start, hold, means) for start in near])
+        ends = _distinct([fit_pose(channels, start, hold, means, roughly=True) for start in near])
     verticals = vertical_estimate(observations.uprights, reference.verticals)
     return _said_of(observations, channels, ends, reference, verticals)
 
@@ -121,16 +126,21 @@ def joint_near(
     reference: SpeedReference,
     candidate: Array,
     joint: JointEstimate | None = None,
+    near: Near | None = None,
 ) -> JointEstimate:
     """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
 
     How fast people are where, and which way, is another question once a camera has been panned.
-    What their heads say, the joint estimate's `verticals`, is not.
+    What their heads say, the joint estimate's `verticals`, is not. Where it is known what almost
+    the same tracks said, it is looked for `near` that, roughly.
     """
     verticals, means = (None, ()) if joint is None else (joint.verticals, joint.means)
+    start = candidate[:3] + reference.offset
+    if near is not None:
+        start, means = near.raw, near.means
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
-    fit = fit_pose(channels, candidate[:3] + reference.offset, pose_prior(prior), means)
+    fit = fit_pose(channels, start, pose_prior(prior), means, roughly=near is not None)
     return _said_of(observations, channels, [fit], reference, verticals)
 
 

@@ -35,6 +35,7 @@ _LEARNING_ROUNDS = 40
 _LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round, in tilt, roll, log height
 _NEAR = 0.2  # of the longest move
 _CONVERGED = 1e-5
+_ROUGHLY = 0.1  # standard deviations: a round more moves it by some hundredths
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +76,14 @@ class PosePrior:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Near:
+    """Where a fit ended: `raw` (3,), and the coefficients of its fields there."""
+
+    raw: Array
+    means: tuple[Array, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
     """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
@@ -88,6 +97,11 @@ class Fit:
     bound: Array
     score: float
     means: tuple[Array, ...]
+
+    @property
+    def near(self) -> Near:
+        """Where a fit of almost the same tracks may begin."""
+        return Near(raw=self.candidate, means=self.means)
 
 
 def assumed(field: Field, spread: Spread) -> Learned:
@@ -145,11 +159,17 @@ def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
 
 
 def fit_pose(
-    channels: Sequence[Channel], start: Array, prior: PosePrior, means: Sequence[Array] = ()
+    channels: Sequence[Channel],
+    start: Array,
+    prior: PosePrior,
+    means: Sequence[Array] = (),
+    *,
+    roughly: bool = False,
 ) -> Fit:
     """Tilt, roll and log height from a start (3,), together with the fields' coefficients.
 
-    These begin at the `means` of a fit near by; at what was learned, unless they are given.
+    These begin at the `means` of a fit near by; at what was learned, unless they are given. It goes
+    on until nothing moves, or `roughly`, until hardly anything does.
     """
     candidate = start.astype(np.float64)
     if len(means) != len(channels):
@@ -185,6 +205,8 @@ def fit_pose(
             for mean, both in zip(means, solved, strict=True)
         ]
         if np.abs(share * move).max() < _CONVERGED:
+            break
+        if roughly and share * share * float(move @ matrix @ move) < _ROUGHLY**2:
             break
     score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):

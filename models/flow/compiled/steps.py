@@ -200,35 +200,42 @@ def known_scores_of_tracks(
     owner_idx: Index,
     slot_idx: Index,
     grid: Grid,
-    rotation: Array,
+    rotations: Array,
     turns: Array,
-    height_m: float,
+    heights_m: Array,
     anchor: Array,
     anchor_height_m: float,
-    d_log_share: Array,
+    d_log_shares: Array,
     tracks: int,
 ) -> Array:
-    """Scores (tracks, 4) of steps as far as they are on known ground, seen from an anchor (3, 3).
+    """Scores (K, tracks, 4) of steps as far as they are on known ground, seen from an anchor.
 
-    `weight`, `owner_idx` and `d_log_share` are as in `likelihood_of_tracks`.
+    At K candidates, by `rotations` (K, 3, 3), `turns` (K, 2, 3, 3), `heights_m` (K,) and
+    `d_log_shares` (K, S, 4). `weight`, `owner_idx` and each of the last are as in
+    `likelihood_of_tracks`; the anchor's rotation is (3, 3).
     """
-    scores = np.zeros((tracks, 4))
+    scores, counted = np.zeros((len(rotations), tracks, 4)), np.empty(weight.size)
     for number in range(weight.size):
-        step = step_on_ground(starts, ends, number, rotation)
-        if not step.valid:
-            continue
         start, end = landing(starts, number, anchor), landing(ends, number, anchor)
         x_m, y_m = (start.x + end.x) / 2 * anchor_height_m, (start.y + end.y) / 2 * anchor_height_m
-        counted = weight[number] * (1 - unseen_at(grid, x_m, y_m).value)
-        owner, slot = owner_idx[number], slot_idx[number]
-        direction = math.atan2(step.way_y, step.way_x)
-        look = look_at(grid, slot, step.x * height_m, step.y * height_m, direction)
-        for parameter in range(4):
-            slope = slope_of(step, turns, parameter)
-            score = (
-                height_m * (look.by_x * slope.x + look.by_y * slope.y)
-                + look.by_direction * slope.direction
-                + slope.log_ratio
-            )
-            scores[owner, parameter] += counted * (score - d_log_share[slot, parameter])
+        counted[number] = weight[number] * (1 - unseen_at(grid, x_m, y_m).value)
+    for candidate in range(len(rotations)):
+        rotation, height_m = rotations[candidate], heights_m[candidate]
+        turned, d_log_share = turns[candidate], d_log_shares[candidate]
+        for number in range(weight.size):
+            step = step_on_ground(starts, ends, number, rotation)
+            if not step.valid:
+                continue
+            owner, slot = owner_idx[number], slot_idx[number]
+            direction = math.atan2(step.way_y, step.way_x)
+            look = look_at(grid, slot, step.x * height_m, step.y * height_m, direction)
+            for parameter in range(4):
+                slope = slope_of(step, turned, parameter)
+                score = (
+                    height_m * (look.by_x * slope.x + look.by_y * slope.y)
+                    + look.by_direction * slope.direction
+                    + slope.log_ratio
+                )
+                score -= d_log_share[slot, parameter]
+                scores[candidate, owner, parameter] += counted[number] * score
     return scores

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models.drift.change_point import FEWEST_BESIDE, find_change
+from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.reference import learn_speed_reference
 from models.simulation.knocked import Knock
@@ -45,6 +46,13 @@ def test_a_second_knock_is_a_change_between_two_poses_off_the_prior(known):
 @pytest.mark.parametrize("pose", [PRIOR, KNOCKED])
 def test_a_still_camera_has_no_change(known, pose):
     assert find_change(window((pose, 150)), PRIOR, known) is None
+
+
+@pytest.mark.parametrize("after", [SLIGHT, KNOCKED, PRIOR])
+def test_a_look_from_the_pose_of_all_finds_the_same(known, after):
+    tracks = window((PRIOR, 60), (after, 60))
+    near = joint_estimate(tracks, PRIOR, known).near
+    assert find_change(tracks, PRIOR, known, near) == find_change(tracks, PRIOR, known)
 
 
 def test_a_few_tracks_after_a_knock_are_too_few(known):
