@@ -41,12 +41,24 @@ def test_a_jump_is_at_least_a_hundredth_of_the_picture(by, told):
     assert jumps(v) == [high if told else [False] * 60]
 
 
+def test_a_walk_may_begin_and_end_in_the_air():
+    v, high = raised(40, [*range(12), *range(50, 60)])
+    assert jumps(v) == [high]
+    most, _ = raised(40, slice(30, 60))
+    assert not any(jumps(most)[0])  # half of it: nobody knows which half is wrong
+    assert sum(jumps(raised(40, slice(31, 60))[0])[0]) == 29
+    long, high = raised(40, slice(80, 140), count=140)
+    assert jumps(long) == [high]  # 5.9 s from the first to the last
+    assert not any(jumps(raised(40, slice(80, 142), count=142)[0])[0])
+
+
 def test_a_jump_that_is_not_undone_is_none():
-    forward = 300 + 2.0 * np.arange(60)
-    assert not any(jumps(forward - 40 * (np.arange(60) >= 30))[0])  # up for good
-    assert not any(jumps(forward + 40 * ((np.arange(60) >= 20) & (np.arange(60) < 30)))[0])
-    back = forward - 40 * ((np.arange(60) >= 20) & (np.arange(60) < 30))
-    back[30:] += 50  # 90 down after 40 up
+    middle = (np.arange(200) >= 90) & (np.arange(200) < 110)  # 9 s from either end
+    forward = 300 + 1.0 * np.arange(200)
+    assert not any(jumps(forward - 40 * (np.arange(200) >= 90))[0])  # up for good
+    assert not any(jumps(forward + 40 * middle)[0])  # down, and up again
+    back = forward - 40 * middle
+    back[110:] += 50  # 90 down after 40 up
     assert not any(jumps(back)[0])
 
 
