@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Mask
 
 WINDOW_MIN_POINTS = 11
 WINDOW_MAX_POINTS = 31  # N in [11, 31]: Xu et al. 2020, section 4.1
@@ -128,6 +128,17 @@ def points_of(trajectories: Sequence[Trajectory]) -> Points:
         uv=np.ascontiguousarray(uv),  # of columns in memory it would be columns, too
         top_v=top_v,
         bounds=bounds,
+    )
+
+
+def points_where(points: Points, kept: Mask) -> Points:
+    """Some of the points (T,) only; trajectories keep their numbers, with no point if need be."""
+    before = np.concatenate([[0], np.cumsum(kept)])
+    return Points(
+        time_s=points.time_s[kept],
+        uv=points.uv[kept],
+        top_v=points.top_v[kept],
+        bounds=before[points.bounds],
     )
 
 

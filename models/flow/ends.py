@@ -22,6 +22,7 @@ _HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))
 _ROUNDS = 2  # in which the speeds are asked again
 _ROUNDS_NEAR = 1  # where the heading is known by almost the same tracks
 _FAR_LOG_HEIGHT = 0.7  # from the speeds': twice as high, everybody walks where nobody was seen
+_NO_LOG_HEIGHT = 5.0  # from a pose's: 150 times as high or as low, nothing is seen
 _UNLIKELY = 12.0  # of the log posterior, for the speeds to be asked no more
 _SHARED = 3  # parameters that speeds and places both determine
 
@@ -167,12 +168,16 @@ def elsewhere(peaks: list[Peak], odds: Array) -> Array:
 def flatter(best: End, covariance: Array) -> Array:
     """What a posterior that is flatter than at its peak adds to the covariance (4, 4).
 
-    Looked at along the heading, the other parameters following as they do around the peak.
+    Looked at along the heading, the other parameters following as they do around the peak. Nothing
+    where that would take the camera to no height at all: so little is known then that nothing is
+    told.
     """
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])
     # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
     turns = sd * np.arange(-4.0, 5.0)
+    if abs(turns[-1] * line[2]) > _NO_LOG_HEIGHT:
+        return np.zeros_like(covariance)
     values = best.posterior.values(best.candidate + turns[:, None] * line)
     density = np.exp(values - values.max())
     variance = float(density @ turns**2 / density.sum())

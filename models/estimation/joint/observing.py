@@ -9,12 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from models.estimation.joint.loops.jumps import jumped
 from models.estimation.joint.loops.runs import nodes_of_runs, runs_of_tracks
+from models.estimation.joint.loops.short_boxes import short_boxes
 from models.estimation.joint.loops.ways import steps_of_runs
 from models.estimation.joint.observations import Observations, Rows, Steps, Tops
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Mask
-from models.trajectory import Trajectory, points_of
+from models.trajectory import Trajectory, points_of, points_where
 
 STEP_S = 1.5  # longer than a stride, shorter than a change of mind
 _KERNEL_S = 0.7  # half the width of the smoothing around a node
@@ -29,6 +31,10 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     1.5 s apart, so that noise of the tracker does not read as speed; between nodes lie the steps.
     """
     points = points_of(trajectories)
+    ended_s = points.time_s[points.bounds[1:] - 1]
+    short = short_boxes(points.uv, points.top_v, points.bounds)
+    high = jumped(points.time_s, points.uv, points.bounds, float(intrinsics.height))
+    points = points_where(points, ~(short | high))
     inside = intrinsics.shows_foot(points.uv)
     runs = runs_of_tracks(points.time_s, inside, points.bounds, _LONGEST_GAP_S, _FEWEST_POINTS)
     firsts, nodes_s, feet, tops = nodes_of_runs(
@@ -63,7 +69,7 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
             top_y=top_y[top],
             rows=_rows(owner_idx[top], run[top], nodes_s[top], count),
         ),
-        ended_s=points.time_s[points.bounds[1:] - 1],
+        ended_s=ended_s,
         tracks=count,
     )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from models.evaluation.injectors.boxes import box_jitter, detector_update, rounding
 from models.evaluation.injectors.clocks import drifting_clock, dropped_frames, jittered_clock
-from models.evaluation.injectors.hidden_feet import hidden_feet
+from models.evaluation.injectors.hidden_feet import hidden_feet, jumps
 from models.evaluation.injectors.identities import fragments, switches
 from models.evaluation.injectors.lens_and_ground import (
     ramp,
@@ -44,6 +44,10 @@ FAULTS = {
     "hidden-feet": Fault(injector=hidden_feet, size=0.2, words="20 % of feet"),
     "hidden-feet-later": Fault(
         injector=hidden_feet, size=0.2, words="20 % of feet, after the reference", later=True
+    ),
+    "jumps": Fault(injector=jumps, size=0.2, words="20 % of the time"),
+    "jumps-later": Fault(
+        injector=jumps, size=0.2, words="20 % of the time, after the reference", later=True
     ),
     "box-jitter": Fault(injector=box_jitter, size=0.03, words="3 % of a person's height"),
     "rounding": Fault(injector=rounding, size=6.0, words="to 6 px"),

@@ -1,11 +1,17 @@
-"""Feet behind things that stand at the site: the box ends where the lower body is cut off."""
+"""Feet behind things that stand at the site or pass by: the box ends where the body is cut off."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.evaluation.injectors.view import USUAL_STATURE_M, View, ground_of, seen_again
+from models.evaluation.injectors.view import (
+    USUAL_STATURE_M,
+    View,
+    ground_of,
+    own_rng,
+    seen_again,
+)
 from models.evaluation.scenes import SceneTrack
 from models.geometry.rotation import Array
 
@@ -14,6 +20,8 @@ _TALL_M = (0.5, 0.9)  # a bench, a hedge, a parked car's bonnet
 _IN_FRONT_M = (0.5, 4.0)  # of somebody who walks there
 _MOST_HIDDEN = 0.6  # of a person; of whom more is hidden nobody is detected
 _MOST_THINGS = 400
+_PASSING_S = (1.0, 4.0)
+_PASSING_M = (0.3, 0.9)  # of a person behind a cart, a child, a car that goes by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,15 +91,53 @@ def hidden_m(places: Array, thing: Thing, camera_m: float) -> Array:
     return np.where(behind, np.maximum(tall, 0.0), 0.0)
 
 
+def jumps(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -> list[SceneTrack]:
+    """Tracks whose feet jump with the box, for a share `size` of the time.
+
+    Something that passes hides the lowest 0.3 to 0.9 m of a person for 1 to 4 s: the box's lower
+    edge springs up, stays as far above the feet, and springs back. When and how much is each
+    track's own, and has nothing to do with the place.
+    """
+    return [
+        seen
+        for track in tracks
+        if (seen := _cut_below(track, view, _passing_m(track, size, seed))) is not None
+    ]
+
+
+def _passing_m(track: SceneTrack, size: float, seed: int) -> Array:
+    """How much (N,) in metres of a track's person something that passes hides, 0 for none."""
+    rng, time_s = own_rng(track.track_id, seed), track.trajectory.time_s
+    cut = np.zeros(time_s.size)
+    usual_s = (_PASSING_S[0] + _PASSING_S[1]) / 2 * (1 - size) / size if size > 0 else np.inf
+    from_s = float(time_s[0]) if rng.uniform() < size else time_s[0] + rng.exponential(usual_s)
+    while from_s <= time_s[-1]:
+        until_s = from_s + rng.uniform(*_PASSING_S)
+        cut[(time_s >= from_s) & (time_s < until_s)] = rng.uniform(*_PASSING_M)
+        from_s = until_s + rng.exponential(usual_s)
+    return cut
+
+
 def _behind(track: SceneTrack, view: View, things: Sequence[Thing]) -> SceneTrack | None:
     ground, valid = ground_of(track, view)
     pose = view.pose
     places = np.where(valid[:, None], ground - pose.centre_m[:2], 0.0)
     cut = np.max([hidden_m(places, thing, pose.height_m) for thing in things], axis=0, initial=0.0)
-    if not (cut > 0).any():
+    return _cut_below(track, view, cut)
+
+
+def _cut_below(track: SceneTrack, view: View, cut_m: Array) -> SceneTrack | None:
+    """The track of somebody whose lowest metres (N,) are not seen: its feet are above the ground.
+
+    The upper edges of the boxes stay. Where more than 60 % are hidden there is no point.
+    """
+    hidden = cut_m > 0
+    if not hidden.any():
         return track
-    points = np.concatenate([ground, cut[:, None]], axis=1) - pose.centre_m
+    ground, _ = ground_of(track, view)
+    pose = view.pose
+    points = np.concatenate([ground, cut_m[:, None]], axis=1) - pose.centre_m
     raised, _ = view.intrinsics.project(points @ pose.rotation.T)
-    uv = np.where((cut > 0)[:, None], raised, track.trajectory.uv)
-    uv[cut > _MOST_HIDDEN * USUAL_STATURE_M] = np.nan
+    uv = np.where(hidden[:, None], raised, track.trajectory.uv)
+    uv[cut_m > _MOST_HIDDEN * USUAL_STATURE_M] = np.nan
     return seen_again(track, view, uv, track.trajectory.top_v)

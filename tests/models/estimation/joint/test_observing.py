@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from models.estimation.joint.observing import observe
 from models.simulation.site import SiteConfig
@@ -103,3 +104,26 @@ def test_tracks_are_read_the_same_alone_and_together():
     assert at == len(together.steps.rows)
     nobody = observe([], LENS)
     assert (nobody.tracks, len(nobody.steps.rows), nobody.ended_s.size) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("boxes", [True, False])
+def test_feet_that_are_hidden_for_a_second_are_left_out_and_the_walk_goes_on(boxes):
+    time_s = np.arange(0.0, 20.1, 0.2)
+    whole = straight(time_s, top_v=180 + 20 * time_s)
+    high = (time_s > 7.1) & (time_s < 7.9)
+    raised = replace(whole, uv=whole.uv - np.outer(high, [0.0, 50.0]))
+    found, calm = (
+        observe([each if boxes else replace(each, top_v=None)], LENS) for each in (raised, whole)
+    )
+    for field in ("start_rays", "end_rays", "seconds"):
+        np.testing.assert_allclose(
+            getattr(found.steps, field), getattr(calm.steps, field), atol=1e-9
+        )
+    assert found.steps.rows.linked.sum() == len(calm.steps.rows) - 1
+    assert found.ended_s.tolist() == calm.ended_s.tolist()
+    np.testing.assert_allclose(found.tops.foot_rays, calm.tops.foot_rays, atol=1e-9)
+    for_long = (time_s > 7.1) & (time_s < 11.9)
+    gone = replace(whole, uv=whole.uv - np.outer(for_long, [0.0, 50.0]))
+    parted = observe([gone if boxes else replace(gone, top_v=None)], LENS).steps.rows
+    assert parted.linked.sum() == len(parted) - 2
+    assert not ((parted.time_s > 7.8) & (parted.time_s < 11.2)).any()

@@ -6,7 +6,13 @@ from numpy.testing import assert_allclose
 
 from models.evaluation.injectors.boxes import box_jitter, detector_update, rounding
 from models.evaluation.injectors.clocks import drifting_clock, dropped_frames, jittered_clock
-from models.evaluation.injectors.hidden_feet import Thing, draw_things, hidden_feet, hidden_m
+from models.evaluation.injectors.hidden_feet import (
+    Thing,
+    draw_things,
+    hidden_feet,
+    hidden_m,
+    jumps,
+)
 from models.evaluation.injectors.identities import fragments, switches
 from models.evaluation.injectors.view import view_of
 from models.evaluation.scenes import Scene
@@ -144,3 +150,30 @@ def test_feet_are_hidden_where_things_stand_and_as_many_as_asked():
     again = draw_things(view, 0.2, 3)
     assert [t.tall_m for t in again] == [t.tall_m for t in draw_things(view, 0.2, 3)]
     assert all(0.5 <= thing.tall_m <= 0.9 for thing in again)
+
+
+def test_feet_jump_with_the_box_as_long_as_something_passes():
+    people = [walk(str(n), straight((-10, y), (10, y), 401), tall_m=1.75)
+              for n, y in enumerate(np.linspace(20, 40, 50))]  # fmt: skip
+    found = jumps(people, VIEW, 0.2, 3)
+    high_m = []
+    for person, track in zip(people, found, strict=True):
+        own, before = track.trajectory, person.trajectory
+        assert (own.top_v == before.top_v).all()
+        assert_allclose(own.uv[:, 0], before.uv[:, 0], atol=1e-6)  # of a level camera
+        # A point z metres above the ground at y is at v = 500 + 1000 (5 - z) / y.
+        away_m = straight((-10, 20 + int(person.track_id) * 20 / 49), (10, 0), 401)[0, 1]
+        high_m.append((before.uv[:, 1] - own.uv[:, 1]) * away_m / 1000)
+    high = np.array(high_m)
+    hidden = high > 1e-6
+    assert hidden.mean() == pytest.approx(0.2, abs=0.04)
+    assert 0.3 <= high[hidden].min() < 0.35
+    assert 0.85 < high[hidden].max() <= 0.9
+    for row in hidden:
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(int)))
+        times_s = 0.1 * (ends[1::2] - ends[::2])
+        inside = (ends[::2] > 0) & (ends[1::2] < row.size)
+        assert (times_s[inside] >= 0.9).all()
+    assert jumps(people, VIEW, 0.0, 3) == people
+    again = {t.track_id: t.trajectory.uv.tobytes() for t in jumps(people[7:20], VIEW, 0.2, 3)}
+    assert again == {t.track_id: t.trajectory.uv.tobytes() for t in found[7:20]}

@@ -1,0 +1,105 @@
+"""Boxes that are too short for where their upper edges are: a loop over the points of each track.
+
+Whatever hides somebody's feet leaves the upper edge of the box where it is. Of a plane seen by a
+camera in any pose, how tall one person looks is a linear function of where their head is in the
+picture: so each track is compared with itself, and a camera that has moved changes nothing. The
+line is a quantile's, above the middle: what is hidden is below it.
+
+Source of the line: Koenker and Bassett 1978; of how it is found: Hunter and Lange 2000.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.compiled import compiled
+from models.geometry.rotation import Array, Mask
+
+_FEWEST = 8  # boxes of a track
+_MOST = 60  # that a line is laid through: more of them say the same again
+_QUANTILE = 0.7  # of the boxes of a track, so many may be hidden
+_ROUNDS = 12
+_NEAREST = 0.01  # of a height: what is nearer to the line weighs no more
+_LEAST_LINE = 0.05  # of the middle height: no line is below it
+_HOLD = 1e-4  # of all weights: holds the slopes of who keeps within a hundredth of a height
+_SHORT = 0.12  # in logs: 0.2 m of a person
+_USUAL_SDS = 5.0  # of a track's own noise from box to box
+_SD_OF_MEDIAN_CHANGE = 1.4826 / np.sqrt(2)  # a change is of two boxes
+
+
+@compiled
+def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
+    """Which points (T,) have a box that is too short: what it ends at are no feet.
+
+    None of a track with fewer than eight boxes; somebody hidden all along the way looks like a
+    small person, and is taken for one.
+
+    Args:
+        uv: feet (T, 2) in pixels.
+        top_v: upper edges of boxes (T,) in pixels, NaN where none is known.
+        bounds: of the N tracks (N + 1,).
+    """
+    short = np.zeros(top_v.size, dtype=np.bool_)
+    for track in range(bounds.size - 1):
+        first, beyond = bounds[track], bounds[track + 1]
+        boxed = np.empty(beyond - first, dtype=np.int64)
+        number = 0
+        for j in range(first, beyond):
+            if uv[j, 1] > top_v[j]:  # NaN is not
+                boxed[number] = j
+                number += 1
+        if number < _FEWEST:
+            continue
+        boxed = boxed[:number]
+        tall, across, down = np.empty(number), np.empty(number), np.empty(number)
+        for k in range(number):
+            tall[k] = uv[boxed[k], 1] - top_v[boxed[k]]
+        middle = float(np.median(tall))
+        for k in range(number):
+            tall[k] /= middle
+            across[k] = (uv[boxed[k], 0] - uv[boxed[0], 0]) / middle
+            down[k] = (top_v[boxed[k]] - top_v[boxed[0]]) / middle
+        off = _off_the_line(tall, across, down)
+        changes = np.abs(np.diff(off))
+        limit = max(_SHORT, _USUAL_SDS * _SD_OF_MEDIAN_CHANGE * float(np.median(changes)))
+        for k in range(number):
+            short[boxed[k]] = off[k] < -limit
+    return short
+
+
+@compiled
+def _off_the_line(tall: Array, across: Array, down: Array) -> Array:
+    """Logs (K,) of heights (K,) over a line in two coordinates (K,), (K,), a quantile of them."""
+    stride = -(-tall.size // _MOST)
+    some_tall, some_across, some_down = tall[::stride], across[::stride], down[::stride]
+    mean_across, mean_down = float(np.mean(some_across)), float(np.mean(some_down))
+    level, by_across, by_down = float(np.median(some_tall)), 0.0, 0.0
+    for _ in range(_ROUNDS):
+        # Weighted sums of products: of 1, the two coordinates, the height.
+        s, sa, sd, st = 0.0, 0.0, 0.0, 0.0
+        saa, sad, sdd, sat, sdt = 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(some_tall.size):
+            a, d, t = some_across[k] - mean_across, some_down[k] - mean_down, some_tall[k]
+            over = t / max(level + by_across * a + by_down * d, _LEAST_LINE) - 1
+            weight = (_QUANTILE if over > 0 else 1 - _QUANTILE) / max(abs(over), _NEAREST)
+            s += weight
+            sa += weight * a
+            sd += weight * d
+            st += weight * t
+            saa += weight * a * a
+            sad += weight * a * d
+            sdd += weight * d * d
+            sat += weight * a * t
+            sdt += weight * d * t
+        # About the weighted means two equations are left.
+        aa, ad = saa - sa * sa / s + _HOLD * s, sad - sa * sd / s
+        dd = sdd - sd * sd / s + _HOLD * s
+        at, dt = sat - sa * st / s, sdt - sd * st / s
+        determinant = aa * dd - ad * ad
+        by_across = (at * dd - dt * ad) / determinant
+        by_down = (dt * aa - at * ad) / determinant
+        level = (st - by_across * sa - by_down * sd) / s
+    off = np.empty(tall.size)
+    for k in range(tall.size):
+        line = level + by_across * (across[k] - mean_across) + by_down * (down[k] - mean_down)
+        off[k] = np.log(tall[k] / max(line, _LEAST_LINE))
+    return off
