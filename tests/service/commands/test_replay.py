@@ -48,7 +48,7 @@ def offline(once):
     def make(folder):
         text = surefoot(
             "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0",
-            "--speeds", "1.4", "--processes", "2", "--output", str(folder / "out.json"),
+            "--speeds", "1.4", "--processes", "1", "--output", str(folder / "out.json"),
             "--plot", str(folder / "out.png"), PYTHONPATH=path_to_small_trainings(folder),
         )  # fmt: skip
         (folder / "printed.txt").write_text(text)
@@ -89,6 +89,7 @@ def test_evaluate_knocks_a_scene_says_how_each_estimator_did_and_draws_it(tmp_pa
     surefoot(
         "evaluate", str(SCENES / "meva_g336_school"), "--seeds", "1", "--knocks", "knock",
         "--output", str(output), "--plots", str(plots),
+        PYTHONPATH=path_to_small_trainings(tmp_path),
     )  # fmt: skip
     outcomes = json.loads(output.read_text())["outcomes"]
     assert len(outcomes) == 6  # estimators
