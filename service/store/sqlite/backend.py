@@ -1,10 +1,13 @@
 """A store in an SQLite file: its connections, and one writer after the other."""
 
+import sqlite3
+import time
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy.exc import OperationalError
 
 from service.data_dir import make_file
 from service.store.sqlite.changes import Changes
@@ -13,6 +16,10 @@ from service.store.sqlite.prepared import Prepared
 from service.store.sqlite.turns import Turns
 
 _BEGIN = Prepared(text("BEGIN IMMEDIATE"))
+# SQLite asks for a lock that others have less and less often, every tenth of a second in the end:
+# where several processes write all the time, who has waited long is hardly ever there when it is
+# let go of. It is told to give up soon, and asked anew.
+_HASTY = Prepared(text("PRAGMA busy_timeout=10"))
 _WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
@@ -26,6 +33,7 @@ class Sqlite:
         self.reading = self.engine
         self.connections = connections
         self._patience_s = patience_s
+        self._patient = Prepared(text(_busy_timeout(patience_s)))
         self._turns = Turns("write")
 
     def turn(self) -> AbstractContextManager[None]:
@@ -37,8 +45,18 @@ class Sqlite:
         return self._turns.turn(self._patience_s)
 
     def begin(self, connection: Connection, about: str | None) -> None:
-        """Begin a transaction that writes: it holds the write lock from here on."""
-        _BEGIN.run(connection)
+        """Begin a transaction that writes: it holds the write lock from here on.
+
+        Raises:
+            OperationalError: other processes had it for longer than the patience lasts.
+        """
+        until_s = time.monotonic() + self._patience_s
+        _HASTY.run(connection)
+        try:
+            while not _begun(connection, until_s):
+                pass
+        finally:
+            self._patient.run(connection)
 
     def changes(self) -> Changes:
         """What tells whether anybody has changed the store."""
@@ -47,6 +65,22 @@ class Sqlite:
     def lock(self, name: str) -> FileLock:
         """A lock that one process of this machine has."""
         return FileLock(self._path.with_name(f"{name}.lock"))
+
+
+def _begun(connection: Connection, until_s: float) -> bool:
+    """Whether a transaction has begun; False where others write, and there is time to ask again."""
+    try:
+        _BEGIN.run(connection)
+    except OperationalError as error:
+        busy = getattr(error.orig, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
+        if not busy or time.monotonic() > until_s:
+            raise
+        return False
+    return True
+
+
+def _busy_timeout(patience_s: float) -> str:
+    return f"PRAGMA busy_timeout={round(patience_s * 1000)}"
 
 
 def sqlite_engine(url: str, patience_s: float, connections: int) -> Engine:
@@ -68,7 +102,7 @@ def _prepare(connection: Any, patience_s: float) -> None:
     # The same isolation as the job engine's own connections: reads outside a transaction see the
     # newest commit, the first write takes the write lock at once.
     connection.isolation_level = "IMMEDIATE"
-    connection.execute(f"PRAGMA busy_timeout={round(patience_s * 1000)}")
+    connection.execute(_busy_timeout(patience_s))
     # Before its first page is written: retention gives pages back to the disk. Asked of a file
     # that has pages, it waits for whoever writes, and readers must not.
     if connection.execute("PRAGMA page_count").fetchone() == (0,):
