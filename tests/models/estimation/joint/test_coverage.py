@@ -12,7 +12,7 @@ from models.simulation.knocked import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import PRIOR, seen, tracks_of
 
-SITES = 20
+SITES = 14
 FEW, MANY = 50, 200
 
 
@@ -33,7 +33,7 @@ def test_intervals_cover_and_errors_fall_as_their_bound_does():
             errors[site, place] = estimate.values - plane_parameters_of(knocked)
             sds[site, place] = np.sqrt(np.diag(estimate.covariance))
             bounds[site, place] = np.sqrt(np.diag(estimate.bound))
-    # 90 % is stated; 120 intervals of three times 20 sites that share much.
+    # 90 % is stated; 84 intervals of three times 14 sites that share much.
     assert 0.84 < np.mean(np.abs(errors) < 1.645 * sds) < 0.99
     few_rms, many_rms = np.sqrt((errors**2).mean(axis=0))
     assert (many_rms / few_rms < 0.8).all()  # a half, were the site known exactly
