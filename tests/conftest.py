@@ -22,6 +22,7 @@ from tests.stores import databases, server
 os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
 
 ROOT = Path(__file__).parents[1]
+SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 CAMERA: dict[str, Any] = {
     "id": "corner",
     "name": "The corner",

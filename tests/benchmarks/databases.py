@@ -13,26 +13,29 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 import psutil
 from rich.console import Console
 from rich.table import Table
 
-from service.commands.migrate import migrate
-from service.settings import Settings
-from tests.benchmarks.requests import KINDS, Bodies, Kind, ask, gets, posts
-from tests.conftest import CAMERA
-from tests.running import RunningService, free_port
+from tests.benchmarks.requests import (
+    CLIENTS,
+    KINDS,
+    Bodies,
+    Kind,
+    api_over,
+    ask,
+    gets,
+    posts,
+    register_cameras,
+)
+from tests.running import RunningService
 from tests.stores.server import Server
-
-_CAMERAS = 8  # that the requests go to
-_CLIENTS = 16
 
 
 def _posts_and_poses() -> Bodies:
@@ -40,40 +43,18 @@ def _posts_and_poses() -> Bodies:
 
 
 _KINDS = [
-    *(kind for kind in KINDS if kind.clients == _CLIENTS),
-    Kind(name="a track and a pose in turns", clients=_CLIENTS, asks=_posts_and_poses),
+    *(kind for kind in KINDS if kind.clients == CLIENTS),
+    Kind(name="a track and a pose in turns", clients=CLIENTS, asks=_posts_and_poses),
 ]
 _SQLITE, _ONE, _TWO = "SQLite", "PostgreSQL, one API", "PostgreSQL, two APIs"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
+class Measured(NamedTuple):
     """Answers a second, and CPU of an answer: of the APIs, and of the database's own processes."""
 
     per_s: float
     api_ms: float
     server_ms: float
-
-
-@contextmanager
-def running(folder: Path, url: str | None) -> Iterator[RunningService]:
-    """An API without workers over a database; the clients are one address, which has no limit."""
-    settings = Settings(
-        data_dir=folder / "data",
-        database_url=url,
-        port=free_port(),
-        workers=0,
-        caller_rate=0,
-        camera_rate=0,
-    )
-    folder.mkdir()
-    migrate(settings)
-    service = RunningService(settings, forked=False)
-    service.start()
-    try:
-        yield service
-    finally:
-        service.stop()
 
 
 def cpu_s(pids: list[int]) -> float:
@@ -106,15 +87,6 @@ def measure(
     )
 
 
-def middle(found: list[Measured]) -> Measured:
-    """Of several rounds."""
-    return Measured(
-        per_s=median(each.per_s for each in found),
-        api_ms=median(each.api_ms for each in found),
-        server_ms=median(each.server_ms for each in found),
-    )
-
-
 def main() -> None:
     """Measure in rounds, and print a table, or JSON."""
     asked = argparse.ArgumentParser(description=__doc__)
@@ -127,13 +99,11 @@ def main() -> None:
         server = Server(durable=True)
         server.start()
         stack.callback(server.remove)
-        sqlite = stack.enter_context(running(folder / "sqlite", None))
-        first = stack.enter_context(running(folder / "first", server.url()))
-        second = stack.enter_context(running(folder / "second", server.url()))
+        sqlite = stack.enter_context(api_over(folder / "sqlite", None))
+        first = stack.enter_context(api_over(folder / "first", server.url()))
+        second = stack.enter_context(api_over(folder / "second", server.url()))
         for service in (sqlite, first):
-            for number in range(_CAMERAS):
-                body = {**CAMERA, "id": f"cost-{number}"}
-                service.http.post("/cameras", json=body).raise_for_status()
+            register_cameras(service)
         arrangements = {
             _SQLITE: ([sqlite], None),
             _ONE: ([first], server.pid),
@@ -147,7 +117,10 @@ def main() -> None:
             }
             for _ in range(wanted.rounds)
         ]
-    found = {key: middle([each[key] for each in rounds]) for key in rounds[0]}
+    found = {
+        key: Measured(*map(median, zip(*(each[key] for each in rounds), strict=True)))
+        for key in rounds[0]
+    }
     table = Table("request", "on", "a second", "of SQLite's", "CPU ms, API", "CPU ms, server")
     told = []
     for (kind, name), each in found.items():

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -28,7 +29,7 @@ from tests.benchmarks.http_client import Connection
 from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
 
-_CLIENTS = 16
+CLIENTS = 16
 _BATCH = 50
 _CAMERAS = 8
 
@@ -78,20 +79,51 @@ KINDS = (
     Kind(name="/healthz", clients=1, asks=gets("/healthz")),
     Kind(name="a pose", clients=1, asks=gets("/cameras/{}/pose"), aim_ms=1 / 1.5),
     Kind(
-        name=f"a pose, {_CLIENTS} clients",
-        clients=_CLIENTS,
+        name=f"a pose, {CLIENTS} clients",
+        clients=CLIENTS,
         asks=gets("/cameras/{}/pose"),
         aim_ms=1 / 1.5,
     ),
     Kind(name="a track", clients=1, asks=posts(1), aim_ms=1.0),
     Kind(
-        name=f"a track, {_CLIENTS} clients",
-        clients=_CLIENTS,
+        name=f"a track, {CLIENTS} clients",
+        clients=CLIENTS,
         asks=posts(1),
         aim_ms=1.0,
     ),
     Kind(name=f"{_BATCH} tracks", clients=1, asks=posts(_BATCH), aim_ms=_BATCH / 5),
 )
+
+
+@contextmanager
+def api_over(folder: Path, database_url: str | None = None) -> Iterator[RunningService]:
+    """An API without workers, with its data in a folder; the cameras are not registered yet.
+
+    The clients are one address, and nobody looks at what they post: no rate is limited.
+    """
+    settings = Settings(
+        data_dir=folder / "data",
+        database_url=database_url,
+        port=free_port(),
+        workers=0,
+        caller_rate=0,
+        camera_rate=0,
+    )
+    folder.mkdir(exist_ok=True)
+    migrate(settings)
+    service = RunningService(settings, forked=False)
+    service.start()
+    try:
+        yield service
+    finally:
+        service.stop()
+
+
+def register_cameras(service: RunningService) -> None:
+    """Those that the requests go to."""
+    for number in range(_CAMERAS):
+        body = {**CAMERA, "id": f"cost-{number}"}
+        service.http.post("/cameras", json=body).raise_for_status()
 
 
 async def ask(ports: Sequence[int], kind: Kind, requests: int) -> None:
@@ -124,23 +156,13 @@ def main() -> None:
     asked.add_argument("--json", action="store_true")
     wanted = asked.parse_args()
     least = bare_ms(wanted.requests)
-    with tempfile.TemporaryDirectory(prefix="surefoot-requests-") as folder:
-        # The clients are one address, and nobody looks at what they post.
-        rates = {"caller_rate": 0, "camera_rate": 0}
-        settings = Settings(data_dir=Path(folder) / "data", port=free_port(), workers=0, **rates)
-        migrate(settings)
-        service = RunningService(settings, forked=False)
-        service.start()
-        try:
-            for n in range(_CAMERAS):
-                body = {**CAMERA, "id": f"cost-{n}"}
-                service.http.post("/cameras", json=body).raise_for_status()
-            process = psutil.Process(service.process.pid)
-            found = {
-                kind.name: cpu_ms(process, settings.port, kind, wanted.requests) for kind in KINDS
-            }
-        finally:
-            service.stop()
+    with (
+        tempfile.TemporaryDirectory(prefix="surefoot-requests-") as folder,
+        api_over(Path(folder)) as service,
+    ):
+        register_cameras(service)
+        process, port = psutil.Process(service.process.pid), service.settings.port
+        found = {kind.name: cpu_ms(process, port, kind, wanted.requests) for kind in KINDS}
     if wanted.json:
         json.dump({"bare_fastapi_ms": least, "cpu_ms": found}, sys.stdout, indent=1)
         return

@@ -1,9 +1,7 @@
 """An estimate that begins where the last one ended comes to the same as one of all poses."""
 
 import math
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,9 +21,9 @@ from models.recalibration import (
 from models.simulation.knocked import Knock, knock_trajectory
 from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import by_end
+from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 
-SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 LONG = SCENES.parent / "long"
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 WINDOW, STEP = 160, 10

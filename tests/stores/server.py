@@ -66,7 +66,7 @@ class Server:
         self.folder = Path(
             tempfile.mkdtemp(prefix="surefoot-postgresql-", dir=None if durable else _where())
         )
-        self._options = dict(_FOUND if durable else {**_FOUND, **_HASTE})
+        self._options = _FOUND if durable else {**_FOUND, **_HASTE}
         self._user = _NOBODY if os.getuid() == 0 else None
         if self._user is not None:
             who = pwd.getpwnam(self._user)

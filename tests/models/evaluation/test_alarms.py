@@ -1,9 +1,7 @@
 """How alarms are measured: renewals, delays and rates by hand; a year of habits."""
 
 import math
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,9 +24,9 @@ from models.evaluation.scenes import load_scene
 from models.geometry.ground import ground_from_pixel
 from models.simulation.habits import DAY_S, HabitConfig, walk_days
 from models.simulation.site import SiteConfig, draw_lanes
+from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 
-SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 QUIET = SiteConfig(noise_px=0.0, standing_share=0.0, between_sd=0.0, within_sd=0.0)
 EVEN = HabitConfig(
     evenness=1e9, rain_share=0.0, crowd_share=0.0, day_sd=0.0, season=0.0, weekend_faster=0.0

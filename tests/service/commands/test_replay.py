@@ -5,17 +5,14 @@ import math
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from models.evaluation.scenes import load_scene
 from service.cli import app
-from tests.conftest import path_to_small_trainings
+from tests.conftest import SCENES, path_to_small_trainings
 from tests.running import wait_for
-
-SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 
 pytestmark = [
     pytest.mark.slow,

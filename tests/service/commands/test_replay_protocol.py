@@ -1,11 +1,9 @@
 """The protocol over HTTP and offline: one recorded scene, the same printed digits."""
 
 import math
-import os
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +23,8 @@ from models.geometry.upright import tops_of_boxes
 from models.recalibration import estimate_pose, learn_site, observe
 from models.trajectory import Trajectory
 from service.commands.replay_protocol import boxes_of, tops_carried
+from tests.conftest import SCENES
 
-SCENES = Path(os.environ.get("SUREFOOT_TEST_SCENES", "../shared/scenes")).resolve()
 # Cases in which boxes can say every upper edge that offline knows; the second tells its heading.
 CASES = [("pets2009_s2l1_v001_sort", "knock", 2), ("wildtrack_c1", "pan", 3)]
 
