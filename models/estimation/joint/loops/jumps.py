@@ -35,8 +35,9 @@ def jumped(time_s: Array, uv: Array, bounds: npt.NDArray[np.int64], image_height
         first, beyond = bounds[track], bounds[track + 1]
         if beyond - first < _FEWEST:
             continue
-        seconds = np.diff(time_s[first:beyond])
-        rate = np.diff(uv[first:beyond, 1].copy()) / seconds
+        # Differences by slices: np.diff takes a second to compile, here as elsewhere.
+        seconds = time_s[first + 1 : beyond] - time_s[first : beyond - 1]
+        rate = (uv[first + 1 : beyond, 1] - uv[first : beyond - 1, 1]) / seconds
         change, count = np.empty(rate.size), rate.size
         least, largest = _LEAST * image_height, 0.0
         for j in range(count):

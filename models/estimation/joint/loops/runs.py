@@ -37,7 +37,7 @@ def runs_of_tracks(
         first, beyond = bounds[track], bounds[track + 1]
         gap_s = longest_gap_s
         if beyond - first > 1:
-            usual_s = float(np.median(np.diff(time_s[first:beyond])))
+            usual_s = float(np.median(time_s[first + 1 : beyond] - time_s[first : beyond - 1]))
             gap_s = max(_USUAL_GAPS * usual_s, longest_gap_s)
         begin = first
         for j in range(first + 1, beyond + 1):
@@ -87,7 +87,10 @@ def nodes_of_runs(
         if count < 1:
             continue
         duration_s = time_s[beyond - 1] - time_s[begin]
-        reach_s = max(kernel_s, 1.01 * float(np.median(np.diff(time_s[begin:beyond]))))
+        reach_s = max(
+            kernel_s,
+            1.01 * float(np.median(time_s[begin + 1 : beyond] - time_s[begin : beyond - 1])),
+        )
         boxed = 0
         for j in range(begin, beyond):
             boxed += np.isfinite(tall[j])

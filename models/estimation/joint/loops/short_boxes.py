@@ -59,7 +59,7 @@ def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
             across[k] = (uv[boxed[k], 0] - uv[boxed[0], 0]) / middle
             down[k] = (top_v[boxed[k]] - top_v[boxed[0]]) / middle
         off = _off_the_line(tall, across, down)
-        changes = np.abs(np.diff(off))
+        changes = np.abs(off[1:] - off[:-1])
         limit = max(_SHORT, _USUAL_SDS * _SD_OF_MEDIAN_CHANGE * float(np.median(changes)))
         for k in range(number):
             short[boxed[k]] = off[k] < -limit
