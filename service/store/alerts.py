@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import and_, bindparam, delete, exists, not_, select
+from sqlalchemy import and_, bindparam, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertKind, AlertState, Outcome
+from service.store.database.deleting import delete_some
 from service.store.tables.alerts import AlertRecord
 
 POSE_KINDS = (
@@ -180,5 +181,4 @@ def forget(session: Session, before: datetime, limit: int) -> int:
         .where(AlertRecord.state == AlertState.RESOLVED, AlertRecord.resolved_at < before)
         .limit(limit)
     )
-    result = session.execute(delete(AlertRecord).where(AlertRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, AlertRecord.id, bite)

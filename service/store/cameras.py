@@ -3,9 +3,10 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, Integer, bindparam, delete, func, select, type_coerce
+from sqlalchemy import Connection, Integer, bindparam, func, select, type_coerce
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.metrics import newest_of
 from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
@@ -141,8 +142,7 @@ def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int
         )
         .limit(limit)
     )
-    result = session.execute(delete(PriorPoseRecord).where(PriorPoseRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, PriorPoseRecord.id, bite)
 
 
 def due(session: Session) -> Sequence[CameraRecord]:

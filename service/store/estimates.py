@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, delete, func, select
+from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.tables.estimates import EstimateRecord
 
 
@@ -61,8 +62,7 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
         .subquery()
     )
     bite = select(surplus.c.id).order_by(surplus.c.id).limit(limit)
-    result = session.execute(delete(EstimateRecord).where(EstimateRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, EstimateRecord.id, bite)
 
 
 def _made_between(

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import bindparam, delete, func, select
+from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.tables.attendance import MaintenanceRecord
 
 _UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
@@ -59,5 +60,4 @@ def forget(session: Session, camera_id: str, before: datetime, limit: int) -> in
         .where(MaintenanceRecord.camera_id == camera_id, before > _UNTIL)
         .limit(limit)
     )
-    result = session.execute(delete(MaintenanceRecord).where(MaintenanceRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, MaintenanceRecord.id, bite)

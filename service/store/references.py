@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import Connection, Select, bindparam, delete, exists, func, select, update
+from sqlalchemy import Connection, Select, bindparam, exists, func, select, update
 from sqlalchemy.orm import Session, aliased, defer
 
+from service.store.database.deleting import delete_some
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 
@@ -61,8 +62,7 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
         .where(SiteReferenceRecord.id.in_(surplus), ~named.where(of_camera))
         .limit(limit)
     )
-    result = session.execute(delete(SiteReferenceRecord).where(SiteReferenceRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, SiteReferenceRecord.id, bite)
 
 
 def _newest(camera_id: str) -> Select[SiteReferenceRecord]:

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-from sqlalchemy import bindparam, delete, select
+from sqlalchemy import bindparam, select
 from sqlalchemy.orm import Session
 
 from service.kinds import TrainingState
+from service.store.database.deleting import delete_some
 from service.store.tables.trainings import ModelRecord, TrainingRecord, WeightsRecord
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
@@ -82,8 +83,7 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
         )
         .limit(limit)
     )
-    result = session.execute(delete(TrainingRecord).where(TrainingRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, TrainingRecord.id, bite)
 
 
 def weights_in_use(session: Session) -> set[str]:
@@ -110,8 +110,7 @@ def forget_weights(session: Session, limit: int) -> int:
     """Delete up to `limit` of the weights that no model names. Returns how many."""
     unused = WeightsRecord.sha256.not_in(select(ModelRecord.weights_sha256))
     bite = select(WeightsRecord.sha256).where(unused).limit(limit)
-    result = session.execute(delete(WeightsRecord).where(WeightsRecord.sha256.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, WeightsRecord.sha256, bite)
 
 
 def model_exists(session: Session, model_id: str) -> bool:

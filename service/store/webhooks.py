@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, delete, exists, func, or_, select, update
+from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.kinds import AlertState, DeliveryState
+from service.store.database.deleting import delete_some
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
@@ -139,8 +140,7 @@ def give_up(session: Session, before: datetime, now: datetime, limit: int) -> in
 def forget(session: Session, before: datetime, limit: int) -> int:
     """Delete up to `limit` deliveries that ended before a time, with attempts; how many."""
     bite = select(DeliveryRecord.number).where(DeliveryRecord.finished_at < before).limit(limit)
-    result = session.execute(delete(DeliveryRecord).where(DeliveryRecord.number.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, DeliveryRecord.number, bite)
 
 
 def forget_old_secrets(session: Session, now: datetime, limit: int) -> int:

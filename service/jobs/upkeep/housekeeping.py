@@ -3,6 +3,7 @@
 import logging
 import time
 from datetime import timedelta
+from functools import partial
 
 from sqlalchemy.orm import Session
 
@@ -68,15 +69,24 @@ def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
             deliveries.reconcile_webhook(session, context.queue, webhook_id)
     most = _CAMERAS_HZ * context.settings.reconcile_s
     for camera_id in context.reconciled.take(ids, most):
-        # One transaction a camera, so that posts never wait long for the write lock.
-        with context.store.write(camera_id) as session:
-            found = reconciliation.reconcile_camera(
-                session, context.queue, context.settings, camera_id, context.steps
-            )
+        # A transaction a camera, so that posts never wait long for the write lock; most cameras
+        # are as they should be.
+        found = context.store.write_if_needed(
+            camera_id, partial(_reconcile_camera, context, camera_id)
+        )
         for reason in found:
             log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
-    with context.store.write() as session:
-        reconciliation.reconcile_alerts(session)
-        changed = stale.watch(session, context.settings)
+    changed = context.store.write_if_needed(None, partial(_reconcile_alerts, context, stale))
     for camera_id, change in changed.items():
         log.warning("stale", extra={"camera_id": camera_id, "alert": change})
+
+
+def _reconcile_camera(context: JobContext, camera_id: str, session: Session) -> list[str]:
+    return reconciliation.reconcile_camera(
+        session, context.queue, context.settings, camera_id, context.steps
+    )
+
+
+def _reconcile_alerts(context: JobContext, stale: StaleWatch, session: Session) -> dict[str, str]:
+    reconciliation.reconcile_alerts(session)
+    return stale.watch(session, context.settings)

@@ -1,15 +1,18 @@
 """Sessions of the store, on SQLite or on PostgreSQL."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from sqlalchemy import Connection, Engine
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from service.data_dir import make_private
 from service.settings import Settings
 from service.store.sqlite.backend import Sqlite, sqlite_engine
+
+R = TypeVar("R")
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
 _CONNECTIONS = 15
@@ -37,6 +40,12 @@ class Backend(Protocol):
 
     def begin(self, connection: Connection, about: str | None) -> None:
         """Begin to write upon what the transaction is about; None is everything."""
+
+    def looking(self) -> AbstractContextManager[Connection | None]:
+        """A connection that refuses to write; None where writers keep nobody else from it."""
+
+    def refused(self, error: DBAPIError) -> bool:
+        """Whether an error says that a connection was only to look."""
 
     def changes(self) -> Watcher:
         """What tells whether anybody has changed the store."""
@@ -104,6 +113,28 @@ class Store:
             self._backend.begin(session.connection(), about)
             yield session
             session.commit()
+
+    def write_if_needed(self, about: str | None, do: Callable[[Session], R]) -> R:
+        """What comes of something that hardly ever writes: it is tried without keeping anybody out.
+
+        Args:
+            about: as of `write`.
+            do: where it turns out to write, nothing of it is kept, and it is done again in a
+                session of `write`.
+
+        Raises:
+            OverloadedError: it writes, and the turn did not come in time.
+        """
+        with self._backend.looking() as connection:
+            if connection is not None:
+                try:
+                    with joined(connection) as session:
+                        return do(session)
+                except DBAPIError as error:
+                    if not self._backend.refused(error):
+                        raise
+        with self.write(about) as session:
+            return do(session)
 
     @contextmanager
     def change(self, about: str | None = None) -> Iterator[Connection]:

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.database.following import mark_entry, settled
 from service.store.tables.activity import ActivityRecord
 
@@ -55,5 +56,4 @@ def forget(session: Session, before: datetime, limit: int) -> int:
         .order_by(ActivityRecord.id)
         .limit(limit)
     )
-    result = session.execute(delete(ActivityRecord).where(ActivityRecord.id.in_(oldest)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, ActivityRecord.id, oldest)

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import delete, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.kinds import EventType
+from service.store.database.deleting import delete_some
 from service.store.database.following import mark_entry, newest_settled, settled
 from service.store.tables.operation import EventRecord
 
@@ -34,5 +35,4 @@ def forget(session: Session, keep: int, limit: int) -> int:
     newest = select(EventRecord.id).order_by(EventRecord.id.desc()).offset(keep).limit(1)
     surplus = select(EventRecord.id).where(EventRecord.id <= newest.scalar_subquery())
     bite = surplus.order_by(EventRecord.id).limit(limit)
-    result = session.execute(delete(EventRecord).where(EventRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, EventRecord.id, bite)

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
-from sqlalchemy.exc import InvalidatePoolError
+from sqlalchemy.exc import DBAPIError, InvalidatePoolError
 
 from service.store.postgresql.keys import LOCKS, lock_key
 from service.store.postgresql.server_lock import ServerLock
@@ -73,6 +73,14 @@ class Postgresql:
             connection.execute(_UPON_ALL, values)
         else:
             connection.execute(_UPON_ONE, {**values, "one": lock_key(about)})
+
+    def looking(self) -> AbstractContextManager[None]:
+        """None: who writes about one thing keeps nobody from another."""
+        return nullcontext()
+
+    def refused(self, error: DBAPIError) -> bool:
+        """Never: no connection is only to look."""
+        return False
 
     def changes(self) -> "Unwatched":
         """What tells whether anybody has changed the store."""

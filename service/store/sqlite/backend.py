@@ -2,12 +2,13 @@
 
 import sqlite3
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DBAPIError, OperationalError
 
 from service.data_dir import make_file
 from service.store.sqlite.changes import Changes
@@ -20,6 +21,9 @@ _BEGIN = Prepared(text("BEGIN IMMEDIATE"))
 # where several processes write all the time, who has waited long is hardly ever there when it is
 # let go of. It is told to give up soon, and asked anew.
 _HASTY = Prepared(text("PRAGMA busy_timeout=10"))
+_LOOK_ONLY, _LOOK_AND_WRITE = (
+    Prepared(text(f"PRAGMA query_only={state}")) for state in ("ON", "OFF")
+)
 _WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
 
 
@@ -58,6 +62,21 @@ class Sqlite:
         finally:
             self._patient.run(connection)
 
+    @contextmanager
+    def looking(self) -> Iterator[Connection]:
+        """A connection that refuses to write: nobody is kept from writing by it."""
+        with self.engine.connect() as connection:
+            _LOOK_ONLY.run(connection)
+            try:
+                yield connection
+            finally:
+                connection.rollback()
+                _LOOK_AND_WRITE.run(connection)
+
+    def refused(self, error: DBAPIError) -> bool:
+        """Whether an error says that a connection was only to look."""
+        return _is(error, sqlite3.SQLITE_READONLY)
+
     def changes(self) -> Changes:
         """What tells whether anybody has changed the store."""
         return Changes(self._path)
@@ -72,11 +91,14 @@ def _begun(connection: Connection, until_s: float) -> bool:
     try:
         _BEGIN.run(connection)
     except OperationalError as error:
-        busy = getattr(error.orig, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
-        if not busy or time.monotonic() > until_s:
+        if not _is(error, sqlite3.SQLITE_BUSY) or time.monotonic() > until_s:
             raise
         return False
     return True
+
+
+def _is(error: DBAPIError, code: int) -> bool:
+    return getattr(error.orig, "sqlite_errorcode", 0) & 0xFF == code
 
 
 def _busy_timeout(patience_s: float) -> str:

@@ -1,8 +1,9 @@
 """Statements on how much space tracks take."""
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.tables.tracks import TrackRecord
 from service.store.tracks.counting import bytes_of_track, of_counting_source
 
@@ -23,5 +24,4 @@ def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int)
     surplus = (
         select(sized.c.id).where(sized.c.together > most_bytes).order_by(sized.c.id).limit(limit)
     )
-    result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(surplus)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, TrackRecord.id, surplus)

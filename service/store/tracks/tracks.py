@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, delete, func, select
+from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, func, select
 from sqlalchemy.orm import Session
 
+from service.store.database.deleting import delete_some
 from service.store.database.dialects import new_rows
 from service.store.sqlite.prepared import Prepared
 from service.store.tables.cameras import CameraRecord
@@ -156,8 +157,7 @@ def forget(session: Session, camera_id: str, before: datetime, keep: int, limit:
     """
     outlived = _outlived(camera_id, before, keep)
     bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
-    result = session.execute(delete(TrackRecord).where(TrackRecord.id.in_(bite)))
-    return int(result.rowcount)  # type: ignore[attr-defined]
+    return delete_some(session, TrackRecord.id, bite)
 
 
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:

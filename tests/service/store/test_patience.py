@@ -8,8 +8,14 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
+from service.alerting.staleness import StaleWatch
+from service.job_queue import JobQueue
+from service.jobs.context import JobContext
+from service.jobs.upkeep.housekeeping import run_reconcile
+from service.jobs.upkeep.limits import limits_of_camera
 from service.store.database.store import Store
 from tests.stores.databases import only_sqlite
+from tests.stores.rows import put_rows, row_of
 
 pytestmark = only_sqlite("a server has its own queue of who waits for a lock")
 _WRITTEN = text("INSERT OR REPLACE INTO store_probes VALUES (1, datetime('now'))")
@@ -67,3 +73,56 @@ def test_what_is_no_lack_of_patience_is_told_at_once(store, other):
     # Inside a transaction there is no other: no time makes it possible.
     with store.write() as session, pytest.raises(OperationalError, match="within a transaction"):
         store._backend.begin(session.connection(), None)
+
+
+def test_what_hardly_ever_writes_waits_for_nobody_where_it_does_not(store, other):
+    def count(session):
+        return session.execute(text("SELECT count(*) FROM store_probes")).scalar()
+
+    assert store.write_if_needed("corner", count) == 0
+    assert other.in_transaction
+
+
+def test_and_where_it_writes_it_is_done_again_in_its_turn(store, other):
+    begun = []
+
+    def write(session):
+        begun.append(session.execute(text("SELECT count(*) FROM store_probes")).scalar())
+        session.execute(_WRITTEN)
+        return "written"
+
+    with pytest.raises(OperationalError, match="locked"):
+        store.write_if_needed("corner", write)
+    other.execute("COMMIT")
+    assert store.write_if_needed("corner", write) == "written"
+    assert begun == [0, 0, 0]  # where the lock was not had, it was not begun
+    with store.write() as session:  # by a connection that was only to look before
+        session.execute(_WRITTEN)
+
+
+def test_what_goes_wrong_while_looking_is_told_and_not_tried_again(store, other):
+    tries = []
+
+    def ask(session):
+        tries.append(session)
+        session.execute(text("SELECT 1 FROM nowhere"))
+
+    with pytest.raises(OperationalError, match="no such table"):
+        store.write_if_needed("corner", ask)
+    assert len(tries) == 1
+
+
+def test_upkeep_that_finds_nothing_to_do_waits_for_nobody(settings, store, other):
+    other.execute("COMMIT")
+    with store.change() as connection:
+        put_rows(connection, "cameras", [row_of("cameras", id="corner")])
+        put_rows(connection, "prior_poses", [row_of("prior_poses", camera_id="corner")])
+    other.execute("BEGIN IMMEDIATE")
+    context = JobContext(
+        settings=settings.model_copy(update={"trainings": "off"}),
+        store=store,
+        queue=JobQueue(store.engine),
+    )
+    run_reconcile(context, StaleWatch())
+    for limit in limits_of_camera(settings, "corner"):
+        assert store.write_if_needed("corner", limit.bite) == 0, limit.name
