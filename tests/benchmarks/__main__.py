@@ -23,8 +23,8 @@ from rich.table import Table
 # What each is asked beside its name: here all are to end within some minutes.
 BENCHMARKS: dict[str, tuple[str, ...]] = {
     "refresh": (),
-    "joint": (),
-    "registration": (),
+    "estimators": (),
+    "first_estimate": (),
     "requests": ("--json",),
     "start": (),
     "idle": ("--cameras", "500", "--minutes", "1"),
