@@ -157,6 +157,7 @@ def main() -> int:
             trainings="off",  # the served pose needs none
             caller_rate=0,  # all cameras have one address here
             connections_per_address=0,
+            max_connections=2 * wanted.cameras + 100,
         )
         walks = seed(settings, wanted.cameras)
         service = RunningService(settings, forked=False)
