@@ -19,7 +19,7 @@ from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
 
 _FEWEST = 150  # tracks: of fewer a full search is soon made, and each of them counts for much
-_NEW = 0.25  # of the window
+_NEW = 0.5  # of the window: with a quarter, estimates are as near to those of all poses
 _FARTHEST = 1.0  # standard deviations that a few new tracks move a pose by
 _WIDER = 1.25  # times the standard deviation
 _WORSE = 10.0  # of the log likelihood: other ends are of some 40 less, or known
