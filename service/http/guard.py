@@ -17,7 +17,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
 from service.access.callers import Caller
-from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
+from service.errors import (
+    ForbiddenError,
+    NotFoundError,
+    ServiceError,
+    TooManyRequestsError,
+    UnauthorizedError,
+)
 from service.http.lanes import LOOKUPS
 from service.http.pages import STATIC_URL
 from service.http.reach import auth_on
@@ -56,6 +62,7 @@ class GuardMiddleware:
 
         Raises:
             UnauthorizedError: nobody is known to ask.
+            NotFoundError: the path has a name in it that nothing can have.
             ForbiddenError: who asks may not do this.
             TooManyRequestsError: too many tokens from there were none.
         """
@@ -77,6 +84,8 @@ class GuardMiddleware:
                 return
         elif scope["path"] == _TOLD_MORE and "authorization" in request.headers:
             await self._recognise(request)
+        if "\0" in scope["path"]:  # to ask PostgreSQL for one is an error
+            raise NotFoundError("path: nothing has a name with a NUL character in it")
         await self._app(scope, receive, send)
 
     async def _recognise(self, request: Request) -> None:

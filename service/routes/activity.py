@@ -9,6 +9,7 @@ from fastapi.responses import Response, StreamingResponse
 from service.access.activity import list_activity
 from service.http.dependencies import AppState, StateDep
 from service.schemas.activity import ActivityPage, EntryOut
+from service.schemas.base import Text
 
 router = APIRouter(tags=["operation"])
 
@@ -24,7 +25,7 @@ _MOST_ID = 2**63 - 1
 )
 def show(
     state: StateDep,
-    camera_id: str | None = None,
+    camera_id: Text | None = None,
     after: Annotated[int, Query(ge=0, le=_MOST_ID)] = 0,
     limit: Annotated[int | None, Query(ge=1, le=1000)] = None,
     accept: Annotated[str, Header()] = "",

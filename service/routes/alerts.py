@@ -17,6 +17,7 @@ from service.schemas.alerts import (
     ResolveBody,
     SilenceBody,
 )
+from service.schemas.base import Text
 from service.store.alerts import AlertFilter
 from service.store.tables.alerts import AlertRecord
 
@@ -27,8 +28,8 @@ router = APIRouter(prefix="/alerts", tags=["alerts"])
 def list_all(
     session: ReadDep,
     state: AlertState | None = None,
-    camera_id: str | None = None,
-    group_id: str | None = None,
+    camera_id: Text | None = None,
+    group_id: Text | None = None,
     acknowledged: bool | None = None,
     silenced: bool | None = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,

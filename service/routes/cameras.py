@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Response
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange
 from service.http.dependencies import EtagDep, ReadDep, StateDep, WriteDep
+from service.schemas.base import Text
 from service.schemas.cameras.cameras import CameraBody, CameraOut, CameraPage, CameraPatch
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
@@ -23,7 +24,7 @@ def register(body: CameraBody, state: StateDep, session: WriteDep, response: Res
 
 @router.get("")
 def list_all(
-    session: ReadDep, cursor: str = "", limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    session: ReadDep, cursor: Text = "", limit: Annotated[int, Query(ge=1, le=1000)] = 100
 ) -> CameraPage:
     """Cameras in order of their ids; `next_cursor` leads to the next page."""
     views = cameras.list_cameras(session, cursor, limit + 1)

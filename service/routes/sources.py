@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from service.cameras import sources
 from service.http.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.schemas.base import Text
 from service.schemas.cameras.sources import SourceList, SourceOut, UseBody
 
 router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
@@ -34,7 +35,7 @@ def use(
 
 @router.delete("/{source:path}", status_code=204)
 def remove(
-    camera_id: str, source: str, session: WriteDep, actor: ActorDep, by: str | None = None
+    camera_id: str, source: str, session: WriteDep, actor: ActorDep, by: Text | None = None
 ) -> None:
     """Delete a source that does not count, with its tracks."""
     sources.remove_source(session, camera_id, source, name_of(actor, by))

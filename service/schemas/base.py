@@ -23,9 +23,17 @@ def _checked_moment(value: datetime) -> datetime:
     return value
 
 
+def _without_nul(value: str) -> str:
+    # PostgreSQL has no text with one.
+    if "\0" in value:
+        raise ValueError("text without NUL characters is needed")
+    return value
+
+
 Moment = Annotated[AwareDatetime, AfterValidator(_checked_moment)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Text = Annotated[str, AfterValidator(_without_nul)]
 Who = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
 
@@ -37,9 +45,7 @@ class Body(BaseModel):
     @field_validator("*")
     @classmethod
     def _no_nul(cls, value: object) -> object:
-        if isinstance(value, str) and "\0" in value:
-            raise ValueError("text without NUL characters is needed")
-        return value
+        return _without_nul(value) if isinstance(value, str) else value
 
 
 CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]

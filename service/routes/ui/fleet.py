@@ -8,6 +8,7 @@ from fastapi.responses import HTMLResponse
 
 from service.http.dependencies import ReadDep, StateDep
 from service.http.pages import render
+from service.schemas.base import Text
 from service.views import fleet, operation
 from service.web.rows import banners_of, counts_of, rows_of, urgent
 
@@ -37,7 +38,7 @@ def rows(
     request: Request,
     state: StateDep,
     session: ReadDep,
-    ids: Annotated[str | None, Query(max_length=20_000)] = None,
+    ids: Annotated[Text | None, Query(max_length=20_000)] = None,
 ) -> HTMLResponse:
     """The rows of some cameras, or of all; one that is gone has none."""
     wanted = None if ids is None else set(ids.split(","))

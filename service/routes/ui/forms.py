@@ -26,6 +26,7 @@ async def read_form(request: Request) -> Form:
     Raises:
         UnsupportedMediaTypeError: it is no form.
         TooLargeError: more than a form of ours has.
+        MalformedError: it cannot be read, or has NUL characters in it.
     """
     media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if media_type != _TYPE:
@@ -36,9 +37,13 @@ async def read_form(request: Request) -> Form:
         if len(body) > _MOST_BYTES:
             raise TooLargeError(f"body: at most {_MOST_BYTES} bytes of a form are taken")
     try:
-        return Form(parse_qs(body.decode("utf-8"), max_num_fields=_MOST_FIELDS))
+        form = Form(parse_qs(body.decode("utf-8"), max_num_fields=_MOST_FIELDS))
     except ValueError as error:  # UnicodeDecodeError is one
         raise MalformedError(f"body: this is no form: {error}") from error
+    for name, values in form.items():
+        if any("\0" in value for value in values):
+            raise MalformedError(f"{name[:80]!r}: text without NUL characters is needed")
+    return form
 
 
 FormDep = Annotated[Form, Depends(read_form)]
