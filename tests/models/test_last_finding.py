@@ -94,12 +94,10 @@ def people(lanes):
 
 @pytest.mark.parametrize("knock", [None, LARGE])
 def test_a_few_new_tracks_refine_the_last_pose_and_come_to_the_same(site, people, knock):
-    every = observe(knocked(people, LENS, PRIOR, knock), LENS, PRIOR)
+    every = observe(knocked(people[:200], LENS, PRIOR, knock), LENS, PRIOR)
     looks = list(follow(every, site))
     assert sum(refined for _, _, refined in looks) >= len(looks) - 2
-    far = [apart(full, found) for full, found, _ in looks]
-    assert sorted(far)[-2] < SAME
-    assert max(far) < 1.5 * SAME  # one look in ninety, at three sites, is 0.07 off
+    assert max(apart(full, found) for full, found, _ in looks) < SAME
 
 
 def test_a_knock_in_mid_window_is_found_as_soon(site, people):
