@@ -195,7 +195,7 @@ import sys
 from dataclasses import replace
 from models.regression import recipe
 
-recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=1024, batch=64)
+recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=256, batch=64)
 if "service.jobs.training_process" in sys.orig_argv:
     from models.regression import training
 
@@ -204,7 +204,7 @@ if "service.jobs.training_process" in sys.orig_argv:
 
 
 def path_to_small_trainings(folder: Path) -> str:
-    """A PYTHONPATH of processes that train in a quarter of the time, and are content with it."""
+    """A PYTHONPATH of processes that train in a fraction of the time, and are content with it."""
     return path_to_changed(folder, _SMALL)
 
 

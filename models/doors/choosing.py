@@ -62,12 +62,13 @@ def best_door_grain(parts: Sequence[Part], at: Array) -> DoorGrain | None:
     gains: dict[DoorGrain, list[Array]] = {}
     for part in parts:
         counted = _counts(part.known, part.weights, at, part.nodes)
+        nowhere = _nowhere(part, counted, at)
         smoothed = around(counted, part.nodes, _SMOOTH_M)
         for smooth_m, counts in zip(_SMOOTH_M, smoothed, strict=True):
             for alike in (False, True):
                 grain = DoorGrain(smooth_m=smooth_m, alike=alike)
                 doors = door_map_of(counts, part.nodes, grain)
-                gains.setdefault(grain, []).append(_gains(part, doors, at))
+                gains.setdefault(grain, []).append(_gains(part, doors, at, nowhere))
     every = {grain: np.concatenate(found) for grain, found in gains.items()}
     best = max(every, key=lambda grain: float(every[grain].mean()))
     gained = every[best]
@@ -81,11 +82,16 @@ def _counts(moments: Moments, weights: Array, at: Array, nodes: Nodes) -> Counts
     return count_at(moments, place * math.exp(at[2]), on_ground, weight, nodes)
 
 
-def _gains(part: Part, doors: DoorMap, at: Array) -> Array:
+def _nowhere(part: Part, counts: Counts, at: Array) -> Array:
+    """What there would be to say (tracks,) of walks if people began and ended them anywhere."""
+    doors = door_map_of(counts, part.nodes, DoorGrain(smooth_m=_SMOOTH_M[0], alike=False))
+    anywhere = replace(doors, ratio=np.ones_like(doors.ratio))
+    return np.asarray(door_values(part.asked, anywhere, at[None])[0])
+
+
+def _gains(part: Part, doors: DoorMap, at: Array, nowhere: Array) -> Array:
     """How much (P,) likelier each walking group's people begin and end there than without doors."""
-    none = replace(doors, ratio=np.ones_like(doors.ratio))
-    there, nowhere = (door_values(part.asked, each, at[None])[0] for each in (doors, none))
-    gains = there - nowhere
+    gains = door_values(part.asked, doors, at[None])[0] - nowhere
     owners = np.unique(part.asked.owner_idx)
     _, group = np.unique(part.group_idx[owners], return_inverse=True)
     return np.asarray(np.bincount(group, gains[owners]) / np.bincount(group))

@@ -18,12 +18,14 @@ from models.estimation.joint.observations import Observations, check_in_time, of
 from models.estimation.joint.reference import relearned
 from models.estimation.joint.speed_reference import SpeedReference
 from models.flow.folds import Fold, Folds
+from models.flow.likelihood import walkers_of
+from models.flow.reference import candidate_of
 from models.flow.turn_detection import groups_in_time
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 
-_ENOUGH = 400  # walking groups that the answers to knocks are learned of
+_ENOUGH = 200  # walking groups that the answers to knocks are learned of, to some 5 %
 _RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
 # Walking groups after one another that the bootstrap keeps together: people share their quarter of
 # an hour, and runs of 16 are held against a knock. Of fewer, recorded days alarm twice as often.
@@ -35,11 +37,15 @@ _LEAST_SHRUNK = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Asked:
-    """Scores (P, 14) of groups left out, when each was last seen (P,), and seen after knocks."""
+    """Scores (P, 14) of groups left out, and when each was last seen (P,).
+
+    Of some of these, `before` (Q, 14) are the scores and `knocked` (K, Q, 14) those after knocks.
+    """
 
     still: Array
     times: npt.NDArray[np.int64]
-    knocked: Array | None
+    before: Array
+    knocked: Array
 
 
 def learn_chart(
@@ -51,10 +57,10 @@ def learn_chart(
 ) -> DriftChart | None:
     """The chart of a site; None where fewer than 12 walking groups have scores.
 
-    Each quarter of the walking groups is scored by what the others say is usual, and again as a
-    camera that has been knocked would see them. How high the statistic gets by chance is learned by
-    bootstrap: what is taken for usual, the people that there really are, and runs of these in
-    blocks are all drawn anew.
+    Each quarter of the walking groups is scored by what the others say is usual, and some of them
+    again as a camera that has been knocked would see them. How high the statistic gets by chance is
+    learned by bootstrap: what is taken for usual, the people that there really are, and runs of
+    these in blocks are all drawn anew.
 
     Args:
         observations: of the tracks, in the order of their ends.
@@ -68,10 +74,11 @@ def learn_chart(
     """
     check_in_time(observations)
     asked: list[_Asked] = []
-    known = 0
+    wanted = _ENOUGH
     for fold in folds.each:
-        asked.append(_asked(observations, prior, site, fold, answers=known < _ENOUGH))
-        known += len(asked[-1].still)
+        asked.append(_asked(observations, prior, site, fold, wanted))
+        wanted -= len(asked[-1].before)
+    known = sum(len(part.still) for part in asked)
     if known < FEWEST:
         return None
     order = np.argsort(np.concatenate([part.times for part in asked]), kind="stable")
@@ -90,11 +97,8 @@ def learn_chart(
         tail=1.0,
     )
     bounded = chart.bounded(scores)
-    answered = [part for part in asked if part.knocked is not None]
-    before = chart.bounded(np.concatenate([part.still for part in answered]))
-    after = chart.bounded(
-        np.concatenate([part.knocked for part in answered if part.knocked is not None], axis=1)
-    )
+    before = chart.bounded(np.concatenate([part.before for part in asked]))
+    after = chart.bounded(np.concatenate([part.knocked for part in asked], axis=1))
     chart = replace(
         chart,
         mean=bounded.mean(axis=0),
@@ -109,28 +113,25 @@ def learn_chart(
 
 
 def _asked(
-    observations: Observations,
-    prior: CameraPose,
-    site: SpeedReference,
-    fold: Fold,
-    *,
-    answers: bool,
+    observations: Observations, prior: CameraPose, site: SpeedReference, fold: Fold, wanted: int
 ) -> _Asked:
+    """The scores of a fold's groups; of so many as are wanted, after knocks too."""
     seen = of_tracks(observations, fold.asked)
     speed_reference = relearned(of_tracks(observations, fold.known), prior, site)
     usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.site)
     _, _, last = groups_in_time(fold.walkers)
-    knocked = None
-    if answers:
+    still = scores_at(seen, fold.walkers, usual, np.zeros(4))
+    # Evenly over the time: mornings and evenings answer differently.
+    some = np.linspace(0, last.size - 1, min(last.size, wanted)).astype(np.int64)
+    answers = np.zeros((1 + len(KNOCKS), 0, SCORES))
+    if some.size:
+        theirs = np.isin(fold.walkers.group_idx, fold.walkers.group_idx[last[some]])
+        few = of_tracks(seen, np.flatnonzero(theirs))
+        walkers = walkers_of(few, candidate_of(prior))
         # A camera that has moved on sees people as one that stays would from a little back.
-        knocked = np.stack(
-            [scores_at(seen, fold.walkers, usual, -knock.step, knock.stretch) for knock in KNOCKS]
-        )
-    return _Asked(
-        still=scores_at(seen, fold.walkers, usual, np.zeros(4)),
-        times=fold.asked[last],
-        knocked=knocked,
-    )
+        moves = [(np.zeros(4), 1.0), *((-knock.step, knock.stretch) for knock in KNOCKS)]
+        answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])
+    return _Asked(still=still, times=fold.asked[last], before=answers[0], knocked=answers[1:])
 
 
 def _covariance(scores: Array) -> Array:

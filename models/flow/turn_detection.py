@@ -25,6 +25,7 @@ _FEWEST = 8  # walking groups that a move is detected by
 _MOST = 300
 _BLOCK = 3  # walking groups after one another that the bootstrap keeps together
 _DRAWS = 1500
+_PARTS = 30  # of these, each small enough to stay near the processor
 _RIDGE = 0.02  # of each score's variance is its own, so that no direction is too good
 _BODY = 0.05  # the share of draws at which looks are counted; beyond, Student's tail is theirs
 
@@ -106,14 +107,11 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
     count = len(scores)
     covariance = np.cov(scores.T)
     directions, variance = _directions(covariance, bent)
-    rng = np.random.default_rng(seed)
-    statistics = np.empty(_DRAWS)
-    for draw in range(_DRAWS):
-        drawn_mean = scores[rng.integers(0, count, count)].mean(axis=0)
-        starts = rng.integers(0, count, -(-_MOST // _BLOCK))
-        window = (starts[:, None] + np.arange(_BLOCK)).ravel() % count
-        squares = _squares(scores[window], drawn_mean, directions, variance, count)
-        statistics[draw] = squares.max()
+    along = scores @ directions.T
+    drawn = np.random.default_rng(seed).integers(0, count, (_DRAWS, count + -(-_MOST // _BLOCK)))
+    statistics = np.concatenate(
+        [_highest(along, part, variance) for part in np.array_split(drawn, _PARTS)]
+    )
     passed = np.quantile(statistics, 1 - _BODY)
     alone = 2 * chance_below(-float(np.sqrt(passed)), count - 1)
     return StillScores(
@@ -149,14 +147,31 @@ def moved_within(
     return int(tracks[int(walking_groups) + _FEWEST])
 
 
+def _highest(along: Array, drawn: npt.NDArray[np.int64], variance: Array) -> Array:
+    """The statistics (D,) of windows of groups whose scores lie (P, 4) along the directions.
+
+    Of P + W indices (D, P + W), the first P are of a reference, the others of where blocks begin.
+    """
+    groups = len(along)
+    usual = along[drawn[:, :groups]].mean(axis=1)[:, None]
+    window = (drawn[:, groups:, None] + np.arange(_BLOCK)) % groups
+    sums = np.cumsum((along[window.reshape(len(drawn), -1)] - usual)[:, ::-1], axis=1)
+    return np.asarray(_squared(sums[:, _FEWEST - 1 :], variance, groups).max(axis=(1, 2)))
+
+
 def _squares(
     scores: Array, mean: Array, directions: Array, variance: Array, walking_groups: float
 ) -> Array:
     """Squared standard scores (W, 4) of the newest 8, 9, ... groups' means, for each parameter."""
     along = np.cumsum(((scores - mean) @ directions.T)[::-1], axis=0)[_FEWEST - 1 :]
-    count = np.arange(_FEWEST, _FEWEST + len(along))[:, None]
+    return _squared(along, variance, walking_groups)
+
+
+def _squared(sums: Array, variance: Array, walking_groups: float) -> Array:
+    """Squared standard scores of sums (..., W, 4) of the newest 8, 9, ... groups."""
+    count = np.arange(_FEWEST, _FEWEST + sums.shape[-2])[:, None]
     # The map is wrong by as much as its own walking groups' mean is.
-    return np.asarray((along / count) ** 2 / (variance * (1 / count + 1 / walking_groups)))
+    return np.asarray((sums / count) ** 2 / (variance * (1 / count + 1 / walking_groups)))
 
 
 def _directions(covariance: Array, bent: Array) -> tuple[Array, Array]:
