@@ -125,9 +125,11 @@ def _asked(
     some = np.linspace(0, last.size - 1, min(last.size, wanted)).astype(np.int64)
     answers = np.zeros((1 + len(KNOCKS), 0, SCORES))
     if some.size:
-        theirs = np.isin(fold.walkers.group_idx, fold.walkers.group_idx[last[some]])
-        few = of_tracks(seen, np.flatnonzero(theirs))
-        walkers = walkers_of(few, candidate_of(prior))
+        group_idx = fold.walkers.group_idx
+        theirs = np.flatnonzero(np.isin(group_idx, group_idx[last[some]]))
+        few = of_tracks(seen, theirs)
+        # Who walks with whom hangs on who else is there: the groups stay what they were.
+        walkers = replace(walkers_of(few, candidate_of(prior)), group_idx=group_idx[theirs])
         # A camera that has moved on sees people as one that stays would from a little back.
         moves = [(np.zeros(4), 1.0), *((-knock.step, knock.stretch) for knock in KNOCKS)]
         answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])

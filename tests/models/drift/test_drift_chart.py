@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.drift import chart_learning
 from models.drift.chart import (
     CLOCK,
     KNOCKS,
@@ -255,6 +256,20 @@ def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
     assert not may_be_clock(reading)  # by now a pose can tell
     early = read_chart(chart, score_groups(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
     assert may_be_clock(early)
+
+
+def test_in_a_crowd_answers_are_learned_of_so_many_groups(lanes):
+    """Who walks with whom there hangs on who else is asked: a few of them are other groups."""
+    people = walk_site(LENS, PRIOR, lanes, CONFIG, 400, np.random.default_rng(7))
+    begun_s = people[0].time_s[0]
+    crowd = feet(replace(t, time_s=t.time_s - 0.985 * (t.time_s[0] - begun_s)) for t in people)
+    site = learn_speed_reference(crowd, PRIOR, WalkConfig(), 0)
+    first = fold_maps(crowd, LENS, AT, 0).each[0]
+    for wanted in (5, 10, 15, 20):
+        asked = chart_learning._asked(crowd, PRIOR, site, first, wanted)
+        assert len(asked.still) > 20
+        assert len(asked.before) == wanted
+        assert asked.knocked.shape == (len(KNOCKS), wanted, SCORES)
 
 
 @pytest.mark.parametrize(("groups", "together"), [(1000, 24), (100, 9), (13, 2)])
