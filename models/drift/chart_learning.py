@@ -25,7 +25,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 
-_ENOUGH = 200  # walking groups that the answers to knocks are learned of, to some 5 %
+_ENOUGH = 400  # walking groups that the answers to knocks are learned of, to some 4 %
 _RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
 # Walking groups after one another that the bootstrap keeps together: people share their quarter of
 # an hour, and runs of 16 are held against a knock. Of fewer, recorded days alarm twice as often.
