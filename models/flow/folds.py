@@ -13,13 +13,16 @@ from models.estimation.joint.observations import Observations, of_tracks
 from models.flow.likelihood import Walkers, walkers_of
 from models.flow.map.flow_map import Grain
 from models.flow.registration import Site
-from models.flow.site_doors import Quarter, door_grain
+from models.flow.site_doors import Quarter, door_grain, with_quarters_doors
 from models.flow.site_map import best_grain, mapped
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 
 FEWEST_GROUPS = 12
 _FOLDS = 4
+# Grains are chosen anew of twice as many tracks, which bear a finer one, and in the next part of a
+# day, in which people may walk elsewhere: to choose takes a third of the time of learning a map.
+_MORE, _HOLD_S = 2, 6 * 3600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,15 +36,29 @@ class Fold:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Folds:
-    """All quarters, and the grains of map and doors that predict people best.
+class Grains:
+    """The grains of map and doors that predict people best; without doors, these have none.
 
-    There is no grain of doors where there are none.
+    They were chosen of so many `tracks`, the last of which ended `to_s`.
     """
 
+    flow: Grain
+    doors: DoorGrain | None
+    tracks: int
+    to_s: float
+
+    def hold_for(self, tracks: Observations) -> bool:
+        """Whether tracks are so much the same people's that the same is best for them."""
+        soon = abs(float(tracks.ended_s.max()) - self.to_s) < _HOLD_S
+        return soon and tracks.tracks < _MORE * self.tracks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Folds:
+    """All quarters, and the grains of their maps and doors."""
+
     each: tuple[Fold, ...]
-    grain: Grain
-    door_grain: DoorGrain | None
+    grains: Grains
 
 
 def fold_maps(
@@ -50,6 +67,7 @@ def fold_maps(
     at: Array,
     seed: int,
     weights: Array | None = None,
+    grains: Grains | None = None,
 ) -> Folds | None:
     """A map of each three quarters of the groups; None where fewer than 12 groups walk.
 
@@ -59,6 +77,7 @@ def fold_maps(
         at: the known pose (4,).
         seed: of the quarters; walking groups stay together.
         weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
+        grains: that were chosen before; they are chosen anew where they do not hold.
     """
     walkers = walkers_of(observations, at)
     if walkers.walking_groups < FEWEST_GROUPS:
@@ -72,9 +91,12 @@ def fold_maps(
         if left_out.people:
             learned_of = walkers_of(of_tracks(observations, known), at)
             parts.append((learned_of, left_out, known, asked))
-    grain = best_grain(
-        [(of, weights[known], left_out) for of, left_out, known, _ in parts], intrinsics, at
-    )
+    kept = grains if grains is not None and grains.hold_for(observations) else None
+    if kept is None:
+        learned = [(of, weights[known], left_out) for of, left_out, known, _ in parts]
+        grain = best_grain(learned, intrinsics, at)
+    else:
+        grain = kept.flow
     quarters = [
         Quarter(
             known=of,
@@ -84,14 +106,18 @@ def fold_maps(
         )
         for of, left_out, known, _ in parts
     ]
-    doors, sites = door_grain(quarters, at)
+    if kept is None:
+        doors, sites = door_grain(quarters, at)
+        to_s = float(observations.ended_s.max())
+        kept = Grains(flow=grain, doors=doors, tracks=observations.tracks, to_s=to_s)
+    else:
+        sites = with_quarters_doors(quarters, at, kept.doors)
     return Folds(
         each=tuple(
             Fold(site=site, walkers=left_out, known=known, asked=asked)
             for site, (_, left_out, known, asked) in zip(sites, parts, strict=True)
         ),
-        grain=grain,
-        door_grain=doors,
+        grains=kept,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from models.doors.door_map import DoorMap
 from models.estimation.joint.observations import Observations
 from models.flow.cross_fit import CrossFit, cross_fit
-from models.flow.folds import Folds, fold_maps
+from models.flow.folds import Folds, Grains, fold_maps
 from models.flow.likelihood import walkers_of
 from models.flow.map.flow_map import FlowMap
 from models.flow.map.view import Coverage
@@ -43,7 +43,8 @@ class FlowReference:
     `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
     peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
     together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
-    its two tests go by. `doors` is None where there are none.
+    its two tests go by. `doors` is None where there are none. `grains` are what map and
+    doors were learned by, for the next ones; None of what was stored before they were kept.
     """
 
     flow: FlowMap
@@ -57,6 +58,7 @@ class FlowReference:
     still: StillScores
     fit: UsualFit
     doors: DoorMap | None = None
+    grains: Grains | None = None
 
     def site(self, intrinsics: Intrinsics) -> Site:
         """What walkers are registered to."""
@@ -130,8 +132,8 @@ def learn_flow(
     unsure = _LEFT_NOISE * inflation * scatter / count**2
     walkers = walkers_of(observations, at)
     weights = np.ones(observations.tracks) if weights is None else weights
-    whole = mapped(walkers, weights, intrinsics, at, folds.grain)
-    whole = with_doors(whole, walkers, weights, at, folds.door_grain)
+    whole = mapped(walkers, weights, intrinsics, at, folds.grains.flow)
+    whole = with_doors(whole, walkers, weights, at, folds.grains.doors)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
     return FlowReference(
         flow=whole.flow,
@@ -145,6 +147,7 @@ def learn_flow(
         people=float(counted.sum() ** 2 / (counted**2).sum()),
         still=learn_scores(crossed.scores, crossed.bent, seed),
         fit=usual_fit(crossed.fits),
+        grains=folds.grains,
     )
 
 

@@ -46,6 +46,13 @@ def with_doors(
     return replace(site, doors=doors_of(walkers.moments, weights, at, _nodes_of(site), grain))
 
 
+def with_quarters_doors(
+    quarters: Sequence[Quarter], at: Array, grain: DoorGrain | None
+) -> tuple[Site, ...]:
+    """The quarters' sites with their doors of a grain; as they are without one."""
+    return tuple(with_doors(own.site, own.known, own.weights, at, grain) for own in quarters)
+
+
 def door_grain(quarters: Sequence[Quarter], at: Array) -> tuple[DoorGrain | None, tuple[Site, ...]]:
     """The grain of doors that help, and the quarters' sites with these; None where none do.
 
@@ -76,7 +83,7 @@ def door_grain(quarters: Sequence[Quarter], at: Array) -> tuple[DoorGrain | None
     if grain is None:
         return surest, sites
     asked = [quarter.asked for quarter in quarters]
-    every = [with_doors(own.site, own.known, own.weights, at, grain) for own in quarters]
+    every = with_quarters_doors(quarters, at, grain)
     most = _log_information(sites, asked, at) + _SURER
     for weight in _WEIGHTS:
         weighed = tuple(_weighed(site, weight) for site in every)

@@ -8,7 +8,7 @@ from models.drift.chart_learning import learn_chart
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
 from models.estimation.joint.speed_reference import SpeedReference
-from models.flow.folds import fold_maps
+from models.flow.folds import Grains, fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -30,6 +30,7 @@ def learn_site(
     weights: Array | None = None,
     speed_tracks: int | None = None,
     chart: bool = True,
+    grains: Grains | None = None,
 ) -> CameraSite:
     """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
 
@@ -47,6 +48,7 @@ def learn_site(
         weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
         speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
         chart: whether the chart is wanted: it takes as long as all the rest.
+        grains: of the map that grows, which are kept for some hours.
 
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step, and how people walk is not known.
@@ -57,7 +59,7 @@ def learn_site(
         first = tracks if speed_tracks is None else _first(tracks, speed_tracks)
         speed_reference = learn_speed_reference(first, prior, walk, seed)
     site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
-    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights)
+    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, grains)
     if folds is None:
         return site
     return replace(

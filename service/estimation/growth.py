@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from models.drift.change_point import FEWEST_BESIDE
 from models.drift.creep_packing import creep_log_from_bytes
 from models.estimation.joint.packing import reference_from_bytes
+from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -39,7 +40,8 @@ _DAY_S = 86_400.0
 class GrowthPeriod:
     """All that a map is to be learned of anew, in the order of the tracks' ends.
 
-    `weights` (N,) are what they count for. `replaces` is when the map that there is was learned,
+    `weights` (N,) are what they count for. `kept` is the map that there is, as bytes, where all of
+    it is known to be still. `replaces` is when the map that there is was learned,
     `spoilt` whether it has tracks in it of a time that is no longer known to be still.
     """
 
@@ -50,6 +52,7 @@ class GrowthPeriod:
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
     weights: Array
+    kept: bytes | None
     to_s: float
     taken_at: datetime
     replaces: datetime | None
@@ -98,6 +101,7 @@ def load_growth(
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
         weights=weights,
+        kept=None if kept is None or spoilt else kept.data,
         to_s=to_s,
         taken_at=datetime.now(UTC),
         replaces=None if kept is None else kept.learned_at,
@@ -126,6 +130,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
         weights=weights,
+        grains=None if period.kept is None else flow_from_bytes(period.kept).grains,
     )
     return paths_of(grown)
 

@@ -94,7 +94,7 @@ def test_a_site_without_doors_is_as_if_nobody_had_looked_for_any(lanes):
     seen = observed(walk_site(LENS, PRIOR, endless, near, 150, rng))
     assert seen.moments is not None
     assert seen.moments.events > 50
-    assert fold_maps(seen, LENS, AT, 0).door_grain is None
+    assert fold_maps(seen, LENS, AT, 0).grains.doors is None
     learned, bare = (
         learn_flow(tracks, LENS, PRIOR, 0) for tracks in (seen, replace(seen, moments=None))
     )
