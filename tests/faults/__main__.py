@@ -22,7 +22,10 @@ def main() -> int:
     words.add_argument("--cameras", type=int, default=3)
     words.add_argument("--trackers", type=int, default=4)
     words.add_argument("--trainings", type=int, default=1, help="cameras whose model is trained")
-    words.add_argument("--workers", type=int, default=2)
+    words.add_argument("--workers", type=int, default=2, help="of each machine")
+    words.add_argument(
+        "--machines", type=int, default=1, help="more than one share a PostgreSQL server"
+    )
     words.add_argument("--pause-s", type=float, default=0.4, help="of a tracker between posts")
     words.add_argument("--only", nargs="*", choices=names, default=[], help="faults beside kills")
     words.add_argument("--keep", action="store_true", help="keep the folder with data and log")

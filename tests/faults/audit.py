@@ -11,6 +11,7 @@ import httpx
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
 from tests.service.delivery.receiver import Receiver
+from tests.stores.databases import ask
 
 _STUCK_S, _LONGEST_S = 60.0, 900.0
 _JOBS = "jobs of the engine"
@@ -55,9 +56,9 @@ def settle(stand: Stand, ledger: Ledger) -> float:
 def _waiting(stand: Stand) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     try:
-        ready = httpx.get(f"{stand.url}/readyz", timeout=5)
-        if ready.status_code != 200:
-            found["not ready"] = [ready.text]
+        answers = [httpx.get(f"{each.url}/readyz", timeout=5) for each in stand.machines]
+        if unready := [answer.text for answer in answers if answer.status_code != 200]:
+            found["not ready"] = unready
     except httpx.HTTPError as error:
         found["not ready"] = [type(error).__name__]
     for name, statement in _WAITING.items():
@@ -69,6 +70,8 @@ def _waiting(stand: Stand) -> dict[str, list[str]]:
 
 def query(stand: Stand, statement: str) -> Sequence[Any]:
     """Rows out of the store, read beside the service."""
+    if stand.database is not None:
+        return ask(stand.settings, statement)
     path = stand.settings.database_path
     connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=30)
     try:
@@ -170,4 +173,5 @@ def _witness(stand: Stand, ledger: Ledger, jobs: Sequence[str]) -> dict[str, int
         **{f"{name} seen": runs[name] for name in sorted(runs)},
         "jobs twice at once": len(twice),
         "jobs beside a stopped process": kinds["beside_a_stopped_one"],
+        "jobs beside a machine that was cut off": kinds["beside_a_cut_one"],
     }

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import psutil
 
+from tests.faults import of_servers
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
 
@@ -194,10 +195,18 @@ def _mount(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def _disk(stand: Stand) -> str | None:
+    if stand.database is not None:
+        return "the data is not on the machines' disks"
     return None if stand.disk.is_mount() else "the data has no file system of its own"
 
 
+def _server(stand: Stand) -> str | None:
+    return None if stand.database is not None else "no server: --machines 2"
+
+
 def _clock(stand: Stand) -> str | None:
+    if stand.database is not None:
+        return "the server's clock is not the machines'"
     return None if stand.has_clock else "no C compiler (cc) to make a clock with"
 
 
@@ -207,4 +216,7 @@ FAULTS = (
     Fault(name="clock", do=clock, missing=_clock),
     Fault(name="lost weights", do=lost_weights),
     Fault(name="hang", do=hang),
+    Fault(name="database crash", do=of_servers.restart, missing=_server),
+    Fault(name="partition", do=of_servers.partition, missing=_server),
+    Fault(name="read-only primary", do=of_servers.read_only, missing=_server),
 )

@@ -17,6 +17,7 @@ class Ledger:
     oddities: Counter[str] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
     problems: Counter[str] = field(default_factory=Counter)
+    took_s: dict[str, list[float]] = field(default_factory=dict)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def answered(self, what: str, status: int, text: str) -> None:
@@ -46,3 +47,13 @@ class Ledger:
     def problem(self, text: str) -> None:
         with self.lock:
             self.problems[text] += 1
+
+    def recovered(self, name: str, seconds: float) -> None:
+        """Note how long it took until all was ready again after something."""
+        with self.lock:
+            self.took_s.setdefault(name, []).append(seconds)
+
+    def recoveries(self) -> dict[str, str]:
+        """The longest of each kind, in words."""
+        with self.lock:
+            return {name: f"{max(took):.1f}" for name, took in sorted(self.took_s.items())}

@@ -30,6 +30,7 @@ class Plan:
     trackers: int
     trainings: int
     workers: int
+    machines: int
     pause_s: float
     only: Sequence[str]
     keep: bool
@@ -39,19 +40,18 @@ def run(plan: Plan) -> int:
     """Run, print the counts, and return 0 where nothing is wrong."""
     start = time.monotonic()
     ledger, folder = Ledger(), Path(tempfile.mkdtemp(prefix="surefoot-faults-"))
-    stand = Stand(folder, plan.workers)
+    stand = Stand(folder, plan.workers, plan.machines, on_server=plan.machines > 1)
     counts: dict[str, int] = {}
     try:
-        missing = mount_disk(stand)
-        if missing is not None:
+        if stand.database is None and (missing := mount_disk(stand)) is not None:
             say(f"not tried: a disk of its own: {missing}")
-        stand.settings.data_dir.mkdir()
+        stand.prepare()
         with receiver() as inbox:
             load_s = _under_load(plan, stand, ledger, inbox)
             settled_s = settle(stand, ledger)
             stand.stop()
             counts = audit(stand, ledger, inbox, trained=bool(plan.trainings))
-        if _wanted(plan, "corrupt"):
+        if _wanted(plan, "corrupt") and stand.database is None:
             corrupt(stand, ledger)
         say(f"under load for {load_s:.0f} s, settled after {settled_s:.0f} s more")
     finally:
@@ -88,7 +88,7 @@ def _under_load(plan: Plan, stand: Stand, ledger: Ledger, inbox: Receiver) -> fl
     for client in clients:
         client.start()
     _carry_out(plan, stand, ledger, inbox)
-    if stand.has_clock and _wanted(plan, "clock"):
+    if stand.database is None and stand.has_clock and _wanted(plan, "clock"):
         clock_back(stand, ledger)
         inbox.answer(503, 503, 204)
     time.sleep(5)
@@ -143,7 +143,8 @@ def _kill(stand: Stand, ledger: Ledger, which: str, random_: random.Random) -> N
     """One kill, as soon as there is something to kill."""
     end = time.monotonic() + _START_S
     while time.monotonic() < end:
-        if stand.kill_api() if which == "api" else stand.kill_worker(random_):
+        machine = random_.choice(stand.machines)
+        if machine.kill_api() if which == "api" else machine.kill_worker(random_):
             ledger.fault(f"kill -9 {which}")
             return
         time.sleep(0.2)
@@ -167,12 +168,13 @@ def _tell(plan: Plan, stand: Stand, ledger: Ledger, counts: dict[str, int], took
         ("faults", {name: n for name, n in sorted(ledger.faults.items())}),
         ("answers", {f"{what} {n}": c for (what, n), c in sorted(ledger.answers.items())}),
         ("audit", counts),
+        ("seconds until all was ready after", ledger.recoveries()),
         ("oddities", dict(ledger.oddities.most_common(12))),
         ("PROBLEMS", dict(ledger.problems.most_common())),
     ):
         say(f"\n{title}{'' if table else ': none'}")
         for name, count in table.items():
-            say(f"  {count:8d}  {name}")
+            say(f"  {count:>8}  {name}")
 
 
 def say(line: str) -> None:

@@ -32,6 +32,21 @@ def _is_stopped(pid: str) -> bool:
         return False
 
 
+def _is_cut(pid: str) -> bool:
+    """Whether a process is of the machine that is cut off from the database by now."""
+    try:
+        cut = (_FOLDER / "cut").read_bytes()
+        return b"SUREFOOT_DATA_DIR=" + cut in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return False
+
+
+def _kind(pid: str) -> str:
+    if _is_stopped(pid):
+        return "beside_a_stopped_one"
+    return "beside_a_cut_one" if _is_cut(pid) else "twice_at_once"
+
+
 def _watched(name: str, job: Callable[..., Any]) -> Callable[..., Any]:
     def run(context: Any, key: str, *more: Any) -> Any:
         with (_FOLDER / f"{name}-{key}.lock").open("a+") as lock:
@@ -40,8 +55,7 @@ def _watched(name: str, job: Callable[..., Any]) -> Callable[..., Any]:
             except OSError:
                 lock.seek(0)
                 pid = lock.read().strip()
-                kind = "beside_a_stopped_one" if _is_stopped(pid) else "twice_at_once"
-                _say(f"{kind} {name} {key} {pid} {os.getpid()}")
+                _say(f"{_kind(pid)} {name} {key} {pid} {os.getpid()}")
                 return job(context, key, *more)
             lock.truncate(0)
             lock.write(str(os.getpid()))
