@@ -21,7 +21,7 @@ from models.geometry.rotation import Array
 FEWEST_GROUPS = 12
 _FOLDS = 4
 # Grains are chosen anew of twice as many tracks, which bear a finer one, and in the next part of a
-# day, in which people may walk elsewhere: to choose takes a third of the time of learning a map.
+# day, in which people may walk elsewhere: to choose takes a sixth of the time of learning a map.
 _MORE, _HOLD_S = 2, 6 * 3600.0
 
 
