@@ -27,7 +27,12 @@ class Client(threading.Thread):
         super().__init__(daemon=True)
         self.stand, self.ledger, self.over = stand, ledger, over
         self.random = random.Random(seed)
-        self.http = httpx.Client(base_url=stand.url, timeout=_PATIENCE_S)
+        self.http = self._connected()
+
+    def _connected(self) -> httpx.Client:
+        """To any machine, as a proxy before them would choose."""
+        url = self.random.choice(self.stand.machines).url
+        return httpx.Client(base_url=url, timeout=_PATIENCE_S)
 
     def ask(self, what: str, method: str, path: str, **more: Any) -> httpx.Response | None:
         """One request; None where nobody answered, which is no fault of a killed service."""
@@ -35,7 +40,7 @@ class Client(threading.Thread):
             answer = self.http.request(method, path, **more)
         except httpx.HTTPError:
             self.http.close()
-            self.http = httpx.Client(base_url=self.stand.url, timeout=_PATIENCE_S)
+            self.http = self._connected()
             return None
         self.ledger.answered(what, answer.status_code, answer.text)
         return answer

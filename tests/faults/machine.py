@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO
 
 import httpx
 import psutil
@@ -21,9 +22,20 @@ _LIBC = ctypes.CDLL(None)
 _DEATH_SIGNAL = 1  # prctl's PR_SET_PDEATHSIG
 
 
-def dies_with_us() -> None:
+def _dies_with_us() -> None:
     """Run in the child before its program: it takes no lock and imports nothing."""
     _LIBC.prctl(_DEATH_SIGNAL, signal.SIGKILL)
+
+
+def serve(environment: Mapping[str, str], output: IO[bytes] | int) -> subprocess.Popen[bytes]:
+    """A `surefoot serve` that ends with this process; all that it prints goes to an output."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "service.cli", "serve"],
+        env=environment,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        preexec_fn=_dies_with_us,  # noqa: PLW1509
+    )
 
 
 class Machine:
@@ -80,13 +92,7 @@ class Machine:
             if self._over.is_set():
                 return
             with self.log.open("ab") as log:
-                self.process = subprocess.Popen(
-                    [sys.executable, "-m", "service.cli", "serve"],
-                    env=self.environment,
-                    stdout=log,
-                    stderr=log,
-                    preexec_fn=dies_with_us,  # noqa: PLW1509
-                )
+                self.process = serve(self.environment, log)
             self.starts += 1
             self.process.wait()
             self._ends += 1

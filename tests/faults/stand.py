@@ -2,10 +2,8 @@
 
 import base64
 import os
-import random
 import shutil
 import subprocess
-import sys
 import time
 from itertools import chain
 from pathlib import Path
@@ -16,7 +14,7 @@ from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.faults.clock import Clock
 from tests.faults.database import Database
-from tests.faults.machine import Machine, dies_with_us
+from tests.faults.machine import Machine, serve
 from tests.running import free_port
 
 
@@ -82,11 +80,6 @@ class Stand:
             migrate(self.settings)
 
     @property
-    def url(self) -> str:
-        """Of any machine, as a proxy before them would choose."""
-        return random.choice(self.machines).url
-
-    @property
     def starts(self) -> int:
         """How often a service was started."""
         return sum(machine.starts for machine in self.machines)
@@ -102,13 +95,7 @@ class Stand:
 
     def command(self, **changes: str) -> subprocess.Popen[bytes]:
         """Another `serve` over other data; the caller ends it."""
-        return subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "serve"],
-            env=self.machines[0].environment | changes,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            preexec_fn=dies_with_us,  # noqa: PLW1509
-        )
+        return serve(self.machines[0].environment | changes, subprocess.PIPE)
 
     def start(self) -> None:
         """Keep all running from now on."""
