@@ -27,7 +27,7 @@ from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
 from service.store.tracks import tracks, windows
 from service.windows.attendance import Attendance, attendance_of
-from service.windows.references import is_outdated, made_against, window_of
+from service.windows.references import is_outdated, made_against, window_beside, window_of
 from service.windows.stillness import Doubt, doubts, still_bounds
 from service.windows.unpacked import Unpacked
 
@@ -70,20 +70,22 @@ def load_growth(
         return None
     kept = flow_maps.find(session, reference.id)
     past = doubts(session, settings, reference)
-    if _in_doubt(session, settings, reference, kept, past):
-        return None
     assert reference.to_s is not None
     assert reference.data is not None
     attended = attendance_of(session, camera_id, datetime.now(UTC))
-    judged = window_of(session, reference, settings)
+    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
+    since_s = None if kept is None else kept.to_s
+    enough = max(_FEWEST_NEW, _NEW_SHARE * (0 if kept is None else kept.tracks))
+    # Asked at every look, and hardly ever due: what is counted quickly says so first.
+    if not spoilt and tracks.count_since(session, camera_id, since_s) < enough:
+        return None
+    if _in_doubt(session, settings, reference, kept, past):
+        return None
+    judged = window_beside(attended, reference, settings)
     judged_from_s = windows.oldest_end_s(session, judged)
     bounds = still_bounds(settings, reference, past, attended, judged_from_s)
-    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
-    if not spoilt:
-        since_s = None if kept is None else kept.to_s
-        known = 0 if kept is None else kept.tracks
-        if windows.count_still(session, bounds, since_s) < max(_FEWEST_NEW, _NEW_SHARE * known):
-            return None
+    if not spoilt and windows.count_still(session, bounds, since_s) < enough:
+        return None
     records = windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
     to_s = records[-1].ended_s if records else reference.to_s
     age_s = to_s - np.array([record.ended_s for record in records])

@@ -88,6 +88,14 @@ def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) ->
     return session.scalar(query) or 0
 
 
+def count_since(session: Session, camera_id: str, ended_after_s: float | None) -> int:
+    """How many tracks ended after a time; all of them, if none is given."""
+    query = select(func.count()).where(*counting(camera_id))
+    if ended_after_s is not None:
+        query = query.where(TrackRecord.ended_s > ended_after_s)
+    return session.scalar(query) or 0
+
+
 def newest_source(session: Session, camera_id: str) -> str | None:
     """The source that counts; where none does yet, that of the newest track."""
     return session.scalar(newest_source_of(camera_id))
