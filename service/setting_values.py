@@ -1,6 +1,7 @@
 """What settings are written as, and what is said of one that is refused."""
 
 import base64
+import os
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
@@ -9,6 +10,15 @@ from pydantic import ValidationError
 
 _SECRETS = ("secret_key", "proxy_secret", "database_url")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
+
+_MOST_WORKERS = 4  # unless more are asked for: each holds 160 MB, and two carry 500 cameras
+
+
+def one_a_core() -> int:
+    """How many workers a machine has where nobody says."""
+    ours = getattr(os, "sched_getaffinity", None)  # Linux's alone
+    cores = len(ours(0)) if ours else os.cpu_count() or 1
+    return min(cores, _MOST_WORKERS)
 
 
 def wrong_settings(error: ValidationError) -> list[str]:

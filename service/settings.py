@@ -10,14 +10,8 @@ from zoneinfo import ZoneInfo
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from service import setting_values as values
 from service.data_dir import DATABASE, WEIGHTS
-from service.setting_values import (
-    read_database_url,
-    read_key,
-    read_networks,
-    read_numbers,
-    read_zone,
-)
 
 
 class Settings(BaseSettings):
@@ -26,7 +20,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="SUREFOOT_", frozen=True)
 
     data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
-    database_url: Annotated[str, AfterValidator(read_database_url)] | None = Field(
+    database_url: Annotated[str, AfterValidator(values.read_database_url)] | None = Field(
         None,
         repr=False,
         description="postgresql://user:password@host/name; unset: an SQLite file in data_dir",
@@ -54,7 +48,11 @@ class Settings(BaseSettings):
     proxy_role_header: str = Field(
         "X-Forwarded-Role", description="its header of what that may: read, operate or admin"
     )
-    workers: int = Field(1, ge=0, description="local worker processes that `serve` starts")
+    workers: int = Field(
+        default_factory=values.one_a_core,
+        ge=0,
+        description="local worker processes that `serve` starts: one a core, four at the most",
+    )
     secret_key: str | None = Field(
         None,
         repr=False,
@@ -98,7 +96,7 @@ class Settings(BaseSettings):
         1.0, gt=0, description="false no_data alerts of a camera in a year"
     )
     rhythm_days: int = Field(7, ge=1, description="days that a camera's rhythm is learned of first")
-    timezone: Annotated[str, AfterValidator(read_zone)] = Field(
+    timezone: Annotated[str, AfterValidator(values.read_zone)] = Field(
         "UTC", description="IANA zone of the cameras: their hours and weekends"
     )
 
@@ -234,7 +232,7 @@ class Settings(BaseSettings):
     @classmethod
     def _key_of_32_bytes(cls, value: str | None) -> str | None:
         if value is not None:
-            read_key(value)
+            values.read_key(value)
         return value
 
     @property
@@ -245,7 +243,7 @@ class Settings(BaseSettings):
     @field_validator("webhook_allow", "proxy_from")
     @classmethod
     def _networks(cls, value: str) -> str:
-        read_networks(value)
+        values.read_networks(value)
         return value
 
     @field_validator("proxy_from")
@@ -258,24 +256,24 @@ class Settings(BaseSettings):
     @field_validator("webhook_retry_s")
     @classmethod
     def _delays(cls, value: str) -> str:
-        if not all(delay > 0 for delay in read_numbers(value)):
+        if not all(delay > 0 for delay in values.read_numbers(value)):
             raise ValueError(f"numbers above 0, with commas, are needed, got {value!r}")
         return value
 
     @property
     def webhook_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
         """Private networks that webhooks may go to."""
-        return read_networks(self.webhook_allow)
+        return values.read_networks(self.webhook_allow)
 
     @property
     def proxy_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
         """Where proxies that log people in ask from."""
-        return read_networks(self.proxy_from)
+        return values.read_networks(self.proxy_from)
 
     @property
     def webhook_delays_s(self) -> tuple[float, ...]:
         """Seconds from each failed attempt to the next; the last one repeats."""
-        return read_numbers(self.webhook_retry_s)
+        return values.read_numbers(self.webhook_retry_s)
 
     @property
     def database_path(self) -> Path:

@@ -154,8 +154,8 @@ def settings(tmp_path: Path, migrated: Path) -> Iterator[Settings]:
     """Of a migrated store of the test's own, on the database that the run is on."""
     # Beside other tests a training that yields as it should would hardly get on.
     # Beside other processes of a test run, who yields much hardly moves.
-    nice = {"worker_nice": 0, "training_nice": 1}
-    with databases.settled(migrated, tmp_path / "data", epochs=1, reconcile_s=1, **nice) as made:
+    alone = {"workers": 1, "worker_nice": 0, "training_nice": 1}
+    with databases.settled(migrated, tmp_path / "data", epochs=1, reconcile_s=1, **alone) as made:
         yield made
 
 

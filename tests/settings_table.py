@@ -16,7 +16,8 @@ def settings_table() -> str:
     rows = ["| Setting | Default | What it is |", "|---|---|---|"]
     for name, field in Settings.model_fields.items():
         described = (field.description or "").replace("|", "\\|")
-        rows.append(f"| `{name.upper()}` | {_words(field.default)} | {described} |")
+        default = "by the machine" if field.default_factory else _words(field.default)
+        rows.append(f"| `{name.upper()}` | {default} | {described} |")
     return "\n".join(rows) + "\n"
 
 
