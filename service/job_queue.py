@@ -7,6 +7,7 @@ here imports torch; the HTTP process holds a `JobQueue`, the worker process runs
 import contextlib
 import logging
 import secrets
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
@@ -23,6 +24,9 @@ APPLICATION = "surefoot"
 JOBS_VERSION = "1"
 TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
 _ENGINE_CONNECTIONS = 5  # to a server, of each worker
+# The engine's priorities are whole numbers from 1 to 2**31 - 1, the smallest first: 68 years.
+_BEGINNING = datetime(2026, 1, 1, tzinfo=UTC)
+_HEAD_START = timedelta(seconds=30)
 _UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
 # Of the engine's tables those that nothing works without.
 ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
@@ -67,15 +71,20 @@ class JobQueue:
         )
         return True
 
-    def enqueue_estimate(self, session: Session, camera_id: str) -> None:
+    def enqueue_estimate(
+        self, session: Session, camera_id: str, due_at: datetime, *, urgent: bool = False
+    ) -> None:
         """Queue a look at a camera's new tracks, unless one waits or runs already.
 
-        While one runs, the camera's mark "due" stays: the next round of the upkeep sees it.
+        Those that were due first come first; one that is `urgent` as if it had been due for half a
+        minute more, so that many of these hold up others by no more than that. While one runs, the
+        camera's mark "due" stays: the next round of the upkeep sees it.
         """
         options: EnqueueOptions = {
             "workflow_name": ESTIMATE_JOB,
             "queue_name": ESTIMATE_QUEUE,
             "deduplication_id": camera_id,
+            "priority": _place_in_queue(due_at - _HEAD_START if urgent else due_at),
         }
         # Outside the savepoint: one that is refused takes nothing of the caller's with it.
         with contextlib.suppress(DBOSQueueDeduplicatedError), savepoint(session):
@@ -119,6 +128,11 @@ def queue_of(session: Session) -> JobQueue:
     """The queue in a session's own database, where nobody handed one down."""
     bind = session.get_bind()
     return JobQueue(bind if isinstance(bind, Engine) else bind.engine)
+
+
+def _place_in_queue(due_at: datetime) -> int:
+    """The priority of what is due at a time, to the second; the engine keeps the order within."""
+    return max(round((due_at - _BEGINNING).total_seconds()), 1)
 
 
 def migrate_engine_tables(settings: Settings) -> None:

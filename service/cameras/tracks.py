@@ -41,9 +41,17 @@ def picture_of(connection: Connection, camera_id: str) -> Picture:
 
 
 def receive_tracks(
-    connection: Connection, queue: JobQueue, camera_id: str, batch: Batch, *, max_sources: int = 16
+    connection: Connection,
+    queue: JobQueue,
+    camera_id: str,
+    batch: Batch,
+    *,
+    max_sources: int = 16,
+    watched: bool = False,
 ) -> Receipt:
     """Store the good tracks of a request and have them looked at, in one transaction.
+
+    Those of a camera that somebody has `watched` before those of others.
 
     A track is known by (camera, source, id, start time): one that is stored already stays, and
     counts as taken.
@@ -84,7 +92,7 @@ def receive_tracks(
         references.be_of_source(connection, camera_id, sources[0])
     if added and awaited.look:
         with joined(connection) as session:
-            request_estimate(session, queue, camera_id)
+            request_estimate(session, queue, camera_id, watched=watched)
     return Receipt(
         accepted=added,
         duplicates=len(batch.tracks) - added,

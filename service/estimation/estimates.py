@@ -63,6 +63,9 @@ def save_estimate(
     else:
         record = _record(reference, evidence, finding, drift, learning=False)
         _judge(session, queue, settings, reference, evidence, finding, drift, record)
+    camera = cameras.find(session, evidence.camera_id)
+    if camera is not None:
+        camera.urgent = record.suspected or record.drift_streak > 0 or bool(record.drifted)
     session.add(record)
     save_last_pose(session, reference.id, finding.last)
     payload = {

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
 from service.cameras.quota import Quota
+from service.cameras.watched import Watched
 from service.errors import PreconditionRequiredError
 from service.http.direct.feed import Feed
 from service.http.direct.kept import Kept, KeptAnswer
@@ -43,6 +44,7 @@ class AppState:
     stream_polls: anyio.CapacityLimiter
     feed: Feed
     poses: Kept[KeptAnswer]
+    watched: Watched = field(default_factory=Watched)
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
     stopping: threading.Event = field(default_factory=threading.Event)

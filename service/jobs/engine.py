@@ -72,7 +72,7 @@ def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None
         polling_interval_sec=_POLL_TRAININGS_S,
         on_conflict="always_update",
     )
-    # One job a camera, first come first served: a flooded camera has its turn like any other.
+    # One job a camera, the longest due first: a flooded camera has its turn like any other.
     DBOS.register_queue(
         ESTIMATE_QUEUE,
         worker_concurrency=_ESTIMATES_AT_ONCE,

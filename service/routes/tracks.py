@@ -135,7 +135,12 @@ def _take(state: AppState, camera_id: str, came: Posted) -> Response:
     state.quota.check(state.store, camera_id, batch)
     with state.store.change(camera_id) as connection:
         receipt = tracks.receive_tracks(
-            connection, state.queue, camera_id, batch, max_sources=state.settings.max_sources
+            connection,
+            state.queue,
+            camera_id,
+            batch,
+            max_sources=state.settings.max_sources,
+            watched=camera_id in state.watched,
         )
     body = written(ReceiptOut.from_value(receipt), exclude_defaults=True)
     return Response(body, 202, media_type="application/json")

@@ -75,7 +75,9 @@ def overlooked(session: Session, queue: JobQueue) -> list[str]:
 def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
     """Queue a look at each of some cameras; those first that have been due for longest."""
     for camera_id in camera_ids:
-        queue.enqueue_estimate(session, camera_id)
+        camera = cameras.find(session, camera_id)
+        if camera is not None and camera.estimate_due_at is not None:
+            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
 
 
 def reconcile_alerts(session: Session) -> None:

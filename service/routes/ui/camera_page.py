@@ -29,6 +29,7 @@ _CHARTS_STYLE = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
 def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Has the camera moved, how far, since when, how sure, and what to do now."""
     page = camera_page.view_camera_page(session, state.settings, camera_id)
+    state.watched.note(camera_id)
     zone = state.settings.zone
     clock = Clock(now=page.now, zone=zone)
     estimate = page.pose.estimate

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy import ForeignKey, Index, LargeBinary, String
+from sqlalchemy import ForeignKey, Index, LargeBinary, String, false
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.kinds import (
@@ -19,7 +19,8 @@ class CameraRecord(Record):
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `lacks` says what failed beside the served estimate.
+    `estimate_after`. `lacks` says what failed beside the served estimate. One that is `urgent` may
+    have moved: it is looked at before others.
     """
 
     __tablename__ = "cameras"
@@ -45,6 +46,7 @@ class CameraRecord(Record):
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
     lacks: Mapped[Reasons] = mapped_column(default=())
+    urgent: Mapped[bool] = mapped_column(default=False, server_default=false())
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 

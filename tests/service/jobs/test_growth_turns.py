@@ -1,6 +1,7 @@
 """Growth of maps at the expense of estimates that wait: a fifth of a worker's time, no more."""
 
 import time
+from datetime import UTC, datetime
 from functools import partial
 
 import pytest
@@ -23,7 +24,7 @@ def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
     first, context = map_of(known), known.context
     known.keep_to_lanes(PRIOR, 50 + WINDOW)
     with context.store.write() as session:
-        context.queue.enqueue_estimate(session, "elsewhere")
+        context.queue.enqueue_estimate(session, "elsewhere", datetime.now(UTC))
     context.growth_turns.spend(10.0)  # a fifth of the time: the next is in 40 s
     known.look()
     assert map_of(known).learned_at == first.learned_at

@@ -1,6 +1,7 @@
 """A training that is in the way rests between two of its steps, and loses nothing by it."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import pytest
 
@@ -50,7 +51,7 @@ def test_what_waits_for_a_worker_goes_first(settings):
     assert settings.trainings == "idle"
     assert may_go_on(context)
     with store.write() as session:
-        context.queue.enqueue_estimate(session, "corner")
+        context.queue.enqueue_estimate(session, "corner", datetime.now(UTC))
     assert not may_go_on(context)
     assert may_go_on(always)
     context.queue.close()

@@ -41,7 +41,7 @@ class Recorder:
     def requeue_training(self, session, camera_id, training_id):
         return False
 
-    def enqueue_estimate(self, session, camera_id):
+    def enqueue_estimate(self, session, camera_id, due_at, *, urgent=False):
         self.estimates.append(camera_id)
 
 

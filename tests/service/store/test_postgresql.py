@@ -107,7 +107,7 @@ def test_a_job_that_is_there_takes_nothing_with_it(store):
     for said in ("first", "second"):
         with store.write("corner") as session:
             add(session, said)
-            queue.enqueue_estimate(session, "corner")
+            queue.enqueue_estimate(session, "corner", datetime.now(UTC))
     with store.read() as session:
         assert queue.cameras_under_way(session) == {"corner"}
     assert said_after(store) == ["first", "second"]
