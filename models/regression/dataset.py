@@ -8,14 +8,12 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array, quaternion_from_rotation
+from models.geometry.rotation import quaternion_from_rotation
+from models.regression.inputs import network_inputs
 from models.regression.network import offsets_of
 from models.regression.recipe import TrainingPlan
 from models.simulation.poses import PoseSet, grid_poses, random_poses
 from models.simulation.walkers import simulate_walks
-
-_STEP_SCALE = 32.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,28 +44,13 @@ def synthetic_set(plan: TrainingPlan, rng: np.random.Generator) -> SyntheticSet:
         poses = grid_poses(plan.prior_pose, recipe.spread)
     else:
         poses = random_poses(plan.prior_pose, recipe.spread, recipe.random_poses, rng)
-    return _walks_of(plan, poses.take(np.repeat(np.arange(len(poses)), recipe.walks_per_pose)), rng)
+    return walks_of(plan, poses.take(np.repeat(np.arange(len(poses)), recipe.walks_per_pose)), rng)
 
 
 def held_out_set(plan: TrainingPlan, count: int, rng: np.random.Generator) -> SyntheticSet:
     """Walks seen from poses drawn evenly over the plan's range, none of them on its grid."""
     poses = random_poses(plan.prior_pose, plan.recipe.spread, count, rng)
-    return _walks_of(plan, poses, rng)
-
-
-def scale_points(uv: Array, intrinsics: Intrinsics, inputs: str) -> Tensor:
-    """Network input (B, T, 2) or (B, T, 4) of pixels (B, T, 2); NaN becomes 0.
-
-    Points are scaled so that the image spans -1 to 1 on both axes. With
-    `inputs="points_and_steps"` the step to each point stands beside it, 32 times as large: then
-    both are of one size.
-    """
-    half = np.array([intrinsics.width, intrinsics.height]) / 2
-    points = (uv + 0.5) / half - 1
-    if inputs == "points_and_steps":
-        steps = np.diff(points, axis=1, prepend=points[:, :1])
-        points = np.concatenate([points, _STEP_SCALE * steps], axis=-1)
-    return torch.from_numpy(np.nan_to_num(points, nan=0.0).astype(np.float32))
+    return walks_of(plan, poses, rng)
 
 
 def equal_length_batches(
@@ -85,7 +68,8 @@ def equal_length_batches(
         yield batches[place]
 
 
-def _walks_of(plan: TrainingPlan, poses: PoseSet, rng: np.random.Generator) -> SyntheticSet:
+def walks_of(plan: TrainingPlan, poses: PoseSet, rng: np.random.Generator) -> SyntheticSet:
+    """A simulated walk for each of some poses, as the plan's network reads it."""
     walks = simulate_walks(plan.intrinsics, poses, plan.walk, rng)
     uv = walks.uv
     if plan.recipe.noise_px:
@@ -94,7 +78,7 @@ def _walks_of(plan: TrainingPlan, poses: PoseSet, rng: np.random.Generator) -> S
     quaternion = quaternion_from_rotation(seen_by.rotation)
     offsets = offsets_of(seen_by.height_m, seen_by.tilt_rad, seen_by.roll_rad, plan)
     return SyntheticSet(
-        points=scale_points(uv, plan.intrinsics, plan.recipe.inputs),
+        points=network_inputs(uv, plan),
         lengths=torch.from_numpy(walks.lengths),
         height_m=torch.from_numpy(seen_by.height_m.astype(np.float32)),
         quaternion=torch.from_numpy(quaternion.astype(np.float32)),

@@ -8,6 +8,7 @@ from torch import Tensor, nn
 from torch.nn.utils.rnn import pack_padded_sequence
 
 from models.geometry.rotation import Array, quaternion_from_rotation, rotation_from_angles
+from models.regression.inputs import CHANNELS
 from models.regression.recipe import Recipe, TrainingPlan
 
 
@@ -48,7 +49,7 @@ class PoseRegressor(nn.Module):
 def network_for(recipe: Recipe) -> PoseRegressor:
     """A network with fresh weights and the inputs and outputs of a recipe."""
     return PoseRegressor(
-        channels=2 if recipe.inputs == "points" else 4,
+        channels=CHANNELS[recipe.inputs],
         orientation_outputs=4 if recipe.target == "pose" else 2,
     )
 

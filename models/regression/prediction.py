@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from models.geometry.rotation import Array
-from models.regression.dataset import scale_points
+from models.regression.inputs import network_inputs
 from models.regression.network import PoseRegressor, pose_from_output
 from models.regression.recipe import TrainingPlan
 from models.trajectory import Windows
@@ -18,7 +18,7 @@ def predict_windows(
     """Heights (B,) in metres and unit quaternions wxyz (B, 4), w >= 0, of windows."""
     if not len(windows):
         return np.empty(0), np.empty((0, 4))
-    points = scale_points(windows.uv, plan.intrinsics, plan.recipe.inputs)
+    points = network_inputs(windows.uv, plan)
     lengths = torch.from_numpy(windows.lengths)
     with torch.inference_mode():
         rows = torch.cat(

@@ -2,13 +2,11 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import torch
-from torch import Tensor, nn
 
 from models.errors import CalibrationError
 from models.geometry.rotation import Array, angle_between
@@ -18,8 +16,10 @@ from models.regression.dataset import (
     held_out_set,
     synthetic_set,
 )
-from models.regression.network import PoseRegressor, network_for, pose_from_output, pose_loss
-from models.regression.recipe import Recipe, TrainingPlan
+from models.regression.losses import batch_loss
+from models.regression.network import PoseRegressor, pose_from_output
+from models.regression.recipe import TrainingPlan
+from models.regression.starting import starting_network
 
 _HELD_OUT_WALKS = 2000
 _MUST_BEAT = 0.8  # of the error that answering the prior pose always would make
@@ -84,7 +84,7 @@ def train(
     data = synthetic_set(plan, rng)
     simulated = time.monotonic()
 
-    network = network_for(recipe)
+    network = starting_network(recipe)
     optimizer = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate, betas=(0.9, 0.999))
     lengths = data.lengths.numpy()
     per_epoch = len(list(equal_length_batches(lengths, recipe.batch, np.random.default_rng(0))))
@@ -95,7 +95,7 @@ def train(
     for _ in range(recipe.epochs):
         losses: list[float] = []
         for rows in equal_length_batches(lengths, recipe.batch, rng):
-            loss = _loss(network, data, rows, recipe)
+            loss = batch_loss(network, data, rows, recipe)
             optimizer.zero_grad()
             torch.autograd.backward(loss)
             optimizer.step()
@@ -164,26 +164,6 @@ def _metrics(
         simulation_s=simulation_s,
         training_s=training_s,
     )
-
-
-def _loss(
-    network: PoseRegressor, data: SyntheticSet, rows: npt.NDArray[np.int64], recipe: Recipe
-) -> Tensor:
-    with torch.autocast("cpu", torch.bfloat16, enabled=_in_bfloat16(recipe)):
-        output = network(data.points[rows], data.lengths[rows])
-    output = output.float()
-    if recipe.target == "offsets":
-        return nn.functional.smooth_l1_loss(output, data.offsets[rows], beta=0.5)
-    return pose_loss(output, data.height_m[rows], data.quaternion[rows], recipe.alpha)
-
-
-def _in_bfloat16(recipe: Recipe) -> bool:
-    """Whether products of this recipe are of bfloat16 here; emulated, they would take longer."""
-    if recipe.arithmetic != "bfloat16":
-        return False
-    # The oldest torch that we run on cannot be asked.
-    capabilities: Mapping[str, bool] = getattr(torch.cpu, "get_capabilities", dict)()
-    return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))
 
 
 def _schedule(name: str, steps: int) -> Callable[[int], float]:

@@ -40,7 +40,6 @@ from service.settings import Settings
 
 _BATCH = 10
 _PAUSE_S = 0.4  # for the eye
-_EPOCHS = 5
 _LONGEST_S = 150.0
 
 
@@ -58,7 +57,6 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
             data_dir=folder,
             port=port,
             recipe="default",
-            epochs=_EPOCHS,
             seed=seed,
             workers=1,
             auth="off",  # it plays by itself, and with nothing that is anybody's

@@ -7,9 +7,9 @@ speeds, noise in angles: no pixel, metre or focal length is left. Numpy only.
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.levelled import level_from_camera
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
-from models.regression.base.levelled import level_from_camera
 from models.regression.base.segments import LONGEST_S, NODES, Segments
 
 FEATURES = 27

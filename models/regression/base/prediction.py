@@ -7,10 +7,10 @@ from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import FEWEST_TRACKS
 from models.estimation.parameters import PlaneEstimate, plane_parameters_of
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.levelled import moved_by, offset_between
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.regression.base.features import FEATURES, segment_features, walking
-from models.regression.base.levelled import moved_by, offset_between
 from models.regression.base.network import SetNetwork
 from models.regression.base.segments import Segments
 from models.simulation.walkers import WalkConfig

@@ -7,10 +7,10 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.levelled import moved_by, offset_between
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.regression.base.features import FEATURES, segment_features, walking
-from models.regression.base.levelled import moved_by, offset_between
 from models.regression.base.segments import Segments, segments_of_walks
 from models.simulation.cameras import CameraRange, draw_camera
 from models.simulation.crowds import FlowConfig

@@ -4,14 +4,12 @@ import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from pickle import UnpicklingError
 
 import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from models.errors import CheckpointError
 from models.geometry.rotation import Array, Mask
 from models.regression.base.features import FEATURES, MIRRORED
 from models.regression.base.network import SetNetwork, bent
@@ -21,6 +19,7 @@ from models.regression.base.sets import (
     SiteRange,
     simulated_sets,
 )
+from models.regression.resumable import resume_training, save_training
 from models.simulation.cameras import CameraRange
 
 _DEGREES_OF_FREEDOM = 5.0
@@ -109,15 +108,8 @@ class BaseTraining:
 
     def save(self, path: Path) -> None:
         """Write what a later process needs to go on, whole or not at all."""
-        partial = path.with_suffix(".partial")
-        state = {
-            "done": self.done,
-            "spent_s": self.spent_s,
-            "network": self.network.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-        }
-        torch.save(state, partial)
-        partial.replace(path)
+        so_far = {"done": self.done, "spent_s": self.spent_s}
+        save_training(path, self.network, self._optimizer, so_far)
 
     def go_on(self, path: Path) -> None:
         """Take over what `save` wrote of a training of the same plan.
@@ -125,13 +117,8 @@ class BaseTraining:
         Raises:
             CheckpointError: the file is damaged or of another network.
         """
-        try:
-            state = torch.load(path, weights_only=True)
-            self.network.load_state_dict(state["network"])
-            self._optimizer.load_state_dict(state["optimizer"])
-            self.done, self.spent_s = int(state["done"]), float(state["spent_s"])
-        except (OSError, RuntimeError, KeyError, ValueError, UnpicklingError) as error:
-            raise CheckpointError(f"{path}: no training to go on with: {error}") from error
+        state = resume_training(path, self.network, self._optimizer)
+        self.done, self.spent_s = state["done"], state["spent_s"]
 
     def _set_rate(self, rounds: float) -> None:
         """The learning rate rises for half a round and falls to 0 by a half cosine."""

@@ -29,7 +29,7 @@ def test_weights_go_to_a_file_of_their_hash_and_back(plan, tmp_path):
     digest = save_weights(network, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [f"{digest}.safetensors"]
     again = load_weights(tmp_path, digest, plan.recipe)
-    points = torch.randn(4, 20, 4)
+    points = torch.randn(4, 20, 12)
     lengths = torch.full((4,), 20)
     torch.testing.assert_close(again(points, lengths), network(points, lengths))
 

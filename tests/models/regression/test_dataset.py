@@ -5,17 +5,9 @@ import numpy as np
 import torch
 from numpy.testing import assert_allclose
 
-from models.regression.dataset import equal_length_batches, scale_points, synthetic_set
+from models.regression.dataset import equal_length_batches, synthetic_set
 from models.regression.recipe import PAPER, TrainingPlan
 from models.simulation.walkers import WalkConfig
-
-
-def test_points_span_minus_one_to_one(lens):
-    corners = np.array([[[-0.5, -0.5], [1279.5, 719.5], [np.nan, np.nan]]])
-    expected = [[[-1, -1], [1, 1], [0, 0]]]
-    assert_allclose(scale_points(corners, lens, "points"), expected)
-    both = scale_points(corners, lens, "points_and_steps")
-    assert_allclose(both, [[[-1, -1, 0, 0], [1, 1, 64, 64], [0, 0, 0, 0]]])
 
 
 def test_the_papers_set_has_ten_walks_for_each_pose_of_the_grid(lens, pose):

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import angle_between
-from models.regression.dataset import scale_points
+from models.regression.inputs import network_inputs
 from models.regression.network import (
     PoseRegressor,
     network_for,
@@ -58,7 +58,7 @@ def parameters(channels: int, orientation: int) -> int:
 
 @pytest.mark.parametrize(
     ("recipe", "channels", "orientation"),
-    [(PAPER, 2, 4), (DEFAULT, 4, 2)],
+    [(PAPER, 2, 4), (DEFAULT, 12, 2)],
     ids=["paper", "default"],
 )
 def test_a_recipes_network_has_as_many_parameters_as_the_papers_layers(
@@ -248,7 +248,7 @@ def test_windows_are_predicted_as_the_network_says_one_by_one(
     assert height.dtype == q.dtype == np.float64
     assert_allclose(np.linalg.norm(q, axis=1), 1)
     for n, length in enumerate(windows.lengths):
-        points = scale_points(windows.uv[n : n + 1, :length], lens, recipe.inputs)
+        points = network_inputs(windows.uv[n : n + 1, :length], plan)
         with torch.no_grad():
             raw = network(points, torch.tensor([length])).double().numpy()
         one_height, one_q = pose_from_output(raw, plan)

@@ -42,12 +42,13 @@ def test_a_training_without_an_epoch_is_none(lens, pose):
 @pytest.mark.slow
 def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     plan = plan_training(
-        intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0, epochs=1
+        intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0
     )
     network, metrics = train(plan)
     check_held_out(metrics)
-    # 0.73; a network that is not shown the steps between points comes to 0.77.
-    assert metrics.median_angle_error_deg < 0.75 * metrics.prior_angle_error_deg
+    # 0.30 and 0.46; eight epochs of fresh weights and points and steps alone: 0.36 and 0.48.
+    assert metrics.median_angle_error_deg < 0.34 * metrics.prior_angle_error_deg
+    assert metrics.median_height_error_m < 0.5 * metrics.prior_height_error_m
     # Its own walks, seen from a camera knocked by 6 deg of tilt: the mean says so.
     knocked = replace(pose, tilt_rad=pose.tilt_rad + math.radians(6))
     walks = simulate_walks(

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.levelled import moved_by
 from models.geometry.pose import CameraPose
 from models.regression.base.features import (
     FEATURES,
@@ -18,7 +19,6 @@ from models.regression.base.features import (
     segment_features,
     walking,
 )
-from models.regression.base.levelled import moved_by
 from models.regression.base.segments import Segments
 from models.simulation.cameras import CameraRange, draw_camera
 

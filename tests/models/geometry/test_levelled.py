@@ -5,8 +5,8 @@ import numpy as np
 from hypothesis import given
 from numpy.testing import assert_allclose
 
+from models.geometry.levelled import level_from_camera, moved_by, offset_between
 from models.geometry.pose import CameraPose
-from models.regression.base.levelled import level_from_camera, moved_by, offset_between
 from tests.strategies import poses
 
 

@@ -1,0 +1,1 @@
+"""Weights that the training of a camera's regressor starts from, learned on many cameras."""
