@@ -8,7 +8,12 @@ import pytest
 from tests.benchmarks import __main__ as every
 from tests.conftest import ROOT
 
-MODULES = sorted(path.stem for path in (ROOT / "tests" / "benchmarks").glob("[a-z]*.py"))
+HERE = ROOT / "tests" / "benchmarks"
+MODULES = sorted(
+    ".".join(path.relative_to(HERE).with_suffix("").parts)
+    for path in HERE.rglob("*.py")
+    if path.name != "__init__.py" and path != HERE / "__main__.py"
+)
 
 
 @pytest.mark.parametrize("name", MODULES)

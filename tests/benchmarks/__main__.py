@@ -25,6 +25,7 @@ BENCHMARKS: dict[str, tuple[str, ...]] = {
     "refresh": (),
     "estimators": (),
     "first_estimate": (),
+    "trainings": ("--only", "default"),
     "requests": ("--json",),
     "start": (),
     "idle": ("--cameras", "500", "--minutes", "1"),

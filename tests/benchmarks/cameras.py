@@ -27,9 +27,9 @@ import psutil
 from models.trajectory import Trajectory
 from service.settings import Settings
 from service.store.sqlite.files import connected
-from tests.benchmarks.cloned import APART_S, QUEUED, as_posted, camera_at, seed
-from tests.benchmarks.http_client import Connection
 from tests.benchmarks.load import quantiles
+from tests.benchmarks.parts.cloned import APART_S, QUEUED, as_posted, camera_at, seed
+from tests.benchmarks.parts.http_client import Connection
 from tests.running import RunningService, free_port, wait_for
 
 _READS_HZ, _PAGES_HZ = 10.0, 0.1

@@ -25,7 +25,7 @@ from models.simulation.site import SiteConfig, draw_lanes, walk_site
 from models.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.benchmarks.cloned import APART_S, as_posted
+from tests.benchmarks.parts.cloned import APART_S, as_posted
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import LENS, PRIOR

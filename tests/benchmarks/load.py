@@ -24,8 +24,8 @@ import psutil
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.benchmarks.health_probe import answer_at_once, probe_health
-from tests.benchmarks.http_client import Answer, Connection
+from tests.benchmarks.parts.health_probe import answer_at_once, probe_health
+from tests.benchmarks.parts.http_client import Answer, Connection
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 

@@ -25,7 +25,7 @@ from rich.table import Table
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.benchmarks.http_client import Connection
+from tests.benchmarks.parts.http_client import Connection
 from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.synchronize import Event
 
-from tests.benchmarks.http_client import Connection
+from tests.benchmarks.parts.http_client import Connection
 
 
 def answer_at_once(port: int) -> None:

@@ -1,0 +1,1 @@
+"""Ten thousand cameras on a PostgreSQL server, with estimates that cost nothing."""
