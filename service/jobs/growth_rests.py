@@ -5,7 +5,7 @@ import time
 from service.reasons import Reasons
 
 _REST_S = 3600.0
-_SHARE = 0.2  # of a worker's time, where estimates wait for it
+_SHARE = 0.1  # of a worker's time, where estimates wait for it
 
 
 class GrowthRests:
@@ -30,7 +30,7 @@ class GrowthRests:
 class GrowthTurns:
     """How much of its time a worker has spent on growth: of hundreds of maps some are always due.
 
-    Where estimates wait, no more than a fifth of it: a map that grows minutes later is no worse.
+    Where estimates wait, no more than a tenth of it: a map that grows an hour later is no worse.
     """
 
     def __init__(self) -> None:

@@ -14,6 +14,7 @@ _READY = (
     "UPDATE site_references SET ready_at = ?, to_s = ?, tracks = 200, data = x'00', "
     "walking_speed_mps = 1.3"
 )
+_LEARNED_S = 3 * 86_400.0  # ago
 
 
 def camera_id(number: int) -> str:
@@ -35,7 +36,7 @@ def seed_file(folder: Path, cameras: int) -> Path:
     now = datetime.now(UTC)
     with connected(settings.database_path) as connection:
         said = now.strftime("%Y-%m-%d %H:%M:%S.%f")
-        connection.execute(_READY, (said, now.timestamp() - 60))
+        connection.execute(_READY, (said, now.timestamp() - _LEARNED_S))
         connection.execute("DELETE FROM trainings")
     clone(settings.database_path, [camera_id(0)], [camera_id(n) for n in range(1, cameras)])
     return settings.database_path

@@ -1,4 +1,4 @@
-"""Growth of maps at the expense of estimates that wait: a fifth of a worker's time, no more."""
+"""Growth of maps at the expense of estimates that wait: a tenth of a worker's time, no more."""
 
 import time
 from datetime import UTC, datetime
@@ -25,10 +25,10 @@ def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
     known.keep_to_lanes(PRIOR, 50 + WINDOW)
     with context.store.write() as session:
         context.queue.enqueue_estimate(session, "elsewhere", datetime.now(UTC))
-    context.growth_turns.spend(10.0)  # a fifth of the time: the next is in 40 s
+    context.growth_turns.spend(10.0)  # a tenth of the time: the next is in 90 s
     known.look()
     assert map_of(known).learned_at == first.learned_at
-    now_s += 41.0
+    now_s += 91.0
     known.look()
     assert map_of(known).tracks == WANTED + 50
 
