@@ -23,7 +23,9 @@ class Recipe:
     learned on other cameras; `target`, whether it answers a raw height and quaternion, with the
     paper's loss, or offsets from the prior pose in units of the range; `schedule`, whether the
     learning rate stays or falls to 0 by a half cosine after a short rise; `arithmetic`, whether
-    products may be of bfloat16, which is done where the processor multiplies such numbers itself.
+    products may be of bfloat16, which is done where the processor multiplies such numbers itself;
+    `centred`, whether offsets are taken off at the end by which walks seen from the prior pose are
+    answered on average.
     """
 
     name: RecipeName
@@ -40,6 +42,7 @@ class Recipe:
     batch: int
     epochs: int
     alpha: float = 1.0
+    centred: bool = False
     spread: PoseRange = field(default_factory=PoseRange)
 
 
@@ -71,6 +74,7 @@ DEFAULT = Recipe(
     arithmetic="bfloat16",
     batch=256,
     epochs=1,
+    centred=True,
 )
 
 RECIPES: dict[str, Recipe] = {recipe.name: recipe for recipe in (DEFAULT, PAPER)}

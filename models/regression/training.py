@@ -10,6 +10,7 @@ import torch
 
 from models.errors import CalibrationError
 from models.geometry.rotation import Array, angle_between
+from models.regression.centring import centre
 from models.regression.dataset import (
     SyntheticSet,
     equal_length_batches,
@@ -109,6 +110,8 @@ def train(
                 )
             )
     network.eval()
+    if recipe.centred:
+        centre(network, plan, np.random.default_rng([plan.seed, 2]))
     held_out = held_out_set(plan, _HELD_OUT_WALKS, np.random.default_rng([plan.seed, 1]))
     return network, _metrics(
         network,

@@ -1,6 +1,7 @@
 from dataclasses import replace
 from math import inf, nan, radians
 
+import numpy as np
 import pytest
 import torch
 
@@ -8,6 +9,7 @@ from models.errors import CalibrationError, DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.regression import training
+from models.regression.dataset import walks_of
 from models.regression.recipe import DEFAULT, PAPER, TrainingPlan
 from models.regression.training import (
     HeldOutCheckError,
@@ -16,6 +18,7 @@ from models.regression.training import (
     check_held_out,
     train,
 )
+from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig
 
 METRICS = HeldOutMetrics(
@@ -145,6 +148,23 @@ def test_the_papers_target_trains_too(plan: TrainingPlan) -> None:
     # Fresh weights answer a height near 0 m; the poses lie from 3 to 9 m.
     assert seen[0].loss > 4
     assert seen[-1].loss < 0.7 * seen[0].loss
+
+
+@pytest.mark.usefixtures("hardly_checked")
+def test_a_centred_one_answers_the_prior_pose_where_the_camera_has_not_moved(
+    plan: TrainingPlan,
+) -> None:
+    centred, _ = train(plan)
+    as_learned, _ = train(replace(plan, recipe=replace(plan.recipe, centred=False)))
+    poses = repeated_pose(plan.prior_pose, 1000)
+    seen = walks_of(plan, poses, np.random.default_rng(99))  # others than it was centred by
+    with torch.no_grad():
+        answers = centred(seen.points, seen.lengths)
+        before = as_learned(seen.points, seen.lengths)
+    # In units of the range, 3 m and 15 deg; a tiny training's answers hardly differ.
+    assert answers.mean(0).abs().max() < 0.002
+    assert before.mean(0).abs().max() > 0.005
+    assert torch.allclose(answers - answers.mean(0), before - before.mean(0), atol=1e-6)
 
 
 def test_errors_of_the_prior_are_those_of_the_range_it_trains_on(plan: TrainingPlan) -> None:
