@@ -7,6 +7,7 @@ here imports torch; the HTTP process holds a `JobQueue`, the worker process runs
 import contextlib
 import logging
 import secrets
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -90,9 +91,9 @@ class JobQueue:
         with contextlib.suppress(DBOSQueueDeduplicatedError), savepoint(session):
             self._enqueue(session, options, camera_id)
 
-    def cameras_under_way(self, session: Session) -> set[str]:
-        """The cameras for which an estimate job waits or runs."""
-        return engine_jobs.deduplicated(session, ESTIMATE_QUEUE)
+    def due_without_job(self, session: Session) -> Sequence[tuple[str, datetime | None]]:
+        """Cameras that are due without an estimate job, longest due first; until when they rest."""
+        return engine_jobs.due_without(session, ESTIMATE_QUEUE)
 
     def estimates_wait(self, session: Session, besides: str = "") -> bool:
         """Whether an estimate job of another camera waits to start, for want of a free worker."""

@@ -145,15 +145,6 @@ def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int
     return delete_some(session, PriorPoseRecord.id, bite)
 
 
-def due(session: Session) -> Sequence[CameraRecord]:
-    """Cameras that are to be looked at, those first that have been due for longest."""
-    return session.scalars(
-        select(CameraRecord)
-        .where(CameraRecord.estimate_due_at.is_not(None))
-        .order_by(CameraRecord.estimate_due_at, CameraRecord.id)
-    ).all()
-
-
 def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraRecord]:
     """Cameras whose last look failed, and some others, by their ids."""
     return session.scalars(

@@ -18,7 +18,12 @@ _LONGEST_ERROR = 500
 
 def may_look(camera: CameraRecord, now: datetime) -> bool:
     """Whether a camera may be looked at, or rests after a look or a failure."""
-    return not lies_ahead(camera.estimate_after, now, LONGEST_REST_S)
+    return not rests(camera.estimate_after, now)
+
+
+def rests(until: datetime | None, now: datetime) -> bool:
+    """Whether a camera rests that may not be looked at until a time."""
+    return lies_ahead(until, now, LONGEST_REST_S)
 
 
 def rest_after_s(tries: int) -> float:

@@ -19,7 +19,7 @@ from service.store.tracks import predictions, tracks
 from service.training.lost_trainings import requeue_lost
 from service.training.steps import StepWatch
 from service.training.unasked import train_by_itself
-from service.windows.looking import may_look
+from service.windows.looking import rests
 from service.windows.references import window_of
 from service.windows.requests import request_estimate
 
@@ -65,11 +65,11 @@ def overlooked(session: Session, queue: JobQueue) -> list[str]:
     They were posted to while they were looked at or rested, or the engine has lost their job.
     """
     now = datetime.now(UTC)
-    due = [camera.id for camera in cameras.due(session) if may_look(camera, now)]
-    if not due:
-        return []
-    under_way = queue.cameras_under_way(session)
-    return [camera_id for camera_id in due if camera_id not in under_way]
+    return [
+        camera_id
+        for camera_id, rests_until in queue.due_without_job(session)
+        if not rests(rests_until, now)
+    ]
 
 
 def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:

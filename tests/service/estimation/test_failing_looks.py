@@ -13,7 +13,6 @@ from service.jobs.estimate import run_estimate
 from service.jobs.upkeep import reconciliation
 from service.reasons import ServiceCode
 from service.store import flow_maps, references, trainings
-from service.store.operation import engine_jobs
 from service.store.tables.cameras import CameraRecord
 from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
 from service.store.tables.tracks import TrackRecord
@@ -22,6 +21,7 @@ from service.windows.looking import rest_after_s
 from service.windows.requests import request_estimate
 from tests.conftest import CAMERA
 from tests.service.street import KNOCKED, PRIOR, Street
+from tests.stores.queued import queued_cameras
 
 WANTED = 60
 
@@ -233,7 +233,7 @@ def test_one_job_a_camera_however_often_it_is_asked_for(newcomer):
             request_estimate(session, context.queue, "corner")
             reconciliation.reconcile_camera(session, context.queue, context.settings, "corner")
     with context.store.read() as session:
-        assert engine_jobs.deduplicated(session, "estimate") == {"corner"}
+        assert queued_cameras(session) == ["corner"]
         assert reconciliation.overlooked(session, context.queue) == []
 
 
@@ -248,7 +248,7 @@ def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newco
         reconciliation.queue_overlooked(session, context.queue, ["corner"])
     assert camera(newcomer).estimate_due_at == due_at
     with context.store.read() as session:
-        assert engine_jobs.deduplicated(session, "estimate") == {"corner"}
+        assert queued_cameras(session) == ["corner"]
         assert reconciliation.overlooked(session, context.queue) == []
 
 
@@ -261,7 +261,7 @@ def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
         session.execute(text("DELETE FROM workflow_status"))
     newcomer.keep_to_lanes(PRIOR, 5)
     with context.store.read() as session:
-        assert engine_jobs.deduplicated(session, "estimate") == set()
+        assert queued_cameras(session) == []
         assert reconciliation.overlooked(session, context.queue) == []
     let_rest_end(newcomer)
     with context.store.read() as session:

@@ -4,16 +4,12 @@ from sqlalchemy import text
 
 from tests.conftest import CAMERA, track
 from tests.service.bench import moved
-
-QUEUED = text(
-    "SELECT deduplication_id FROM workflow_status "
-    "WHERE deduplication_id IS NOT NULL ORDER BY priority, created_at"
-)
+from tests.stores.queued import queued_cameras
 
 
 def in_turn(bench):
     with bench.store.read() as session:
-        return list(session.scalars(QUEUED))
+        return queued_cameras(session)
 
 
 def post_to(http, camera_id):

@@ -25,6 +25,7 @@ from service.store.database.store import Store
 from service.store.operation import events, workers
 from service.training.weights import fetch_weights, share_weights
 from tests.stores import server
+from tests.stores.queued import queued_cameras
 
 pytestmark = pytest.mark.skipif(not server.wanted(), reason="PostgreSQL only")
 
@@ -109,7 +110,7 @@ def test_a_job_that_is_there_takes_nothing_with_it(store):
             add(session, said)
             queue.enqueue_estimate(session, "corner", datetime.now(UTC))
     with store.read() as session:
-        assert queue.cameras_under_way(session) == {"corner"}
+        assert queued_cameras(session) == ["corner"]
     assert said_after(store) == ["first", "second"]
 
 
