@@ -11,7 +11,7 @@ from pydantic import ValidationError
 _SECRETS = ("secret_key", "proxy_secret", "database_url")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
-_MOST_WORKERS = 4  # unless more are asked for: each holds 160 MB, and two carry 500 cameras
+_MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
 
 def one_a_core() -> int:
