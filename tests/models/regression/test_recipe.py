@@ -44,9 +44,11 @@ def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     plan = plan_training(
         intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0
     )
+    # A quarter of the poses: the weights that it starts from have learned the most of it.
+    plan = replace(plan, recipe=replace(plan.recipe, random_poses=1024))
     network, metrics = train(plan)
     check_held_out(metrics)
-    # 0.30 and 0.46; eight epochs of fresh weights and points and steps alone: 0.36 and 0.48.
+    # 0.32 and 0.49; eight epochs of fresh weights and points and steps alone: 0.36 and 0.48.
     assert metrics.median_angle_error_deg < 0.34 * metrics.prior_angle_error_deg
     assert metrics.median_height_error_m < 0.5 * metrics.prior_height_error_m
     # Its own walks, seen from a camera knocked by 6 deg of tilt: the mean says so.

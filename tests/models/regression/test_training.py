@@ -8,7 +8,7 @@ import torch
 from models.errors import CalibrationError, DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.regression import training
+from models.regression import centring, training
 from models.regression.dataset import walks_of
 from models.regression.recipe import DEFAULT, PAPER, TrainingPlan
 from models.regression.training import (
@@ -39,8 +39,9 @@ class StopError(Exception):
 
 @pytest.fixture
 def hardly_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most of a tiny training is its check, which few tests are about."""
+    """Most of a tiny training are its check and its centring, which few tests are about."""
     monkeypatch.setattr(training, "_HELD_OUT_WALKS", 100)
+    monkeypatch.setattr(centring, "_WALKS", 100)
 
 
 @pytest.fixture
@@ -150,7 +151,6 @@ def test_the_papers_target_trains_too(plan: TrainingPlan) -> None:
     assert seen[-1].loss < 0.7 * seen[0].loss
 
 
-@pytest.mark.usefixtures("hardly_checked")
 def test_a_centred_one_answers_the_prior_pose_where_the_camera_has_not_moved(
     plan: TrainingPlan,
 ) -> None:
