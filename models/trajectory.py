@@ -185,23 +185,26 @@ def choose_step_s(trajectories: Sequence[Trajectory]) -> float:
 
 
 def cut_windows(
-    trajectories: Sequence[Trajectory], intrinsics: Intrinsics, step_s: float
+    trajectories: Sequence[Trajectory],
+    intrinsics: Intrinsics,
+    step_s: float,
+    max_points: int = WINDOW_MAX_POINTS,
 ) -> Windows:
-    """Windows of 11 to 31 points at a fixed step, from each trajectory.
+    """Windows of 11 to 31 points (or to `max_points`) at a fixed step, from each trajectory.
 
     The rule: a trajectory is broken where its points leave the image or are more than 2.5 steps
     apart; each run is resampled linearly at `step_s` from its first point on; a run of n >= 11
-    samples is cut into ceil(n / 31) windows of equal length that do not overlap. What is shorter
-    gives no window.
+    samples is cut into ceil(n / max_points) windows of equal length that do not overlap. What is
+    shorter gives no window.
     """
     pieces: list[Array] = []
     owners: list[int] = []
     for owner, trajectory in enumerate(trajectories):
         for run in _runs(trajectory, intrinsics, step_s):
-            count = math.ceil(len(run) / WINDOW_MAX_POINTS)
+            count = math.ceil(len(run) / max_points)
             pieces += np.array_split(run, count)
             owners += [owner] * count
-    uv = np.full((len(pieces), WINDOW_MAX_POINTS, 2), np.nan)
+    uv = np.full((len(pieces), max_points, 2), np.nan)
     for row, piece in zip(uv, pieces, strict=True):
         row[: len(piece)] = piece
     return Windows(

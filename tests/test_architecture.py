@@ -43,10 +43,11 @@ MODEL_ROOMS = [
     {"regression"},
     {"flow"},
     {"drift"},
-    {"recalibration"},
+    {"recalibration", "baselines"},
     {"evaluation"},
 ]
-TORCH_ROOMS = {"models/regression", "service/jobs", "service/studies/centred.py"}
+TORCH_ROOMS = {"models/regression", "models/baselines", "service/jobs"}
+TORCH_ROOMS |= {"service/studies/centred.py", "service/studies/paper.py"}
 
 
 def sources(top: str) -> list[Path]:

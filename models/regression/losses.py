@@ -24,6 +24,12 @@ def batch_loss(
     return pose_loss(output, data.height_m[rows], data.quaternion[rows], recipe.alpha)
 
 
+def loss_on(network: PoseRegressor, data: SyntheticSet, recipe: Recipe) -> float:
+    """The mean loss of a whole set, which nothing is learned of."""
+    with torch.inference_mode():
+        return float(batch_loss(network, data, np.arange(len(data)), recipe))
+
+
 def in_bfloat16(recipe: Recipe) -> bool:
     """Whether products of this recipe are of bfloat16 here; emulated, they would take longer."""
     if recipe.arithmetic != "bfloat16":

@@ -67,11 +67,14 @@ class HeldOutCheckError(CalibrationError):
 
 
 def train(
-    plan: TrainingPlan, on_progress: Callable[[TrainingProgress], None] = lambda _: None
+    plan: TrainingPlan,
+    on_progress: Callable[[TrainingProgress], None] = lambda _: None,
+    on_epoch: Callable[[PoseRegressor], None] = lambda _: None,
 ) -> tuple[PoseRegressor, HeldOutMetrics]:
     """A trained regressor and its held-out metrics; the same plan gives the same weights.
 
-    `on_progress` is called after every step; what it raises ends the training.
+    `on_progress` is called after every step, `on_epoch` with the network as each epoch left it;
+    what they raise ends the training.
 
     Raises:
         DegenerateGeometryError: the camera sees no ground to walk on.
@@ -109,6 +112,7 @@ def train(
                     step=step, steps=steps, loss=loss_mean, eta_s=per_step_s * (steps - step)
                 )
             )
+        on_epoch(network)
     network.eval()
     if recipe.centred:
         centre(network, plan, np.random.default_rng([plan.seed, 2]))

@@ -1,4 +1,4 @@
-"""Commands of the studies: evaluate, protocol, flow-study, alarm-study, creep-study, centred."""
+"""Commands of the studies: evaluate, protocol, flow-, alarm- and creep-study, centred, paper."""
 
 from pathlib import Path
 from typing import Annotated
@@ -81,8 +81,8 @@ def protocol(
 ) -> None:
     """What is served, measured in the order of time, with faults, and over long recordings."""
     from models.evaluation.injectors.catalogue import FAULTS
-    from service.studies.served import run_served
-    from service.studies.served_tasks import Table
+    from service.studies.served.run import run_served
+    from service.studies.served.tasks import Table
 
     try:
         run_served(
@@ -187,4 +187,30 @@ def centred(
     )
 
 
-STUDIES = (evaluate, protocol, flow_study, alarm_study, creep_study, centred)
+def paper(
+    scenes: Annotated[list[Path], typer.Argument(help="Folders with camera.json and tracks.csv.")],
+    out: Annotated[Path, typer.Option(help="Folder of results, tables and the manifest.")],
+    parts: Annotated[str, typer.Option(help="Parts by name, with commas; all unless said.")] = "",
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="At most so many seeds for now; all unless said.")
+    ] = None,
+    processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
+) -> None:
+    """The paper's tables beside ours; goes on where it was ended."""
+    from models.errors import CalibrationError
+    from service.studies.paper import run_paper
+
+    try:
+        run_paper(
+            scenes,
+            parts=[name for name in parts.split(",") if name],
+            most_seeds=seeds,
+            processes=processes,
+            out=out,
+        )
+    except CalibrationError as error:
+        Console(stderr=True).print(f"[red]paper failed:[/] {error}")
+        raise typer.Exit(1) from error
+
+
+STUDIES = (evaluate, protocol, flow_study, alarm_study, creep_study, centred, paper)

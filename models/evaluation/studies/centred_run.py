@@ -4,13 +4,20 @@ This is the paper's own experiment: the training range is centred on the truth.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from models.estimation.averaged import average_windows, averaged_estimate, pose_of
+from models.estimation.averaged import (
+    PoseEstimate,
+    average_windows,
+    averaged_estimate,
+    pose_of,
+)
 from models.evaluation.scenes import Scene
+from models.geometry.pose import CameraPose
 from models.geometry.rotation import (
     Array,
     angle_between,
@@ -18,10 +25,10 @@ from models.geometry.rotation import (
     rotation_from_angles,
 )
 from models.regression.prediction import predict_windows
-from models.regression.recipe import plan_training
+from models.regression.recipe import TrainingPlan, plan_training
 from models.regression.training import TrainingProgress, train
 from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s, cut_windows
+from models.trajectory import Trajectory, Windows, choose_step_s, cut_windows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,16 +89,9 @@ def run_averaged(
     )
     network, metrics = train(plan, on_progress)
     started = time.monotonic()
-    windows = cut_windows(trajectories, scene.intrinsics, step_s)
-    height_m, quaternions = predict_windows(network, windows, plan)
-    _, predictions = average_windows(height_m, quaternions, windows.owner_idx)
-    estimate = averaged_estimate(predictions, seed)
+    estimate = averaged_of(partial(predict_windows, network, plan=plan), plan, trajectories)
     estimate_s = time.monotonic() - started
-    found = estimate.value
-    raw = quaternion_from_rotation(
-        rotation_from_angles(found.tilt_rad, found.roll_rad, found.heading_rad)
-    )
-    truth = scene.true_pose
+    found, truth = estimate.value, scene.true_pose
     served = pose_of(estimate, truth)
     return AveragedRun(
         scene=scene.scene_id,
@@ -106,7 +106,7 @@ def run_averaged(
         roll_deg=float(np.degrees(found.roll_rad)),
         height_sd_m=estimate.sd.height_m,
         height_error_m=abs(found.height_m - truth.height_m),
-        angle_error_deg=_angle_deg(raw, truth.quaternion_wxyz),
+        angle_error_deg=whole_angle_deg(estimate, truth),
         served_angle_error_deg=_angle_deg(served.quaternion_wxyz, truth.quaternion_wxyz),
         held_out_height_error_m=metrics.median_height_error_m,
         held_out_angle_error_deg=metrics.median_angle_error_deg,
@@ -115,6 +115,32 @@ def run_averaged(
         training_s=metrics.training_s,
         estimate_s=estimate_s,
     )
+
+
+def averaged_of(
+    predict: Callable[[Windows], tuple[Array, Array]],
+    plan: TrainingPlan,
+    tracks: Sequence[Trajectory],
+) -> PoseEstimate:
+    """What is said of tracks on average, of windows as long as those that were trained on.
+
+    `predict` answers windows with heights (B,) in metres and unit quaternions wxyz (B, 4).
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks give a window.
+    """
+    walk = plan.walk
+    windows = cut_windows(tracks, plan.intrinsics, walk.step_s, walk.max_points)
+    height_m, quaternions = predict(windows)
+    _, predictions = average_windows(height_m, quaternions, windows.owner_idx)
+    return averaged_estimate(predictions, plan.seed)
+
+
+def whole_angle_deg(estimate: PoseEstimate, truth: CameraPose) -> float:
+    """The paper's angle error: of the whole averaged orientation, its heading included."""
+    found = estimate.value
+    raw = rotation_from_angles(found.tilt_rad, found.roll_rad, found.heading_rad)
+    return _angle_deg(quaternion_from_rotation(raw), truth.quaternion_wxyz)
 
 
 def _angle_deg(first: np.ndarray, second: Array) -> float:

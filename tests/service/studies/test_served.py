@@ -14,9 +14,9 @@ import pytest
 from models.errors import ShapeError
 from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome, Stretch
-from service.studies.outcome_file import OutcomeFile
-from service.studies.served_tables import BEGIN, END, all_tables, write_between
-from service.studies.served_tasks import Asked, Found, Table, tasks_of
+from service.studies.served.outcome_file import OutcomeFile
+from service.studies.served.tables import BEGIN, END, all_tables, write_between
+from service.studies.served.tasks import Asked, Found, Table, tasks_of
 from tests.models.evaluation.test_partings import scene_of
 
 NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True)

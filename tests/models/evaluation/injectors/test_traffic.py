@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from models.evaluation.injectors.catalogue import FAULTS
 from models.evaluation.injectors.lens_and_ground import (
     ramp,
+    stairs,
     wrong_focal_length,
     wrong_k1,
     wrong_principal_point,
@@ -100,6 +101,29 @@ def test_a_ramp_rises_by_its_grade_beyond_a_line():
     design = np.column_stack([np.array(grid)[up], np.ones(up.sum())])
     gradient = np.linalg.lstsq(design, rise[up], rcond=None)[0][:2]
     assert np.hypot(*gradient) == pytest.approx(0.05)
+
+
+def test_a_flight_of_stairs_is_slow_steep_and_ends_on_a_floor():
+    grid = [(x, y) for x in np.linspace(-8, 8, 9) for y in np.linspace(20, 40, 9)]
+    view = view_on(grid)
+    across = [
+        walk(str(n), straight((-8, y), (8, y), 161)) for n, y in enumerate((22.0, 30.0, 38.0))
+    ]
+    found = stairs(across, view, 1.7, 2)
+    assert len(found) == 3
+    slowest = 0.0
+    for before, after, y in zip(across, found, (22.0, 30.0, 38.0), strict=True):
+        rise = 5 - (after.trajectory.uv[:, 1] - 500) * y / 1000  # v = 500 + 1000 (5 - z) / y
+        x = (after.trajectory.uv[:, 0] - 1000) * y / 1000
+        assert (rise > -1e-9).all()
+        assert (rise < 1.7 + 1e-9).all()
+        took = np.diff(after.trajectory.time_s) / np.diff(before.trajectory.time_s)[0]
+        flight = (rise > 1e-9) & (rise < 1.7 - 1e-9)
+        either = flight[1:] | flight[:-1]
+        assert_allclose(took, np.where(either, 2.5, 1.0), rtol=1e-6)
+        slowest = max(slowest, float(took.max()))
+        assert_allclose(np.diff(x), 0.1, atol=1e-9)  # seen from above, the same places
+    assert slowest == pytest.approx(2.5)
 
 
 def test_a_wrong_lens_moves_pixels_by_hand():

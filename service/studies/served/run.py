@@ -13,10 +13,10 @@ from models.evaluation.served.replays import ReplayPlan
 from models.evaluation.served.windows import Window
 from service.estimation.limits import drift_limits
 from service.settings import Settings
-from service.studies.outcome_file import OutcomeFile
 from service.studies.runs import process_pool, with_bar
-from service.studies.served_tables import all_tables, write_between
-from service.studies.served_tasks import Found, Table, Task, tasks_of, work
+from service.studies.served.outcome_file import OutcomeFile
+from service.studies.served.tables import all_tables, write_between
+from service.studies.served.tasks import Found, Table, Task, tasks_of, work
 
 
 def run_served(

@@ -1,4 +1,4 @@
-"""Outcomes in a file, a line each as they come: a study that was ended goes on where it was."""
+"""Rows of a study in a file, a line each as they come: what was ended goes on where it was."""
 
 import hashlib
 import json
@@ -12,9 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import ShapeError
-from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
-from models.evaluation.served.replays import ReplayOutcome, Stretch
-from service.studies.served_tasks import Asked, Found, Table
 
 _MODELS = Path(__file__).parent.parent.parent / "models"
 
@@ -29,8 +26,8 @@ class Heading:
     cores: int
 
 
-class OutcomeFile:
-    """The outcomes of a study, in a file of JSON lines under a heading.
+class LinesFile:
+    """Rows in a file of JSON lines under a heading; `rows` are those that were found in it.
 
     Figures of two versions of the estimator are never mixed: the heading has a hash of its code.
 
@@ -40,20 +37,15 @@ class OutcomeFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.found: dict[Asked, Found] = {}
+        self.rows: list[dict[str, Any]] = []
         if path.exists() and path.stat().st_size:
             self.heading = self._read()
         else:
             self.heading = _heading_now()
-            self._append([asdict(self.heading)])
+            self.add([asdict(self.heading)])
 
-    def add(self, found: Iterable[Found]) -> None:
-        """Keep some: once this returns they are in the file. What failed is asked again."""
-        kept = [each for each in found if not each.failure]
-        self.found |= {each.asked: each for each in kept}
-        self._append([asdict(each) for each in kept])
-
-    def _append(self, rows: Iterable[dict[str, Any]]) -> None:
+    def add(self, rows: Iterable[dict[str, Any]]) -> None:
+        """Keep some: once this returns they are in the file."""
         with self.path.open("a") as file:
             file.writelines(json.dumps(row) + "\n" for row in rows)
             file.flush()
@@ -68,15 +60,14 @@ class OutcomeFile:
         first, *lines = whole.splitlines() or [""]
         try:
             heading = Heading(**json.loads(first))
-            found = [_found(json.loads(line)) for line in lines]
-        except (ValueError, KeyError, TypeError) as error:
+            self.rows = [json.loads(line) for line in lines]
+        except (ValueError, TypeError) as error:
             raise ShapeError(f"{self.path}: no file of outcomes: {error!r}") from error
         if heading.code != code_hash():
             raise ShapeError(
                 f"{self.path}: begun {heading.begun} by other code of models/ "
                 f"({heading.code}, now {code_hash()}); name another file, or remove it"
             )
-        self.found = {each.asked: each for each in found}
         return heading
 
 
@@ -97,35 +88,3 @@ def _heading_now() -> Heading:
         processor=platform.processor() or platform.machine(),
         cores=multiprocessing.cpu_count(),
     )
-
-
-def _found(row: dict[str, Any]) -> Found:
-    asked = Asked(**{**row["asked"], "table": Table(row["asked"]["table"])})
-    told = row["outcome"]
-    if asked.table == Table.REPLAYS:
-        return Found(asked=asked, outcome=_replay_outcome(told))
-    return Found(
-        asked=asked,
-        outcome=ServedOutcome(**{**told, "parameters": _parameters(told["parameters"])}),
-    )
-
-
-def _replay_outcome(told: dict[str, Any]) -> ReplayOutcome:
-    before, after, measured = told["before"], told["after"], told["measured"]
-    return ReplayOutcome(
-        **{
-            **told,
-            "before": _stretch(before),
-            "after": None if after is None else _stretch(after),
-            "measured": None if measured is None else _parameters(measured),
-        }
-    )
-
-
-def _stretch(told: dict[str, Any]) -> Stretch:
-    counts = {name: tuple(told[name]) for name in ("identifiable", "covered")}
-    return Stretch(**{**told, **counts})
-
-
-def _parameters(told: Iterable[dict[str, Any]]) -> tuple[ParameterOutcome, ...]:
-    return tuple(ParameterOutcome(**each) for each in told)

@@ -8,8 +8,8 @@ from models.evaluation.injectors.catalogue import FAULTS
 from models.evaluation.served.figures import Figures, ParameterFigures, figures_of
 from models.evaluation.served.outcomes import ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome
-from service.studies.outcome_file import Heading
-from service.studies.served_tasks import ALONE, MOVES, Asked, Found, Table
+from service.studies.lines_file import Heading
+from service.studies.served.tasks import ALONE, MOVES, Asked, Found, Table
 
 BEGIN = "<!-- protocol: made by `surefoot protocol --write` -->\n"
 END = "<!-- end of protocol -->\n"

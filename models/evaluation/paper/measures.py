@@ -1,0 +1,95 @@
+"""What every estimator of the paper's study is measured by: in the middle, and after knocks."""
+
+import math
+from collections.abc import Callable
+from statistics import median
+
+import numpy as np
+
+from models.errors import TooFewTrajectoriesError
+from models.estimation.averaged import PoseEstimate, pose_of
+from models.estimation.parameters import plane_parameters_of
+from models.evaluation.paper.part import Figures
+from models.evaluation.protocol.cases import (
+    KNOCKED,
+    STILL,
+    Answer,
+    Estimator,
+    ProtocolCase,
+    draw_case,
+    judge_answer,
+    nothing_identifiable,
+)
+from models.evaluation.scenes import Scene
+from models.evaluation.slopes import slope_with_error
+from models.evaluation.studies.centred_run import averaged_of, whole_angle_deg
+from models.geometry.rotation import Array
+from models.regression.recipe import TrainingPlan
+from models.trajectory import Windows
+
+KNOCKS = 12
+
+Predict = Callable[[Windows], tuple[Array, Array]]
+
+
+def trained_figures(scene: Scene, plan: TrainingPlan, predict: Predict) -> Figures:
+    """The figures of a network that was trained at the scene's true pose.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks of the scene give a window.
+    """
+
+    def averaged(case: ProtocolCase) -> Answer:
+        try:
+            estimate = averaged_of(predict, plan, case.seen)
+        except TooFewTrajectoriesError:
+            return nothing_identifiable(case)
+        values = plane_parameters_of(pose_of(estimate, case.prior_pose))
+        return Answer(values=values, covariance=np.eye(3), tracks=estimate.tracks)
+
+    estimate = averaged_of(predict, plan, [track.trajectory for track in scene.tracks])
+    height_m, angle_deg = errors_of(estimate, scene)
+    figures = {
+        "tracks": float(estimate.tracks),
+        "centred_height_m": height_m,
+        "centred_deg": angle_deg,
+    }
+    return figures | knocked_figures(scene, averaged)
+
+
+def errors_of(estimate: PoseEstimate, scene: Scene) -> tuple[float, float]:
+    """Of the height in metres, and of the whole orientation in degrees, as the paper has it."""
+    truth = scene.true_pose
+    return abs(estimate.value.height_m - truth.height_m), whole_angle_deg(estimate, truth)
+
+
+def still_figures(scene: Scene, estimator: Estimator) -> Figures:
+    """Errors on a still camera, of one half of the people after the other: the middle of 12."""
+    outcomes = [
+        judge_answer(case, "", estimator(case), 0.0)
+        for case in (draw_case(scene, seed, STILL) for seed in range(KNOCKS))
+    ]
+    height_m = scene.true_pose.height_m
+    return {
+        "centred_height_m": height_m * median(each.height_error for each in outcomes),
+        "centred_deg": median(each.angle_error_deg for each in outcomes),
+    }
+
+
+def knocked_figures(scene: Scene, estimator: Estimator) -> Figures:
+    """The middle errors of 12 knocks, and the slopes of what is told over what is true."""
+    outcomes = [
+        judge_answer(case, "", estimator(case), 0.0)
+        for case in (draw_case(scene, seed, KNOCKED) for seed in range(KNOCKS))
+    ]
+    figures = {
+        "knocked_share": median(each.height_error for each in outcomes),
+        "knocked_deg": median(each.angle_error_deg for each in outcomes),
+    }
+    true, told = (
+        np.array([getattr(each, name) for each in outcomes]) for name in ("true_drift", "drift")
+    )
+    for axis, name in enumerate(("tilt", "roll", "height")):
+        slope, _ = slope_with_error(true[:, axis], told[:, axis])
+        figures[f"slope_{name}"] = math.nan if slope is None else slope
+    return figures

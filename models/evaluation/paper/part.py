@@ -1,0 +1,47 @@
+"""A part of the study of the paper: its cases, how one is run, and the table that they make."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+Figures = dict[str, float]
+OnShare = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperCase:
+    """What is run at once: a variant of a part's method on a scene, with a seed."""
+
+    part: str
+    scene: str
+    variant: str
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperResult:
+    """The figures of a case by name, and how long it took."""
+
+    case: PaperCase
+    figures: Figures
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperPart:
+    """One table or figure of the paper, beside ours.
+
+    `cases` names the cases of some scenes; `run` answers one from its scene's folder and is told
+    whom to tell which share is done; `table` is Markdown of the results that there are.
+    """
+
+    says: str
+    cases: Callable[[Sequence[str]], list[PaperCase]]
+    run: Callable[[PaperCase, Path, OnShare], Figures]
+    table: Callable[[Sequence[PaperResult]], str]
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

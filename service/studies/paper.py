@@ -1,0 +1,155 @@
+"""`surefoot paper`: the paper's tables beside ours, part by part, in a folder."""
+
+import platform
+import time
+from collections.abc import MutableMapping, Sequence
+from dataclasses import asdict
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import torch
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from models.errors import CalibrationError, ShapeError
+from models.evaluation.paper.part import PaperCase, PaperResult
+from models.evaluation.paper.parts import PARTS
+from models.evaluation.scenes import load_scene
+from service.studies.lines_file import LinesFile
+from service.studies.runs import as_they_end, process_pool, spawning, write_results
+
+_VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
+
+
+def run_paper(
+    scenes: Sequence[Path],
+    *,
+    parts: Sequence[str],
+    most_seeds: int | None,
+    processes: int,
+    out: Path,
+) -> None:
+    """Run what is not yet in the folder, and write a table for each part, and the manifest.
+
+    Args:
+        scenes: folders with `camera.json` and `tracks.csv`.
+        parts: names of `PARTS`; all where there are none.
+        most_seeds: cases with a seed of this or more are left for later; None leaves none.
+        processes: cases at once, a core each.
+        out: of `<part>.jsonl` (a result a line, as they come), `<part>.md` and `manifest.json`.
+
+    Raises:
+        ShapeError: there is no part of a name, or results in the folder are of other code.
+    """
+    console = Console()
+    for name in parts:
+        if name not in PARTS:
+            raise ShapeError(f"parts: one of {', '.join(PARTS)} is needed, got {name!r}")
+    chosen = [name for name in PARTS if name in parts or not parts]
+    folders = {folder.name: folder for folder in scenes}
+    for folder in scenes:
+        load_scene(folder)  # a wrong path fails before the first hour of training, not after
+    out.mkdir(parents=True, exist_ok=True)
+    for name in chosen:
+        _run_part(name, folders, most_seeds, processes, out, console)
+    _write_manifest(out)
+    console.print(f"{out}/manifest.json says by what, when and how long")
+
+
+def _run_part(
+    name: str,
+    folders: dict[str, Path],
+    most_seeds: int | None,
+    processes: int,
+    out: Path,
+    console: Console,
+) -> None:
+    part, kept = PARTS[name], LinesFile(out / f"{name}.jsonl")
+    results = [_result(row) for row in kept.rows]
+    known = {each.case for each in results}
+    cases = [
+        case
+        for case in part.cases(sorted(folders))
+        if case not in known and (most_seeds is None or case.seed < most_seeds)
+    ]
+    columns = TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with (
+        spawning().Manager() as manager,
+        process_pool(processes) as pool,
+        Progress(*columns, console=console) as bar,
+    ):
+        shares: MutableMapping[int, float] = manager.dict()
+        row = bar.add_task(name, total=len(cases))
+        ended = 0
+
+        def show() -> None:
+            bar.update(row, completed=ended + sum(shares.values()))
+
+        calls = [
+            partial(_run, case, folders[case.scene], shares, number)
+            for number, case in enumerate(cases)
+        ]
+        for number, found in as_they_end(pool, calls, show):
+            shares.pop(number, None)
+            ended += 1
+            if isinstance(found, str):
+                console.print(f"[red]{_name(cases[number])}:[/] {found}")
+                continue
+            kept.add([asdict(found)])
+            results.append(found)
+    text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
+    (out / f"{name}.md").write_text(text)
+    console.print(text, markup=False, soft_wrap=True)
+
+
+def _run(
+    case: PaperCase, folder: Path, shares: MutableMapping[int, float], number: int
+) -> PaperResult | str:
+    """The result of a case, or what it failed with: others go on."""
+    torch.set_num_threads(1)
+    begun = last_told = time.monotonic()
+
+    def report(share: float) -> None:
+        nonlocal last_told
+        if time.monotonic() - last_told > 1:
+            shares[number], last_told = share, time.monotonic()
+
+    try:
+        figures = PARTS[case.part].run(case, folder, report)
+    except CalibrationError as error:
+        return str(error)
+    return PaperResult(case=case, figures=figures, seconds=time.monotonic() - begun)
+
+
+def _result(row: dict[str, Any]) -> PaperResult:
+    return PaperResult(
+        case=PaperCase(**row["case"]), figures=row["figures"], seconds=row["seconds"]
+    )
+
+
+def _name(case: PaperCase) -> str:
+    return f"{case.part}, {case.variant} on {case.scene or 'no scene'}, seed {case.seed}"
+
+
+def _write_manifest(out: Path) -> None:
+    """By what, on what and how long each part took, of all that the folder has."""
+    told = {}
+    for name in PARTS:
+        path = out / f"{name}.jsonl"
+        if not path.exists():
+            continue
+        kept = LinesFile(path)
+        results = [_result(row) for row in kept.rows]
+        told[name] = {
+            "heading": asdict(kept.heading),
+            "cases": len(results),
+            "seeds": sorted({each.case.seed for each in results}),
+            "scenes": sorted({each.case.scene for each in results}),
+            "seconds": sum(each.seconds for each in results),
+            "seconds_a_case": fmean(each.seconds for each in results) if results else None,
+        }
+    versions = {name: version(name) for name in _VERSIONS} | {"python": platform.python_version()}
+    write_results(out / "manifest.json", versions=versions, parts=told)

@@ -1,0 +1,1 @@
+"""`surefoot protocol`: what is served, on recordings in the order of time."""

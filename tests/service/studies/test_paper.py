@@ -1,0 +1,48 @@
+"""`surefoot paper`: what is there is not run again, and the manifest says by what."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from service.cli import app
+from tests.conftest import SCENES
+
+SCENE = SCENES / "pets2009_s1l2_1_v001"
+needs_scenes = pytest.mark.skipif(not SCENE.exists(), reason=f"no recorded scenes in {SCENES}")
+
+
+def paper(*arguments):
+    return CliRunner().invoke(app, ["paper", *map(str, arguments)])
+
+
+@needs_scenes
+@pytest.mark.slow
+def test_a_part_goes_on_where_it_was_ended(tmp_path):
+    part = "vanishing-points"
+    first = paper(SCENE, "--out", tmp_path, "--parts", part, "--seeds", 1, "--processes", 1)
+    assert first.exit_code == 0, first.output
+    lines = (tmp_path / f"{part}.jsonl").read_text().splitlines()
+    assert len(lines) == 1 + 2  # the heading; tops of boxes, and ideal heads with the first seed
+
+    # Killed while it wrote the last one: that one alone is run again.
+    (tmp_path / f"{part}.jsonl").write_text("\n".join(lines)[:-30])
+    again = paper(SCENE, "--out", tmp_path, "--parts", part, "--seeds", 1, "--processes", 1)
+    assert again.exit_code == 0, again.output
+    figures = [json.loads(line)["figures"] for line in lines[1:]]
+    kept = (tmp_path / f"{part}.jsonl").read_text().splitlines()
+    assert kept[:2] == lines[:2]
+    assert [json.loads(line)["figures"] for line in kept[1:]] == figures
+
+    told = json.loads((tmp_path / "manifest.json").read_text())
+    assert told["parts"][part]["cases"] == 2
+    assert told["machine"]["torch"]
+    table = (tmp_path / f"{part}.md").read_text()
+    assert "ideal heads, 3 % jitter" in table
+    assert "tops of boxes" in table
+
+
+def test_a_part_that_is_none_is_named(tmp_path):
+    refused = paper(tmp_path, "--out", tmp_path, "--parts", "tables")
+    assert refused.exit_code == 1
+    assert "'tables'" in refused.output
