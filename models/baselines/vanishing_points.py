@@ -68,11 +68,7 @@ def up_of_walkers(intrinsics: Intrinsics, tracks: Sequence[Trajectory]) -> Array
             continue
         seen.append((feet, heads))
         verticals.append(_planes(feet, heads))
-        ahead = max(1, round(_APART * len(feet)))
-        first, last = slice(None, -ahead), slice(ahead, None)
-        ways = np.cross(np.cross(feet[first], feet[last]), np.cross(heads[first], heads[last]))
-        lengths = np.linalg.norm(ways, axis=1, keepdims=True)
-        level.append((ways / np.maximum(lengths, 1e-12))[lengths[:, 0] > 1e-12])
+        level.append(_level_ways(feet, heads))
     if not seen:
         raise TooFewTrajectoriesError(
             f"tracks: {_LEAST_POINTS} points of one with a head are needed, got none"
@@ -83,6 +79,8 @@ def up_of_walkers(intrinsics: Intrinsics, tracks: Sequence[Trajectory]) -> Array
     for _ in range(_ROUNDS):
         weighted = []
         for rows in kinds:  # each kind has an error of its own
+            if not len(rows):
+                continue
             misses = rows @ up
             scale = max(_MAD * float(np.median(np.abs(misses))), 1e-9)
             weights = 1 / (1 + (misses / (_CAUCHY * scale)) ** 2)
@@ -122,6 +120,21 @@ def _planes(feet: Array, heads: Array) -> Array:
 def _held_by(rows: Array) -> Array:
     """The direction (3,) that is squarest to all rows (N, 3): the last right singular vector."""
     return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][-1])
+
+
+def _level_ways(feet: Array, heads: Array) -> Array:
+    """Level directions (M, 3) between places of a walker, the longer the farther those are apart.
+
+    Places nearer to each other than the walker is tall say where noise leads.
+    """
+    ahead = max(1, round(_APART * len(feet)))
+    first, last = slice(None, -ahead), slice(ahead, None)
+    on_feet, on_heads = (np.cross(rays[first], rays[last]) for rays in (feet, heads))
+    apart = np.linalg.norm(on_feet, axis=1)
+    ways = np.cross(on_feet, on_heads)
+    lengths = np.linalg.norm(ways, axis=1)
+    far = (apart > np.linalg.norm(_planes(feet, heads)[first], axis=1)) & (lengths > 1e-12)
+    return np.asarray(ways[far] * (apart[far] / lengths[far])[:, None])
 
 
 def _upwards(axis: Array, feet: Array, heads: Array) -> Array:
