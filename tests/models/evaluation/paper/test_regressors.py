@@ -1,5 +1,6 @@
 """Table 1: a constant is right in the middle and nowhere else; epochs are chosen as they say."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -40,10 +41,10 @@ def test_a_constant_is_right_in_the_middle_and_follows_no_knock():
 
 def test_an_epoch_chosen_by_the_tracks_themselves_flatters(monkeypatch):
     def few(plan):
-        recipe = regressors.replace(
+        recipe = replace(
             plan.recipe, poses="random", random_poses=60, walks_per_pose=2, batch=40, epochs=4
         )
-        return regressors.replace(plan, recipe=recipe)
+        return replace(plan, recipe=recipe)
 
     monkeypatch.setitem(regressors.VARIANTS, "paper", few)
     shares = []
