@@ -156,7 +156,8 @@ def _that_make_a_pose(
 def _inliers(pose: Tensor, coordinates: Tensor, rays: Array) -> Tensor:
     """The soft count of points that a pose puts where they are seen."""
     misses = _misses(pose, coordinates, rays)
-    return torch.sigmoid(_SHARPNESS * (_THRESHOLD - misses)).sum()
+    count: Tensor = torch.sigmoid(_SHARPNESS * (_THRESHOLD - misses)).sum()
+    return count
 
 
 def _misses(pose: Tensor, coordinates: Tensor, rays: Array) -> Tensor:
@@ -164,4 +165,5 @@ def _misses(pose: Tensor, coordinates: Tensor, rays: Array) -> Tensor:
     seen = coordinates @ rotation_of(pose[:3]).T + pose[3:]
     depth = seen[:, 2].clamp(min=0.1)
     target = torch.from_numpy(rays).to(coordinates.dtype)
-    return torch.linalg.vector_norm(seen[:, :2] / depth[:, None] - target, dim=1)
+    misses: Tensor = torch.linalg.vector_norm(seen[:, :2] / depth[:, None] - target, dim=1)
+    return misses
