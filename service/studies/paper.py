@@ -17,10 +17,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from models.errors import CalibrationError, ShapeError
 from models.evaluation.paper.part import PaperCase, PaperResult
 from models.evaluation.paper.parts import PARTS
+from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
 from service.studies.lines_file import LinesFile
 from service.studies.runs import as_they_end, process_pool, spawning, write_results
 
+_PAPERS_OWN = "town_centre"
 _VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
 
 
@@ -39,7 +41,8 @@ def run_paper(
         parts: names of `PARTS`; all where there are none.
         most_seeds: cases with a seed of this or more are left for later; None leaves none.
         processes: cases at once, a core each.
-        out: of `<part>.jsonl` (a result a line, as they come), `<part>.md` and `manifest.json`.
+        out: of `<part>.jsonl` (a result a line, as they come), `<part>.md`, figures, and
+            `manifest.json`.
 
     Raises:
         ShapeError: there is no part of a name, or results in the folder are of other code.
@@ -55,6 +58,7 @@ def run_paper(
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
         _run_part(name, folders, most_seeds, processes, out, console)
+    _draw_efficiency(out)
     _write_manifest(out)
     console.print(f"{out}/manifest.json says by what, when and how long")
 
@@ -102,6 +106,8 @@ def _run_part(
             results.append(found)
     text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
     (out / f"{name}.md").write_text(text)
+    if part.plot is not None and results:
+        part.plot(results, out / f"{name}.png")
     console.print(text, markup=False, soft_wrap=True)
 
 
@@ -132,6 +138,19 @@ def _result(row: dict[str, Any]) -> PaperResult:
 
 def _name(case: PaperCase) -> str:
     return f"{case.part}, {case.variant} on {case.scene or 'no scene'}, seed {case.seed}"
+
+
+def _draw_efficiency(out: Path) -> None:
+    """Errors over training time, of whatever was trained for the paper's own scene."""
+    paths = [out / f"{name}.jsonl" for name in ("regressors", "posenet")]
+    rows = [row for path in paths if path.exists() for row in LinesFile(path).rows]
+    trained = [
+        each
+        for each in (_result(row) for row in rows)
+        if "training_s" in each.figures and each.case.scene == _PAPERS_OWN
+    ]
+    if trained:
+        plot_efficiency(trained, out / "efficiency.png")
 
 
 def _write_manifest(out: Path) -> None:

@@ -32,13 +32,15 @@ class PaperPart:
     """One table or figure of the paper, beside ours.
 
     `cases` names the cases of some scenes; `run` answers one from its scene's folder and is told
-    whom to tell which share is done; `table` is Markdown of the results that there are.
+    whom to tell which share is done; `table` is Markdown of the results that there are, and `plot`
+    draws them into a PNG.
     """
 
     says: str
     cases: Callable[[Sequence[str]], list[PaperCase]]
     run: Callable[[PaperCase, Path, OnShare], Figures]
     table: Callable[[Sequence[PaperResult]], str]
+    plot: Callable[[Sequence[PaperResult], Path], None] | None = None
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -6,6 +6,7 @@ from models.evaluation.paper.peers import PEERS
 from models.evaluation.paper.posenet import POSENET
 from models.evaluation.paper.regressors_table import REGRESSORS
 from models.evaluation.paper.stairs import STAIRS
+from models.evaluation.paper.sweep import SPEED_SWEEP
 from models.evaluation.paper.vanishing import VANISHING_POINTS
 
 PARTS: dict[str, PaperPart] = {
@@ -15,4 +16,5 @@ PARTS: dict[str, PaperPart] = {
     "vanishing-points": VANISHING_POINTS,
     "peers": PEERS,
     "stairs": STAIRS,
+    "speed-sweep": SPEED_SWEEP,
 }

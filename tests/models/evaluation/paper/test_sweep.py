@@ -1,0 +1,48 @@
+"""The sweep of training speeds: a slow clock is people in a hurry, and the service says so."""
+
+import numpy as np
+import pytest
+
+from models.evaluation.paper.part import PaperCase, PaperResult
+from models.evaluation.paper.sweep import (
+    SLOW_CLOCK,
+    SPEED_SWEEP,
+    SPEEDS_MPS,
+    _by_a_slow_clock,
+    _said_of_the_clock,
+    parted,
+)
+from tests.models.evaluation.test_partings import scene_of
+
+SCENE = scene_of([30.0 * number for number in range(16)])  # 12 m in 10 s
+
+
+def test_speeds_are_those_of_the_paper():
+    assert SPEEDS_MPS[0] == 0.2
+    assert SPEEDS_MPS[-1] == 4.0
+    assert np.diff(SPEEDS_MPS) == pytest.approx(0.2)
+
+
+def test_a_slow_clock_makes_people_hurry_and_is_doubted():
+    said = _said_of_the_clock(SCENE)
+    assert said["walking_speed_mps"] == pytest.approx(1.2, rel=0.03)
+    assert not said["clock_doubted"]
+    said = _said_of_the_clock(_by_a_slow_clock(SCENE))
+    assert said["walking_speed_mps"] == pytest.approx(3.0, rel=0.03)
+    assert said["clock_doubted"]
+
+
+def test_the_table_names_the_floor():
+    results = [
+        PaperResult(
+            case=PaperCase(part="speed-sweep", scene="a", variant=f"{SLOW_CLOCK} at {v:g} m/s", seed=0),
+            figures={"height_m": abs(v - 3.4) + 0.1, "deg": 1.0, "training_s": 1.0,
+                     "walking_speed_mps": 3.5, "clock_doubted": 1.0},
+            seconds=1.0,
+        )
+        for v in SPEEDS_MPS
+    ]  # fmt: skip
+    assert parted(results[0].case.variant) == (SLOW_CLOCK, 0.2)
+    row = SPEED_SWEEP.table(results).splitlines()[2].split(" | ")
+    assert row[2:5] == ["20 of 20", "3.4", "3.50, which it doubts"]
+    assert row[7] == "2.10, 1.0"  # at 1.4 m/s
