@@ -79,10 +79,14 @@ def hypotheses(
     world = coordinates.detach().double().numpy()
     found = []
     for _ in range(count):
-        rows = _that_make_a_pose(world, rays, rng)
-        if rows is not None:
-            pose: Tensor = _PoseOfPoints.apply(coordinates[rows], rays[rows])
-            found.append(pose)
+        drawn = _drawn_pose(world, rays, rng)
+        if drawn is None:
+            continue
+        rows, told = drawn
+        pose: Tensor = torch.from_numpy(told)
+        if coordinates.requires_grad:
+            pose = _PoseOfPoints.apply(coordinates[rows], rays[rows])
+        found.append(pose)
     return found
 
 
@@ -141,15 +145,17 @@ def rotation_of(turn: Tensor) -> Tensor:
     return rotation
 
 
-def _that_make_a_pose(
+def _drawn_pose(
     world: Array, rays: Array, rng: np.random.Generator
-) -> npt.NDArray[np.int64] | None:
+) -> tuple[npt.NDArray[np.int64], Array] | None:
+    """Four drawn points and their pose (6,); None where ten draws make none."""
     if len(rays) < _POINTS:
         return None
     for _ in range(_DRAWS):
         rows = rng.choice(len(rays), _POINTS, replace=False)
-        if pose_of_points(world[rows], rays[rows]) is not None:
-            return rows
+        pose = pose_of_points(world[rows], rays[rows])
+        if pose is not None:
+            return rows, pose
     return None
 
 

@@ -39,8 +39,8 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s, cut_windows
 
 _PUBLISHED = {"town_centre": "12.99, 123.97"}
-_PICTURES, _HELD_OUT, _END_TO_END = 4000, 500, 1000
-_EPOCHS = 10
+_PICTURES, _HELD_OUT, _END_TO_END = 2000, 300, 500
+_EPOCHS = 6
 _HYPOTHESES = 64
 _ALPHA = 1.0
 
