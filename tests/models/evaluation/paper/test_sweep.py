@@ -33,15 +33,17 @@ def test_a_slow_clock_makes_people_hurry_and_is_doubted():
 
 
 def test_the_table_names_the_floor():
+    told = {"deg": 1.0, "training_s": 1.0, "walking_speed_mps": 3.5, "clock_doubted": 1.0}
     results = [
         PaperResult(
-            case=PaperCase(part="speed-sweep", scene="a", variant=f"{SLOW_CLOCK} at {v:g} m/s", seed=0),
-            figures={"height_m": abs(v - 3.4) + 0.1, "deg": 1.0, "training_s": 1.0,
-                     "walking_speed_mps": 3.5, "clock_doubted": 1.0},
+            case=PaperCase(
+                part="speed-sweep", scene="a", variant=f"{SLOW_CLOCK} at {speed:g} m/s", seed=0
+            ),
+            figures={"height_m": abs(speed - 3.4) + 0.1, **told},
             seconds=1.0,
         )
-        for v in SPEEDS_MPS
-    ]  # fmt: skip
+        for speed in SPEEDS_MPS
+    ]
     assert parted(results[0].case.variant) == (SLOW_CLOCK, 0.2)
     row = SPEED_SWEEP.table(results).splitlines()[2].split(" | ")
     assert row[2:5] == ["20 of 20", "3.4", "3.50, which it doubts"]
