@@ -195,6 +195,9 @@ def paper(
         int | None, typer.Option(min=1, help="At most so many seeds for now; all unless said.")
     ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
+    tables: Annotated[
+        bool, typer.Option("--tables", help="Run nothing: tables of what the folder has.")
+    ] = False,
 ) -> None:
     """The paper's tables beside ours; goes on where it was ended."""
     from models.errors import CalibrationError
@@ -205,7 +208,7 @@ def paper(
             scenes,
             parts=[name for name in parts.split(",") if name],
             most_seeds=seeds,
-            processes=processes,
+            processes=0 if tables else processes,
             out=out,
         )
     except CalibrationError as error:

@@ -2,7 +2,7 @@
 
 import platform
 import time
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from importlib.metadata import version
@@ -40,7 +40,7 @@ def run_paper(
         scenes: folders with `camera.json` and `tracks.csv`.
         parts: names of `PARTS`; all where there are none.
         most_seeds: cases with a seed of this or more are left for later; None leaves none.
-        processes: cases at once, a core each.
+        processes: cases at once, a core each; with 0 none is run, and tables alone are written.
         out: of `<part>.jsonl` (a result a line, as they come), `<part>.md`, figures, and
             `manifest.json`.
 
@@ -79,14 +79,29 @@ def _run_part(
         for case in part.cases(sorted(folders))
         if case not in known and (most_seeds is None or case.seed < most_seeds)
     ]
-    columns = TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    if processes:
+        for found in _found(cases, folders, processes, console):
+            kept.add([asdict(found)])
+            results.append(found)
+    text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
+    (out / f"{name}.md").write_text(text)
+    if part.plot is not None and results:
+        part.plot(results, out / f"{name}.png")
+    console.print(text, markup=False, soft_wrap=True)
+
+
+def _found(
+    cases: Sequence[PaperCase], folders: dict[str, Path], processes: int, console: Console
+) -> Iterator[PaperResult]:
+    """The results of cases as they come; what one fails with is printed, and others go on."""
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
     with (
         spawning().Manager() as manager,
         process_pool(processes) as pool,
-        Progress(*columns, console=console) as bar,
+        Progress(*columns, TimeRemainingColumn(), console=console) as bar,
     ):
         shares: MutableMapping[int, float] = manager.dict()
-        row = bar.add_task(name, total=len(cases))
+        row = bar.add_task(cases[0].part if cases else "nothing to run", total=len(cases))
         ended = 0
 
         def show() -> None:
@@ -101,14 +116,8 @@ def _run_part(
             ended += 1
             if isinstance(found, str):
                 console.print(f"[red]{_name(cases[number])}:[/] {found}")
-                continue
-            kept.add([asdict(found)])
-            results.append(found)
-    text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
-    (out / f"{name}.md").write_text(text)
-    if part.plot is not None and results:
-        part.plot(results, out / f"{name}.png")
-    console.print(text, markup=False, soft_wrap=True)
+            else:
+                yield found
 
 
 def _run(

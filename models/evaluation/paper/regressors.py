@@ -38,6 +38,7 @@ from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
 
 CONSTANT, SERVED, DEFAULT, PAPER = "constant", "served", "default", "paper"
+AUTHORS_CODE = "paper, 5,145 walks, 25 epochs"
 _HELD_OUT = 500
 
 Change = Callable[[TrainingPlan], TrainingPlan]
@@ -59,7 +60,7 @@ VARIANTS: dict[str, Change] = {
     "paper, up to 35 points": _walk(max_points=35),
     "paper, learning rate 1e-4": _recipe(learning_rate=1e-4),
     "paper, learning rate falls to 0": _recipe(schedule="cosine"),
-    "paper, 5,145 walks, 25 epochs": _recipe(spread=_COARSE, walks_per_pose=15, epochs=25),
+    AUTHORS_CODE: _recipe(spread=_COARSE, walks_per_pose=15, epochs=25),
 }
 
 

@@ -41,6 +41,12 @@ def test_a_part_goes_on_where_it_was_ended(tmp_path):
     assert "ideal heads, 3 % jitter" in table
     assert "tops of boxes" in table
 
+    (tmp_path / f"{part}.md").unlink()
+    tables = paper(SCENE, "--out", tmp_path, "--parts", part, "--tables")
+    assert tables.exit_code == 0, tables.output
+    assert (tmp_path / f"{part}.md").read_text() == table  # and the other seeds were not run
+    assert len((tmp_path / f"{part}.jsonl").read_text().splitlines()) == len(lines)
+
 
 def test_a_part_that_is_none_is_named(tmp_path):
     refused = paper(tmp_path, "--out", tmp_path, "--parts", "tables")
