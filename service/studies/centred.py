@@ -15,7 +15,7 @@ from rich.table import Table
 from models.evaluation.scenes import load_scene
 from models.evaluation.studies.centred_run import AveragedRun, run_averaged
 from models.regression.training import TrainingProgress
-from service.studies.runs import as_they_end, process_pool, spawning, write_results
+from service.studies.runs import as_they_end, process_pool, shared_values, write_results
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ def run_centred(
         load_scene(folder)  # a wrong path fails before the first hour of training, not after
     runs: list[AveragedRun] = []
     with (
-        spawning().Manager() as manager,
+        shared_values() as manager,
         process_pool(processes) as pool,
         Progress(console=console) as bar,
     ):

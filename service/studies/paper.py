@@ -20,7 +20,7 @@ from models.evaluation.paper.parts import PARTS
 from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
 from service.studies.lines_file import LinesFile
-from service.studies.runs import as_they_end, process_pool, spawning, write_results
+from service.studies.runs import as_they_end, process_pool, shared_values, write_results
 
 _PAPERS_OWN = "town_centre"
 _VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
@@ -96,7 +96,7 @@ def _found(
     """The results of cases as they come; what one fails with is printed, and others go on."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
     with (
-        spawning().Manager() as manager,
+        shared_values() as manager,
         process_pool(processes) as pool,
         Progress(*columns, TimeRemainingColumn(), console=console) as bar,
     ):

@@ -2,10 +2,14 @@
 
 import json
 import multiprocessing
+import multiprocessing.connection
+import os
 import platform
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing.context import SpawnContext
+from multiprocessing.managers import SyncManager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,8 +26,28 @@ def spawning() -> SpawnContext:
 
 
 def process_pool(processes: int) -> ProcessPoolExecutor:
-    """So many processes, a core each."""
-    return ProcessPoolExecutor(processes, mp_context=spawning())
+    """So many processes, a core each, which end when this one does, however it does."""
+    return ProcessPoolExecutor(processes, mp_context=spawning(), initializer=_end_with_parent)
+
+
+def shared_values() -> SyncManager:
+    """What processes share, in one of its own, which ends with this one, too."""
+    manager = SyncManager(ctx=spawning())
+    manager.start(_end_with_parent)
+    return manager
+
+
+def _end_with_parent() -> None:
+    """A task of hours would go on by itself where the study was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch(sentinel: int = parent.sentinel) -> None:
+        multiprocessing.connection.wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def as_they_end(

@@ -2,14 +2,20 @@
 
 import json
 import math
+import os
+import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from io import StringIO
 
+import psutil
 import pytest
 from rich.console import Console
 
 from service.studies.runs import as_they_end, process_pool, with_bar, write_results
+from tests.conftest import ROOT
 
 
 def test_results_come_as_tasks_end_and_the_bar_counts_cases():
@@ -29,6 +35,33 @@ def test_a_tick_comes_while_nothing_ends_and_a_failure_is_raised():
         assert ticks
         with pytest.raises(ValueError, match="math domain error|nonnegative"):
             list(as_they_end(pool, [partial(math.sqrt, -1.0)]))
+
+
+STUDY = """
+import os, time
+from service.studies.runs import process_pool, shared_values
+
+if __name__ == "__main__":
+    with shared_values() as manager, process_pool(1) as pool:
+        print(pool.submit(os.getpid).result(), manager._process.pid, flush=True)
+        pool.submit(time.sleep, 300).result()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_no_process_of_a_study_outlives_it(tmp_path, how):
+    (tmp_path / "study.py").write_text(STUDY)
+    study = subprocess.Popen(
+        [sys.executable, tmp_path / "study.py"], cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    others = [psutil.Process(int(pid)) for pid in study.stdout.readline().split()]
+    assert len(others) == 2
+    study.send_signal(how)
+    study.wait()
+    _, alive = psutil.wait_procs(others, timeout=20)
+    assert not alive
 
 
 def test_json_says_on_what_machine_and_with_which_versions(tmp_path):
