@@ -198,6 +198,9 @@ def paper(
     tables: Annotated[
         bool, typer.Option("--tables", help="Run nothing: tables of what the folder has.")
     ] = False,
+    write: Annotated[
+        Path | None, typer.Option(help="A page with markers to write the tables into.")
+    ] = None,
 ) -> None:
     """The paper's tables beside ours; goes on where it was ended."""
     from models.errors import CalibrationError
@@ -210,6 +213,7 @@ def paper(
             most_seeds=seeds,
             processes=0 if tables else processes,
             out=out,
+            page=write,
         )
     except CalibrationError as error:
         Console(stderr=True).print(f"[red]paper failed:[/] {error}")

@@ -20,9 +20,11 @@ from models.evaluation.paper.parts import PARTS
 from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
 from service.studies.lines_file import LinesFile
+from service.studies.pages import markers, write_between
 from service.studies.runs import as_they_end, process_pool, shared_values, write_results
 
 _PAPERS_OWN = "town_centre"
+_COMMAND = "surefoot paper --write"
 _VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
 
 
@@ -33,6 +35,7 @@ def run_paper(
     most_seeds: int | None,
     processes: int,
     out: Path,
+    page: Path | None = None,
 ) -> None:
     """Run what is not yet in the folder, and write a table for each part, and the manifest.
 
@@ -43,9 +46,11 @@ def run_paper(
         processes: cases at once, a core each; with 0 none is run, and tables alone are written.
         out: of `<part>.jsonl` (a result a line, as they come), `<part>.md`, figures, and
             `manifest.json`.
+        page: with markers to write the tables between, or None.
 
     Raises:
-        ShapeError: there is no part of a name, or results in the folder are of other code.
+        ShapeError: there is no part of a name, results in the folder are of other code, or the
+            page lacks the markers of a part.
     """
     console = Console()
     for name in parts:
@@ -57,7 +62,7 @@ def run_paper(
         load_scene(folder)  # a wrong path fails before the first hour of training, not after
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
-        _run_part(name, folders, most_seeds, processes, out, console)
+        _run_part(name, folders, most_seeds, processes, out, page, console)
     _draw_efficiency(out)
     _write_manifest(out)
     console.print(f"{out}/manifest.json says by what, when and how long")
@@ -69,6 +74,7 @@ def _run_part(
     most_seeds: int | None,
     processes: int,
     out: Path,
+    page: Path | None,
     console: Console,
 ) -> None:
     part, kept = PARTS[name], LinesFile(out / f"{name}.jsonl")
@@ -85,6 +91,8 @@ def _run_part(
             results.append(found)
     text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
     (out / f"{name}.md").write_text(text)
+    if page is not None:
+        write_between(page, markers(name, _COMMAND), text)
     if part.plot is not None and results:
         part.plot(results, out / f"{name}.png")
     console.print(text, markup=False, soft_wrap=True)

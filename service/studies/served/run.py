@@ -13,9 +13,10 @@ from models.evaluation.served.replays import ReplayPlan
 from models.evaluation.served.windows import Window
 from service.estimation.limits import drift_limits
 from service.settings import Settings
+from service.studies.pages import write_between
 from service.studies.runs import process_pool, with_bar
 from service.studies.served.outcome_file import OutcomeFile
-from service.studies.served.tables import all_tables, write_between
+from service.studies.served.tables import BETWEEN, all_tables
 from service.studies.served.tasks import Found, Table, Task, tasks_of, work
 
 
@@ -56,7 +57,7 @@ def run_served(
     said = all_tables(kept.heading, kept.found.values())
     console.print(said, markup=False, highlight=False, soft_wrap=True)
     if page is not None:
-        write_between(page, said)
+        write_between(page, BETWEEN, said)
     console.print(f"{output} has all; {time.monotonic() - started:.0f} s")
     if failures:
         first = failures[0]

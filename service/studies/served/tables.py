@@ -1,18 +1,16 @@
-"""The tables of `surefoot protocol`, in Markdown, and their place between a page's markers."""
+"""The tables of `surefoot protocol`, in Markdown."""
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
-from models.errors import ShapeError
 from models.evaluation.injectors.catalogue import FAULTS
 from models.evaluation.served.figures import Figures, ParameterFigures, figures_of
 from models.evaluation.served.outcomes import ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome
 from service.studies.lines_file import Heading
+from service.studies.pages import markers
 from service.studies.served.tasks import ALONE, MOVES, Asked, Found, Table
 
-BEGIN = "<!-- protocol: made by `surefoot protocol --write` -->\n"
-END = "<!-- end of protocol -->\n"
+BETWEEN = markers("protocol", "surefoot protocol --write")
 _KNOCKS = {
     "still": "still",
     "knock": "tilt, roll, height",
@@ -53,19 +51,6 @@ def all_tables(heading: Heading, found: Iterable[Found]) -> str:
     if replays:
         said.append(_replay_table(replays))
     return "\n".join(f"{each.rstrip()}\n" for each in said)
-
-
-def write_between(page: Path, tables: str) -> None:
-    """Put tables between a page's markers.
-
-    Raises:
-        ShapeError: the page lacks them.
-    """
-    text = page.read_text()
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ShapeError(f"{page}: {BEGIN.strip()} and {END.strip()} are needed, once each")
-    before, rest = text.split(BEGIN)
-    page.write_text(before + BEGIN + "\n" + tables + "\n" + END + rest.split(END)[1])
 
 
 _Cases = Sequence[tuple[Asked, ServedOutcome]]

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.studies.pages import markers
 from tests.conftest import SCENES
 
 SCENE = SCENES / "pets2009_s1l2_1_v001"
@@ -42,9 +43,13 @@ def test_a_part_goes_on_where_it_was_ended(tmp_path):
     assert "tops of boxes" in table
 
     (tmp_path / f"{part}.md").unlink()
-    tables = paper(SCENE, "--out", tmp_path, "--parts", part, "--tables")
+    page = tmp_path / "page.md"
+    begin, end = markers(part, "surefoot paper --write")
+    page.write_text(f"{begin}old\n{end}")
+    tables = paper(SCENE, "--out", tmp_path, "--parts", part, "--tables", "--write", page)
     assert tables.exit_code == 0, tables.output
     assert (tmp_path / f"{part}.md").read_text() == table  # and the other seeds were not run
+    assert page.read_text() == f"{begin}\n{table}\n{end}"
     assert len((tmp_path / f"{part}.jsonl").read_text().splitlines()) == len(lines)
 
 

@@ -14,8 +14,9 @@ import pytest
 from models.errors import ShapeError
 from models.evaluation.served.outcomes import ParameterOutcome, ServedOutcome
 from models.evaluation.served.replays import ReplayOutcome, Stretch
+from service.studies.pages import write_between
 from service.studies.served.outcome_file import OutcomeFile
-from service.studies.served.tables import BEGIN, END, all_tables, write_between
+from service.studies.served.tables import BETWEEN, all_tables
 from service.studies.served.tasks import Asked, Found, Table, tasks_of
 from tests.models.evaluation.test_partings import scene_of
 
@@ -105,13 +106,14 @@ def test_tables_say_what_outcomes_come_to(tmp_path):
 
 def test_tables_are_put_between_the_markers_of_a_page(tmp_path):
     page = tmp_path / "README.md"
-    page.write_text(f"before\n{BEGIN}old\n{END}after\n")
-    write_between(page, "new\n")
-    write_between(page, "newer\n")
-    assert page.read_text() == f"before\n{BEGIN}\nnewer\n\n{END}after\n"
+    begin, end = BETWEEN
+    page.write_text(f"before\n{begin}old\n{end}after\n")
+    write_between(page, BETWEEN, "new\n")
+    write_between(page, BETWEEN, "newer\n")
+    assert page.read_text() == f"before\n{begin}\nnewer\n\n{end}after\n"
     page.write_text("nothing here\n")
     with pytest.raises(ShapeError, match="once each"):
-        write_between(page, "new\n")
+        write_between(page, BETWEEN, "new\n")
 
 
 def write_street(folder: Path) -> Path:
@@ -159,7 +161,7 @@ def test_tasks_share_their_reference_and_name_what_is_unknown(tmp_path):
 def test_a_study_that_was_ended_goes_on_and_writes_its_page(tmp_path):
     folder = write_street(tmp_path / "street")
     page, output = tmp_path / "page.md", tmp_path / "p.jsonl"
-    page.write_text(f"{BEGIN}{END}")
+    page.write_text("".join(BETWEEN))
     command = [
         sys.executable, "-m", "service.cli", "protocol", str(folder), "--tables", "people",
         "--seeds", "4", "--processes", "1", "--output", str(output), "--write", str(page),
