@@ -32,11 +32,9 @@ from models.regression.training import train
 from models.simulation.walkers import WalkConfig
 from models.trajectory import choose_step_s
 
-_GROUNDS: dict[str, Fault | None] = {
-    "flat": None,
-    "stairs": Fault(injector=stairs, size=2.0, words="a flight of 2 m and the floor beyond"),
-    "ramp": Fault(injector=ramp, size=0.1, words="10 % over half of the places"),
-}
+_HIGHEST_M, _HIGHEST_SHARE = 2.0, 0.25  # of a flight: a floor's half, and of the camera's height
+_RAMP = 0.1
+_GROUNDS = ("flat", "stairs", "ramp")
 _SEEDS = (0, 1, 2)
 _KNOCKS = 4  # a seed
 
@@ -57,6 +55,17 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     return _averaged(scene, case.seed, on_share)
 
 
+def _faults(scene: Scene) -> dict[str, Fault | None]:
+    """What is wrong with the ground, by `_GROUNDS`."""
+    flight_m = min(_HIGHEST_M, _HIGHEST_SHARE * scene.true_pose.height_m)
+    faults = (
+        None,
+        Fault(injector=stairs, size=flight_m, words=f"a flight of {flight_m:.1f} m"),
+        Fault(injector=ramp, size=_RAMP, words="10 % over half of the places"),
+    )
+    return dict(zip(_GROUNDS, faults, strict=True))
+
+
 def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
     plan = plan_training(
         intrinsics=scene.intrinsics,
@@ -68,7 +77,7 @@ def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
     network, _ = train(plan, lambda at: on_share(at.step / at.steps))
     predict = partial(predict_windows, network, plan=plan)
     figures: Figures = {}
-    for ground, fault in _GROUNDS.items():
+    for ground, fault in _faults(scene).items():
         tracks = scene.tracks if fault is None else fault.inject(scene.tracks, view_of(scene), seed)
         estimate = averaged_of(predict, plan, [track.trajectory for track in tracks])
         height_m, angle_deg = errors_of(estimate, scene)
@@ -78,7 +87,7 @@ def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
 
 def _served(scene: Scene, seed: int) -> Figures:
     figures: Figures = {}
-    for ground, fault in _GROUNDS.items():
+    for ground, fault in _faults(scene).items():
         outcomes = []
         for knock in range(seed * _KNOCKS, (seed + 1) * _KNOCKS):
             case = draw_case(scene, knock, KNOCKED, fault=fault)
