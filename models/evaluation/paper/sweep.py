@@ -25,6 +25,7 @@ from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import run_averaged
 from models.reasons import TracksCode
 from models.recalibration import learn_site, observe
+from models.trajectory import by_end
 
 SPEEDS_MPS = tuple(round(0.2 * step, 1) for step in range(1, 21))
 SLOW_CLOCK = "default, a clock 2.5 times too slow"
@@ -84,7 +85,8 @@ def _by_a_slow_clock(scene: Scene) -> Scene:
 
 def _said_of_the_clock(scene: Scene) -> Figures:
     """How fast the service takes people to be, and whether it says that this cannot be."""
-    tracks = [track.trajectory for track in scene.tracks if track.trajectory.long_enough]
+    told = (track.trajectory for track in scene.tracks)
+    tracks = by_end(each for each in told if each.long_enough)
     lens, pose = scene.intrinsics, scene.true_pose
     site = learn_site(observe(tracks, lens, pose), lens, pose, chart=False).speed_reference
     unusual = site.doubt is not None and site.doubt.code == TracksCode.SPEED_UNUSUAL

@@ -1,5 +1,7 @@
 """The sweep of training speeds: a slow clock is people in a hurry, and the service says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,22 @@ from models.evaluation.paper.sweep import (
     _said_of_the_clock,
     parted,
 )
+from models.evaluation.scenes import SceneTrack
 from tests.models.evaluation.test_partings import scene_of
 
 SCENE = scene_of([30.0 * number for number in range(16)])  # 12 m in 10 s
+# Somebody who came before others and ended after them: a service is told of them later.
+SLOWEST = SCENE.tracks[1].trajectory
+SCENE = replace(
+    SCENE,
+    tracks=(
+        *SCENE.tracks,
+        SceneTrack(
+            track_id="slow",
+            trajectory=replace(SLOWEST, time_s=SLOWEST.time_s[0] + 0.41 * np.arange(26) * 10),
+        ),
+    ),
+)
 
 
 def test_speeds_are_those_of_the_paper():
