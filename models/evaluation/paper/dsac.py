@@ -22,6 +22,7 @@ from models.baselines.scene_coordinates import (
     train_places,
 )
 from models.errors import CalibrationError
+from models.evaluation.paper.measures import centred_plan
 from models.evaluation.paper.part import (
     Figures,
     OnShare,
@@ -33,10 +34,9 @@ from models.evaluation.paper.part import (
 from models.evaluation.protocol.cases import angle_deg
 from models.evaluation.scenes import load_scene
 from models.geometry.pose import CameraPose, pose_from_matrices
-from models.regression.recipe import TrainingPlan, plan_training
+from models.regression.recipe import TrainingPlan
 from models.simulation.poses import repeated_pose
-from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s, cut_windows
+from models.trajectory import cut_windows
 
 _PUBLISHED = {"town_centre": "12.99, 123.97"}
 _PICTURES, _HELD_OUT, _END_TO_END = 2000, 300, 500
@@ -52,13 +52,7 @@ def _cases(scenes: Sequence[str]) -> list[PaperCase]:
 def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     scene = load_scene(folder)
     tracks = [track.trajectory for track in scene.tracks]
-    plan = plan_training(
-        intrinsics=scene.intrinsics,
-        prior_pose=scene.true_pose,
-        recipe_name="paper",
-        walk=WalkConfig(step_s=choose_step_s(tracks)),
-        seed=case.seed,
-    )
+    plan = centred_plan(scene, "paper", case.seed)
     rng = np.random.default_rng(case.seed)
     data, held_out = patch_set(plan, _PICTURES, rng), patch_set(plan, _HELD_OUT, rng)
     few = patch_set(plan, _END_TO_END, rng)

@@ -24,12 +24,24 @@ from models.evaluation.scenes import Scene
 from models.evaluation.slopes import slope_with_error
 from models.evaluation.studies.centred_run import averaged_of, whole_angle_deg
 from models.geometry.rotation import Array
-from models.regression.recipe import TrainingPlan
-from models.trajectory import Windows
+from models.regression.recipe import TrainingPlan, plan_training
+from models.simulation.walkers import WalkConfig
+from models.trajectory import Windows, choose_step_s
 
 KNOCKS = 12
 
 Predict = Callable[[Windows], tuple[Array, Array]]
+
+
+def centred_plan(scene: Scene, recipe_name: str, seed: int) -> TrainingPlan:
+    """A training around a scene's true pose, as the paper has it; its step is one of its tracks."""
+    return plan_training(
+        intrinsics=scene.intrinsics,
+        prior_pose=scene.true_pose,
+        recipe_name=recipe_name,
+        walk=WalkConfig(step_s=choose_step_s([track.trajectory for track in scene.tracks])),
+        seed=seed,
+    )
 
 
 def trained_figures(scene: Scene, plan: TrainingPlan, predict: Predict) -> Figures:

@@ -43,6 +43,14 @@ class PaperPart:
     plot: Callable[[Sequence[PaperResult], Path], None] | None = None
 
 
+def by_row(results: Sequence[PaperResult]) -> dict[tuple[str, str], list[Figures]]:
+    """The figures of each scene and variant, one for each seed, in the order of their names."""
+    rows: dict[tuple[str, str], list[Figures]] = {}
+    for each in sorted(results, key=lambda one: (one.case.scene, one.case.variant, one.case.seed)):
+        rows.setdefault((each.case.scene, each.case.variant), []).append(each.figures)
+    return rows
+
+
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table of Markdown."""
     lines = [header, ["---"] * len(header), *rows]

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from models.baselines.posenet import parameters_of, read_windows, train_posenet
-from models.evaluation.paper.measures import trained_figures
+from models.evaluation.paper.measures import centred_plan, trained_figures
 from models.evaluation.paper.part import (
     Figures,
     OnShare,
@@ -15,9 +15,6 @@ from models.evaluation.paper.part import (
     markdown,
 )
 from models.evaluation.scenes import load_scene
-from models.regression.recipe import plan_training
-from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s
 
 # By alpha, on Town Centre: metres and degrees.
 _PUBLISHED = {
@@ -45,13 +42,7 @@ def _cases(scenes: Sequence[str]) -> list[PaperCase]:
 
 def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     scene = load_scene(folder)
-    plan = plan_training(
-        intrinsics=scene.intrinsics,
-        prior_pose=scene.true_pose,
-        recipe_name="paper",
-        walk=WalkConfig(step_s=choose_step_s([track.trajectory for track in scene.tracks])),
-        seed=case.seed,
-    )
+    plan = centred_plan(scene, "paper", case.seed)
     network, training_s = train_posenet(
         plan, alpha=float(case.variant), epochs=_EPOCHS, on_share=on_share
     )

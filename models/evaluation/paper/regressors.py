@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.evaluation.paper.measures import (
+    centred_plan,
     errors_of,
     knocked_figures,
     still_figures,
@@ -31,11 +32,9 @@ from models.regression.dataset import held_out_set
 from models.regression.losses import loss_on
 from models.regression.network import PoseRegressor
 from models.regression.prediction import predict_windows
-from models.regression.recipe import TrainingPlan, plan_training
+from models.regression.recipe import TrainingPlan
 from models.regression.training import train
 from models.simulation.poses import PoseRange
-from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s
 
 CONSTANT, SERVED, DEFAULT, PAPER = "constant", "served", "default", "paper"
 AUTHORS_CODE = "paper, 5,145 walks, 25 epochs"
@@ -75,15 +74,8 @@ def run_case(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
 
 
 def _plan(scene: Scene, case: PaperCase) -> TrainingPlan:
-    step_s = choose_step_s([track.trajectory for track in scene.tracks])
     recipe = DEFAULT if case.variant == DEFAULT else PAPER
-    plan = plan_training(
-        intrinsics=scene.intrinsics,
-        prior_pose=scene.true_pose,
-        recipe_name=recipe,
-        walk=WalkConfig(step_s=step_s),
-        seed=case.seed,
-    )
+    plan = centred_plan(scene, recipe, case.seed)
     return plan if recipe == DEFAULT else VARIANTS[case.variant](plan)
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from statistics import mean
 
-from models.evaluation.paper.part import PaperCase, PaperPart, PaperResult, markdown
+from models.evaluation.paper.part import PaperCase, PaperPart, PaperResult, by_row, markdown
 from models.evaluation.paper.regressors import (
     AUTHORS_CODE,
     CONSTANT,
@@ -43,14 +43,9 @@ def _cases(scenes: Sequence[str]) -> list[PaperCase]:
 
 
 def _table(results: Sequence[PaperResult]) -> str:
-    groups: dict[tuple[str, int], list[PaperResult]] = {}
-    for each in results:
-        key = (each.case.scene, _ORDER.index(each.case.variant))
-        groups.setdefault(key, []).append(each)
-    rows = [
-        _row(scene, _ORDER[place], [each.figures for each in groups[scene, place]])
-        for scene, place in sorted(groups)
-    ]
+    groups = by_row(results)
+    ordered = sorted(groups, key=lambda key: (key[0], _ORDER.index(key[1])))
+    rows = [_row(*key, groups[key]) for key in ordered]
     header = [
         "scene",
         "what",

@@ -13,13 +13,14 @@ from statistics import median
 from models.evaluation.injectors.catalogue import Fault
 from models.evaluation.injectors.lens_and_ground import ramp, stairs
 from models.evaluation.injectors.view import view_of
-from models.evaluation.paper.measures import errors_of
+from models.evaluation.paper.measures import centred_plan, errors_of
 from models.evaluation.paper.part import (
     Figures,
     OnShare,
     PaperCase,
     PaperPart,
     PaperResult,
+    by_row,
     markdown,
 )
 from models.evaluation.paper.regressors import DEFAULT, SERVED, served_answer
@@ -27,10 +28,7 @@ from models.evaluation.protocol.cases import KNOCKED, draw_case, judge_answer
 from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import averaged_of
 from models.regression.prediction import predict_windows
-from models.regression.recipe import plan_training
 from models.regression.training import train
-from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s
 
 _HIGHEST_M, _HIGHEST_SHARE = 2.0, 0.25  # of a flight: a floor's half, and of the camera's height
 _RAMP = 0.1
@@ -67,13 +65,7 @@ def _faults(scene: Scene) -> dict[str, Fault | None]:
 
 
 def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
-    plan = plan_training(
-        intrinsics=scene.intrinsics,
-        prior_pose=scene.true_pose,
-        recipe_name=DEFAULT,
-        walk=WalkConfig(step_s=choose_step_s([track.trajectory for track in scene.tracks])),
-        seed=seed,
-    )
+    plan = centred_plan(scene, DEFAULT, seed)
     network, _ = train(plan, lambda at: on_share(at.step / at.steps))
     predict = partial(predict_windows, network, plan=plan)
     figures: Figures = {}
@@ -102,14 +94,9 @@ def _served(scene: Scene, seed: int) -> Figures:
 
 def _table(results: Sequence[PaperResult]) -> str:
     rows = []
-    for variant, scene in sorted({(each.case.variant, each.case.scene) for each in results}):
-        found = [
-            each.figures
-            for each in results
-            if (each.case.variant, each.case.scene) == (variant, scene)
-        ]
+    for (scene, variant), found in by_row(results).items():
         middle = {name: median(each[name] for each in found) for name in found[0]}
-        row = [variant, scene, str(len(found))]
+        row = [scene, variant, str(len(found))]
         row += [f"{middle[f'{ground}_height_m']:.2f}, {middle[f'{ground}_deg']:.2f}"
                 for ground in _GROUNDS]  # fmt: skip
         row += [
@@ -120,7 +107,7 @@ def _table(results: Sequence[PaperResult]) -> str:
             for ground in ("stairs", "ramp")
         ]
         rows.append(row)
-    header = ["estimator", "scene", "seeds"]
+    header = ["scene", "estimator", "seeds"]
     header += [f"{ground}: off m, deg" for ground in _GROUNDS]
     header += ["stairs over flat", "ramp over flat"]
     return markdown(header, rows)

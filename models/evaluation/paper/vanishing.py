@@ -24,6 +24,7 @@ from models.evaluation.paper.part import (
     PaperCase,
     PaperPart,
     PaperResult,
+    by_row,
     markdown,
 )
 from models.evaluation.scenes import Scene, load_scene
@@ -92,12 +93,7 @@ def _off_deg(tilt_rad: float, roll_rad: float, truth: CameraPose) -> float:
 
 def _table(results: Sequence[PaperResult]) -> str:
     rows = []
-    for scene, variant in sorted({(each.case.scene, each.case.variant) for each in results}):
-        found = [
-            each.figures
-            for each in results
-            if (each.case.scene, each.case.variant) == (scene, variant)
-        ]
+    for (scene, variant), found in by_row(results).items():
         rows.append(
             [
                 scene,
