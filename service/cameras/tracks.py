@@ -5,12 +5,12 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection
 
-from service.cameras.cameras import no_camera
+from service.cameras.pictures import check_picture
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
-from service.store import cameras, references
+from service.store import references
 from service.store.cameras import Picture
 from service.store.database.store import joined
 from service.store.packing import pack
@@ -28,24 +28,13 @@ class Receipt:
     left_out: int
 
 
-def picture_of(connection: Connection, camera_id: str) -> Picture:
-    """The pictures of a camera, which tracks have to keep to.
-
-    Raises:
-        NotFoundError: there is no such camera.
-    """
-    found = cameras.picture(connection, camera_id)
-    if found is None:
-        raise no_camera(camera_id)
-    return found
-
-
 def receive_tracks(
     connection: Connection,
     queue: JobQueue,
     camera_id: str,
     batch: Batch,
     *,
+    read_by: Picture,
     max_sources: int = 16,
     watched: bool = False,
 ) -> Receipt:
@@ -54,16 +43,15 @@ def receive_tracks(
     Those of a camera that somebody has `watched` before those of others.
 
     A track is known by (camera, source, id, start time): one that is stored already stays, and
-    counts as taken.
+    counts as taken. `read_by` is the picture that the tracks were held against.
 
     Raises:
         NotFoundError: there is no such camera.
+        StalePictureError: its picture is another by now; nothing is stored.
         NothingTakenError: there were tracks, and none of them could be taken.
         TooManySourcesError: the source is new, and the camera has as many as it may have.
     """
-    awaited = cameras.awaited(connection, camera_id)
-    if awaited is None:
-        raise no_camera(camera_id)
+    awaited = check_picture(connection, camera_id, read_by)
     if batch.rejections and not batch.tracks:
         raise _nothing_taken(batch)
     now = datetime.now(UTC)

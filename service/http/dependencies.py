@@ -14,6 +14,7 @@ from fastapi import Depends, Header, Request
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
+from service.cameras.pictures import Pictures
 from service.cameras.quota import Quota
 from service.cameras.watched import Watched
 from service.errors import PreconditionRequiredError
@@ -44,6 +45,7 @@ class AppState:
     stream_polls: anyio.CapacityLimiter
     feed: Feed
     poses: Kept[KeptAnswer]
+    pictures: Pictures = field(default_factory=Pictures)
     watched: Watched = field(default_factory=Watched)
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))

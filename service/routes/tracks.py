@@ -8,7 +8,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from service.cameras import tracks
-from service.errors import UnsupportedMediaTypeError
+from service.cameras.pictures import StalePictureError
+from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
@@ -17,6 +18,7 @@ from service.http.dependencies import AppState, BodyDep, StateDep
 from service.http.direct.straight import StraightRoute, straight
 from service.http.direct.written import written
 from service.schemas.cameras.tracks import DESCRIBED_TRACK, ReceiptOut
+from service.store.cameras import Picture
 
 router = APIRouter(tags=["tracks"], route_class=StraightRoute)
 
@@ -80,18 +82,15 @@ def _media_type(request: Request) -> str:
     return request.headers.get("content-type", "").split(";")[0].strip().lower()
 
 
-def read_batch(state: AppState, camera_id: str, came: Posted) -> Batch:
-    """The tracks of a request, read while no session is open.
+def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
+    """The tracks of a request of a camera with such pictures, read while no session is open.
 
     Raises:
-        NotFoundError: there is no such camera.
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
         OverloadedError: other large bodies are being read all the time.
     """
     source = formats.read_source(came.source, "/source")
     people = None if came.classes is None else read_classes(came.classes)
-    with state.store.look() as connection:
-        camera = tracks.picture_of(connection, camera_id)
     limits = Limits(
         width=camera.width,
         height=camera.height,
@@ -131,19 +130,34 @@ def _read(
 
 
 def _take(state: AppState, camera_id: str, came: Posted) -> Response:
-    batch = read_batch(state, camera_id, came)
+    camera = state.pictures.of(state.store, camera_id)
+    while True:
+        try:
+            receipt = _store(state, camera_id, camera, came)
+            break
+        except (MalformedError, StalePictureError) as error:
+            # It may be that the picture is another than when it was last asked for.
+            now = state.pictures.again(state.store, camera_id)
+            if now == camera and isinstance(error, MalformedError):
+                raise
+            camera = now
+    body = written(ReceiptOut.from_value(receipt), exclude_defaults=True)
+    return Response(body, 202, media_type="application/json")
+
+
+def _store(state: AppState, camera_id: str, camera: Picture, came: Posted) -> tracks.Receipt:
+    batch = read_batch(state, camera, came)
     state.quota.check(state.store, camera_id, batch)
     with state.store.change(camera_id) as connection:
-        receipt = tracks.receive_tracks(
+        return tracks.receive_tracks(
             connection,
             state.queue,
             camera_id,
             batch,
+            read_by=camera,
             max_sources=state.settings.max_sources,
             watched=camera_id in state.watched,
         )
-    body = written(ReceiptOut.from_value(receipt), exclude_defaults=True)
-    return Response(body, 202, media_type="application/json")
 
 
 async def _take_plain(request: Request) -> Response:

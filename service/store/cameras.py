@@ -47,6 +47,9 @@ _AWAITED = Prepared(
     select(
         type_coerce(CameraRecord.estimate_due_at.is_(None), Integer),
         type_coerce(counting_source(CameraRecord.id).scalar_subquery().is_(None), Integer),
+        CameraRecord.width,
+        CameraRecord.height,
+        CameraRecord.frame_rate_hz,
     ).where(CameraRecord.id == bindparam("camera"))
 )
 
@@ -62,10 +65,14 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Awaited:
-    """What a camera's tracks are awaited for: a `look` at them, a `source` for its reference."""
+    """What a camera's tracks are awaited for: a `look` at them, a `source` for its reference.
+
+    `picture` is what they have to keep to.
+    """
 
     look: bool
     source: bool
+    picture: Picture
 
 
 def find(session: Session, camera_id: str) -> CameraRecord | None:
@@ -82,7 +89,10 @@ def picture(connection: Connection, camera_id: str) -> Picture | None:
 def awaited(connection: Connection, camera_id: str) -> Awaited | None:
     """What tracks of a camera are awaited for; None where there is no such camera."""
     row = _AWAITED.row(connection, {"camera": camera_id})
-    return None if row is None else Awaited(look=bool(row[0]), source=bool(row[1]))
+    if row is None:
+        return None
+    seen = Picture(width=row[2], height=row[3], frame_rate_hz=row[4])
+    return Awaited(look=bool(row[0]), source=bool(row[1]), picture=seen)
 
 
 def as_set_up(

@@ -11,7 +11,7 @@ from service.cameras.cameras import add_prior_pose
 from service.cameras.tracks import receive_tracks
 from service.formats.track import Batch, Clock, Limits, read_track
 from service.jobs.upkeep import reconciliation
-from service.store import trainings
+from service.store import cameras, trainings
 from service.store.database.store import Store
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import tracks, windows
@@ -77,7 +77,11 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         limits = Limits(width=1280, height=720, now_s=time.time(), max_ahead_s=60.0)
         batch.append(read_track(raw, "t", clock, limits))
     return receive_tracks(
-        session.connection(), Recorder(), "corner", Batch(tracks=tuple(batch), rejections=())
+        session.connection(),
+        Recorder(),
+        "corner",
+        Batch(tracks=tuple(batch), rejections=()),
+        read_by=cameras.picture(session.connection(), "corner"),
     )
 
 
