@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from models.errors import CalibrationError, ShapeError
-from models.evaluation.paper.part import PaperCase, PaperResult
+from models.evaluation.paper.part import PAPERS_OWN, PaperCase, PaperResult
 from models.evaluation.paper.parts import PARTS
 from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
@@ -23,7 +23,6 @@ from service.studies.lines_file import LinesFile
 from service.studies.pages import markers, write_between
 from service.studies.runs import as_they_end, process_pool, shared_values, write_results
 
-_PAPERS_OWN = "town_centre"
 _COMMAND = "surefoot paper --write"
 _VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
 
@@ -164,7 +163,7 @@ def _draw_efficiency(out: Path) -> None:
     trained = [
         each
         for each in (_result(row) for row in rows)
-        if "training_s" in each.figures and each.case.scene == _PAPERS_OWN
+        if "training_s" in each.figures and each.case.scene == PAPERS_OWN
     ]
     if trained:
         plot_efficiency(trained, out / "efficiency.png")

@@ -7,6 +7,8 @@ from pathlib import Path
 Figures = dict[str, float]
 OnShare = Callable[[float], None]
 
+PAPERS_OWN = "town_centre"  # of the paper's scenes the one that can be had
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCase:

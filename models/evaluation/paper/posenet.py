@@ -7,6 +7,7 @@ from pathlib import Path
 from models.baselines.posenet import parameters_of, read_windows, train_posenet
 from models.evaluation.paper.measures import centred_plan, trained_figures
 from models.evaluation.paper.part import (
+    PAPERS_OWN,
     Figures,
     OnShare,
     PaperCase,
@@ -27,12 +28,11 @@ _PUBLISHED = {
     2000: (0.26, 4.62),
     5000: (0.26, 4.34),
 }
-_PAPERS_OWN = "town_centre"
 _EPOCHS = 4  # the loss on other walks falls no more from then on
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
-    own_first = sorted(scenes, key=lambda scene: scene != _PAPERS_OWN)
+    own_first = sorted(scenes, key=lambda scene: scene != PAPERS_OWN)
     return [
         PaperCase(part="posenet", scene=scene, variant=str(alpha), seed=0)
         for scene in own_first
@@ -60,7 +60,7 @@ def _table(results: Sequence[PaperResult]) -> str:
                 each.case.scene,
                 str(alpha),
                 f"{found['centred_height_m']:.2f}, {found['centred_deg']:.2f}",
-                f"{height_m:.2f}, {angle_deg:.2f}" if each.case.scene == _PAPERS_OWN else "",
+                f"{height_m:.2f}, {angle_deg:.2f}" if each.case.scene == PAPERS_OWN else "",
                 f"{100 * found['knocked_share']:.1f}, {found['knocked_deg']:.2f}",
                 ", ".join(f"{found[f'slope_{name}']:.2f}" for name in ("tilt", "roll", "height")),
                 f"{found['training_s']:.0f}",

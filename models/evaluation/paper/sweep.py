@@ -13,6 +13,7 @@ from statistics import mean
 import numpy as np
 
 from models.evaluation.paper.part import (
+    PAPERS_OWN,
     Figures,
     OnShare,
     PaperCase,
@@ -32,12 +33,11 @@ SLOW_CLOCK = "default, a clock 2.5 times too slow"
 RECIPES = (DEFAULT, SLOW_CLOCK, PAPER)
 _SLOWNESS = 2.5  # people of 1.4 m/s seem to walk at 3.5, as on the paper's DM1
 _AT = " at "
-_PAPERS_OWN = "town_centre"
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     """The quick recipe first, the paper's own scene first; the paper's recipe takes a night."""
-    own_first = sorted(scenes, key=lambda scene: scene != _PAPERS_OWN)
+    own_first = sorted(scenes, key=lambda scene: scene != PAPERS_OWN)
     return [
         PaperCase(part="speed-sweep", scene=scene, variant=f"{recipe}{_AT}{speed:g} m/s", seed=0)
         for recipe in RECIPES
