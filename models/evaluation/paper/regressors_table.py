@@ -72,10 +72,11 @@ def _row(scene: str, variant: str, found: Sequence[dict[str, float]]) -> list[st
         values = [each[name] for each in found if name in each and math.isfinite(each[name])]
         if not values:
             return ""
-        text = f"{mean(values):.{digits}f}"
-        if len(values) > 1:
-            text += f" ({min(values):.{digits}f} to {max(values):.{digits}f})"
-        return text
+        middle, least, most = (
+            f"{round(value, digits) + 0.0:.{digits}f}"  # never minus nought
+            for value in (mean(values), min(values), max(values))
+        )
+        return f"{middle} ({least} to {most})" if len(values) > 1 else middle
 
     def pair(prefix: str) -> str:
         both = [told(f"{prefix}_height_m", 2), told(f"{prefix}_deg", 2)]
