@@ -22,7 +22,7 @@ from tests.settings_table import settings_table, written_table
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
-    "serve", "worker", "migrate", "replay", "demo", "evaluate", "protocol", "centred",
+    "serve", "worker", "migrate", "replay", "demo", "evaluate", "protocol", "centred", "paper",
     "alarm-study", "flow-study", "backup", "restore", "check", "rotate-key", "token",
     "migrate-data",
 )  # fmt: skip
