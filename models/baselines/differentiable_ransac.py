@@ -72,6 +72,10 @@ class _PoseOfPoints(torch.autograd.Function):
         return own.reshape(_POINTS, 3).to(gradient.dtype), None
 
 
+# torch has it without types in some of the releases that we run on.
+_derived_pose: Callable[[Tensor, Array], Tensor] = _PoseOfPoints.apply
+
+
 def hypotheses(
     coordinates: Tensor, rays: Array, count: int, rng: np.random.Generator
 ) -> list[Tensor]:
@@ -85,7 +89,7 @@ def hypotheses(
         rows, told = drawn
         pose: Tensor = torch.from_numpy(told)
         if coordinates.requires_grad:
-            pose = _PoseOfPoints.apply(coordinates[rows], rays[rows])
+            pose = _derived_pose(coordinates[rows], rays[rows])
         found.append(pose)
     return found
 
