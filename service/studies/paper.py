@@ -6,9 +6,9 @@ from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from statistics import fmean
-from typing import Any
 
 import torch
 from rich.console import Console
@@ -76,8 +76,8 @@ def _run_part(
     page: Path | None,
     console: Console,
 ) -> None:
-    part, kept = PARTS[name], LinesFile(out / f"{name}.jsonl")
-    results = [_result(row) for row in kept.rows]
+    part = PARTS[name]
+    kept, results = _kept(out, name)
     known = {each.case for each in results}
     cases = [
         case
@@ -146,10 +146,14 @@ def _run(
     return PaperResult(case=case, figures=figures, seconds=time.monotonic() - begun)
 
 
-def _result(row: dict[str, Any]) -> PaperResult:
-    return PaperResult(
-        case=PaperCase(**row["case"]), figures=row["figures"], seconds=row["seconds"]
-    )
+def _kept(out: Path, name: str) -> tuple[LinesFile, list[PaperResult]]:
+    """The file of a part's results, and those that are in it."""
+    file = LinesFile(out / f"{name}.jsonl")
+    return file, [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in file.rows]
+
+
+def _begun(out: Path, name: str) -> bool:
+    return (out / f"{name}.jsonl").exists()
 
 
 def _name(case: PaperCase) -> str:
@@ -158,11 +162,10 @@ def _name(case: PaperCase) -> str:
 
 def _draw_efficiency(out: Path) -> None:
     """Errors over training time, of whatever was trained for the paper's own scene."""
-    paths = [out / f"{name}.jsonl" for name in ("regressors", "posenet")]
-    rows = [row for path in paths if path.exists() for row in LinesFile(path).rows]
+    kept = [_kept(out, name)[1] for name in ("regressors", "posenet") if _begun(out, name)]
     trained = [
         each
-        for each in (_result(row) for row in rows)
+        for each in chain.from_iterable(kept)
         if "training_s" in each.figures and each.case.scene == PAPERS_OWN
     ]
     if trained:
@@ -173,11 +176,9 @@ def _write_manifest(out: Path) -> None:
     """By what, on what and how long each part took, of all that the folder has."""
     told = {}
     for name in PARTS:
-        path = out / f"{name}.jsonl"
-        if not path.exists():
+        if not _begun(out, name):
             continue
-        kept = LinesFile(path)
-        results = [_result(row) for row in kept.rows]
+        kept, results = _kept(out, name)
         told[name] = {
             "heading": asdict(kept.heading),
             "cases": len(results),

@@ -1,7 +1,7 @@
 """What every estimator of the paper's study is measured by: in the middle, and after knocks."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from statistics import median
 
 import numpy as np
@@ -9,12 +9,15 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.averaged import PoseEstimate, pose_of
 from models.estimation.parameters import plane_parameters_of
+from models.evaluation.injectors.catalogue import Fault
 from models.evaluation.paper.part import Figures
 from models.evaluation.protocol.cases import (
     KNOCKED,
     STILL,
     Answer,
     Estimator,
+    KnockRange,
+    Outcome,
     ProtocolCase,
     draw_case,
     judge_answer,
@@ -75,28 +78,39 @@ def errors_of(estimate: PoseEstimate, scene: Scene) -> tuple[float, float]:
     return abs(estimate.value.height_m - truth.height_m), whole_angle_deg(estimate, truth)
 
 
+def outcomes_of(
+    scene: Scene,
+    estimator: Estimator,
+    knock_range: KnockRange,
+    seeds: Iterable[int] = range(KNOCKS),
+    fault: Fault | None = None,
+) -> list[Outcome]:
+    """An estimator's answers to knocks of a scene's camera, beside the truth."""
+    cases = (draw_case(scene, seed, knock_range, fault=fault) for seed in seeds)
+    return [judge_answer(case, "", estimator(case), 0.0) for case in cases]
+
+
+def middle_errors(scene: Scene, outcomes: Sequence[Outcome]) -> tuple[float, float]:
+    """The medians of height in metres, and of tilt and roll together in degrees.
+
+    Were the heading right: regressors are given it, and no knock here turns it.
+    """
+    height_m = scene.true_pose.height_m * median(each.height_error for each in outcomes)
+    return height_m, median(each.tilt_roll_error_deg for each in outcomes)
+
+
 def still_figures(scene: Scene, estimator: Estimator) -> Figures:
     """Errors on a still camera, of one half of the people after the other: the middle of 12."""
-    outcomes = [
-        judge_answer(case, "", estimator(case), 0.0)
-        for case in (draw_case(scene, seed, STILL) for seed in range(KNOCKS))
-    ]
-    height_m = scene.true_pose.height_m
-    return {
-        "centred_height_m": height_m * median(each.height_error for each in outcomes),
-        "centred_deg": median(each.angle_error_deg for each in outcomes),
-    }
+    height_m, angle_deg = middle_errors(scene, outcomes_of(scene, estimator, STILL))
+    return {"centred_height_m": height_m, "centred_deg": angle_deg}
 
 
 def knocked_figures(scene: Scene, estimator: Estimator) -> Figures:
     """The middle errors of 12 knocks, and the slopes of what is told over what is true."""
-    outcomes = [
-        judge_answer(case, "", estimator(case), 0.0)
-        for case in (draw_case(scene, seed, KNOCKED) for seed in range(KNOCKS))
-    ]
+    outcomes = outcomes_of(scene, estimator, KNOCKED)
     figures = {
         "knocked_share": median(each.height_error for each in outcomes),
-        "knocked_deg": median(each.angle_error_deg for each in outcomes),
+        "knocked_deg": median(each.tilt_roll_error_deg for each in outcomes),
     }
     true, told = (
         np.array([getattr(each, name) for each in outcomes]) for name in ("true_drift", "drift")

@@ -9,6 +9,8 @@ OnShare = Callable[[float], None]
 
 PAPERS_OWN = "town_centre"  # of the paper's scenes the one that can be had
 
+_MADE_UP = "wildtrack"  # boxes there are projected cylinders of one size
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCase:
@@ -43,6 +45,16 @@ class PaperPart:
     run: Callable[[PaperCase, Path, OnShare], Figures]
     table: Callable[[Sequence[PaperResult]], str]
     plot: Callable[[Sequence[PaperResult], Path], None] | None = None
+
+
+def own_first(scenes: Sequence[str]) -> list[str]:
+    """The scenes, the paper's own before others."""
+    return sorted(scenes, key=lambda scene: scene != PAPERS_OWN)
+
+
+def with_boxes(scenes: Sequence[str]) -> list[str]:
+    """The scenes that have boxes of people."""
+    return [scene for scene in scenes if not scene.startswith(_MADE_UP)]
 
 
 def by_row(results: Sequence[PaperResult]) -> dict[tuple[str, str], list[Figures]]:

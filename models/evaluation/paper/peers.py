@@ -10,6 +10,7 @@ import numpy as np
 
 from models.baselines.box_heights import pose_by_box_heights
 from models.estimation.parameters import without_offset
+from models.evaluation.paper.measures import KNOCKS, outcomes_of
 from models.evaluation.paper.part import (
     Figures,
     OnShare,
@@ -17,29 +18,26 @@ from models.evaluation.paper.part import (
     PaperPart,
     PaperResult,
     markdown,
+    with_boxes,
 )
 from models.evaluation.paper.regressors import SERVED, served_answer
 from models.evaluation.protocol.cases import (
     KNOCKED,
     Answer,
+    Estimator,
     ProtocolCase,
-    draw_case,
-    judge_answer,
 )
 from models.evaluation.scenes import load_scene
 
 _ALONE, _BESIDE = "cameratransform", "cameratransform, our reference's offset off"
 _VARIANTS = (_ALONE, _BESIDE, SERVED)
-_KNOCKS = 12
-_MADE_UP = "wildtrack"  # projected cylinders of one size
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     return [
         PaperCase(part="peers", scene=scene, variant=variant, seed=0)
-        for scene in scenes
+        for scene in with_boxes(scenes)
         for variant in _VARIANTS
-        if not scene.startswith(_MADE_UP)
     ]
 
 
@@ -53,15 +51,10 @@ def _by_heights(case: ProtocolCase, *, beside: bool) -> Answer:
 
 def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     scene = load_scene(folder)
-    outcomes = []
-    for seed in range(_KNOCKS):
-        drawn = draw_case(scene, seed, KNOCKED)
-        if case.variant == SERVED:
-            answer = served_answer(drawn)
-        else:
-            answer = _by_heights(drawn, beside=case.variant == _BESIDE)
-        outcomes.append(judge_answer(drawn, case.variant, answer, 0.0))
-        on_share((seed + 1) / _KNOCKS)
+    estimator: Estimator = served_answer
+    if case.variant != SERVED:
+        estimator = partial(_by_heights, beside=case.variant == _BESIDE)
+    outcomes = outcomes_of(scene, estimator, KNOCKED)
     return {
         "deg": median(each.tilt_roll_error_deg for each in outcomes),
         "height_share": median(each.height_error for each in outcomes),
@@ -98,7 +91,7 @@ def _row(variant: str, scene: str, found: Sequence[Figures]) -> list[str]:
 
 
 PEERS = PaperPart(
-    says=f"peers: {_KNOCKS} knocks of up to 8 deg and 15 % on the scenes with real boxes",
+    says=f"peers: {KNOCKS} knocks of up to 8 deg and 15 % on the scenes with real boxes",
     cases=_cases,
     run=_run,
     table=_table,

@@ -14,6 +14,7 @@ from models.evaluation.paper.part import (
     PaperPart,
     PaperResult,
     markdown,
+    own_first,
 )
 from models.evaluation.scenes import load_scene
 
@@ -32,10 +33,9 @@ _EPOCHS = 4  # the loss on other walks falls no more from then on
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
-    own_first = sorted(scenes, key=lambda scene: scene != PAPERS_OWN)
     return [
         PaperCase(part="posenet", scene=scene, variant=str(alpha), seed=0)
-        for scene in own_first
+        for scene in own_first(scenes)
         for alpha in _PUBLISHED
     ]
 

@@ -24,8 +24,8 @@ from models.evaluation.paper.measures import (
 )
 from models.evaluation.paper.part import Figures, OnShare, PaperCase
 from models.evaluation.protocol.cases import Answer, ProtocolCase, nothing_identifiable
+from models.evaluation.protocol.flow_runs import fused
 from models.evaluation.protocol.learned import learn_case
-from models.evaluation.protocol.served import served_pose
 from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import averaged_of
 from models.regression.dataset import held_out_set
@@ -66,10 +66,10 @@ VARIANTS: dict[str, Change] = {
 def run_case(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     """The figures of a row of table 1 on a scene, for one seed of its training."""
     scene = load_scene(folder)
-    if case.variant == CONSTANT:
-        return still_figures(scene, constant_answer) | knocked_figures(scene, constant_answer)
-    if case.variant == SERVED:
-        return still_figures(scene, served_answer) | knocked_figures(scene, served_answer)
+    untrained = {CONSTANT: nothing_identifiable, SERVED: served_answer}
+    if case.variant in untrained:
+        estimator = untrained[case.variant]
+        return still_figures(scene, estimator) | knocked_figures(scene, estimator)
     return _trained(scene, _plan(scene, case), on_share)
 
 
@@ -132,15 +132,6 @@ def _trained(scene: Scene, plan: TrainingPlan, on_share: OnShare) -> Figures:
     return figures
 
 
-def constant_answer(case: ProtocolCase) -> Answer:
-    """The prior pose, always."""
-    return nothing_identifiable(case)
-
-
 def served_answer(case: ProtocolCase) -> Answer:
     """What the service would serve, with all that a site's reference teaches it."""
-    learned = learn_case(case)
-    found = served_pose(learned.seen, learned.site).fused
-    return Answer(
-        values=found.values[:3], covariance=found.covariance[:3, :3], tracks=len(case.seen)
-    )
+    return fused(learn_case(case))

@@ -11,6 +11,7 @@ from models.evaluation.paper.part import (
     PaperResult,
     by_row,
     markdown,
+    own_first,
 )
 from models.evaluation.paper.regressors import (
     AUTHORS_CODE,
@@ -43,7 +44,7 @@ def _cases(scenes: Sequence[str]) -> list[PaperCase]:
         PaperCase(part=_PART, scene=scene, variant=variant, seed=seed)
         for variant, on, seeds in rows
         for seed in seeds
-        for scene in sorted(on, key=lambda each: each != PAPERS_OWN)
+        for scene in own_first(on)
     ]
 
 

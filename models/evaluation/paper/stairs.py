@@ -13,7 +13,7 @@ from statistics import median
 from models.evaluation.injectors.catalogue import Fault
 from models.evaluation.injectors.lens_and_ground import ramp, stairs
 from models.evaluation.injectors.view import view_of
-from models.evaluation.paper.measures import centred_plan, errors_of
+from models.evaluation.paper.measures import centred_plan, errors_of, middle_errors, outcomes_of
 from models.evaluation.paper.part import (
     Figures,
     OnShare,
@@ -24,7 +24,7 @@ from models.evaluation.paper.part import (
     markdown,
 )
 from models.evaluation.paper.regressors import DEFAULT, SERVED, served_answer
-from models.evaluation.protocol.cases import KNOCKED, draw_case, judge_answer
+from models.evaluation.protocol.cases import KNOCKED
 from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import averaged_of
 from models.regression.prediction import predict_windows
@@ -79,16 +79,11 @@ def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
 
 def _served(scene: Scene, seed: int) -> Figures:
     figures: Figures = {}
+    seeds = range(seed * _KNOCKS, (seed + 1) * _KNOCKS)
     for ground, fault in _faults(scene).items():
-        outcomes = []
-        for knock in range(seed * _KNOCKS, (seed + 1) * _KNOCKS):
-            case = draw_case(scene, knock, KNOCKED, fault=fault)
-            outcomes.append(judge_answer(case, SERVED, served_answer(case), 0.0))
-        height_m = scene.true_pose.height_m
-        figures |= {
-            f"{ground}_height_m": height_m * median(each.height_error for each in outcomes),
-            f"{ground}_deg": median(each.angle_error_deg for each in outcomes),
-        }
+        outcomes = outcomes_of(scene, served_answer, KNOCKED, seeds, fault)
+        height_m, angle_deg = middle_errors(scene, outcomes)
+        figures |= {f"{ground}_height_m": height_m, f"{ground}_deg": angle_deg}
     return figures
 
 

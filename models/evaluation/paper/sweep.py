@@ -13,13 +13,13 @@ from statistics import mean
 import numpy as np
 
 from models.evaluation.paper.part import (
-    PAPERS_OWN,
     Figures,
     OnShare,
     PaperCase,
     PaperPart,
     PaperResult,
     markdown,
+    own_first,
 )
 from models.evaluation.paper.regressors import DEFAULT, PAPER
 from models.evaluation.scenes import Scene, load_scene
@@ -37,13 +37,13 @@ _AT = " at "
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     """The quick recipe first, the paper's own scene first; the paper's recipe takes a night."""
-    own_first = sorted(scenes, key=lambda scene: scene != PAPERS_OWN)
+    ordered = own_first(scenes)
     return [
         PaperCase(part="speed-sweep", scene=scene, variant=f"{recipe}{_AT}{speed:g} m/s", seed=0)
         for recipe in RECIPES
-        for scene in own_first
+        for scene in ordered
         for speed in SPEEDS_MPS
-        if recipe != SLOW_CLOCK or scene == own_first[0]
+        if recipe != SLOW_CLOCK or scene == ordered[0]
     ]
 
 

@@ -6,6 +6,7 @@ feet with a jitter of 3 % of the stature, for what the method could do if heads 
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import mean, median
 
@@ -26,14 +27,15 @@ from models.evaluation.paper.part import (
     PaperResult,
     by_row,
     markdown,
+    with_boxes,
 )
+from models.evaluation.protocol.cases import angle_deg
 from models.evaluation.scenes import Scene, load_scene
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import (
     angle_between,
     angles_from_rotation,
     quaternion_from_rotation,
-    rotation_from_angles,
 )
 from models.simulation.heads import HeadConfig, with_box_heads, with_heads
 from models.trajectory import Trajectory
@@ -41,14 +43,12 @@ from models.trajectory import Trajectory
 _BOXES, _IDEAL = "tops of boxes", "ideal heads, 3 % jitter"
 _SEEDS = (0, 1, 2)
 _WALKERS = 3  # as in the paper
-# Boxes that are projected cylinders of one size have no heads.
-_MADE_UP = "wildtrack"
 _PUBLISHED = {"town_centre": "86.2, 84.3, 89.2"}
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     drawn = [(_IDEAL, seed, scene) for scene in scenes for seed in _SEEDS]
-    real = [(_BOXES, 0, scene) for scene in scenes if not scene.startswith(_MADE_UP)]
+    real = [(_BOXES, 0, scene) for scene in with_boxes(scenes)]
     return [
         PaperCase(part="vanishing-points", scene=scene, variant=variant, seed=seed)
         for variant, seed, scene in real + drawn
@@ -86,9 +86,7 @@ def _way_seen(scene: Scene, track: Trajectory) -> float:
 
 def _off_deg(tilt_rad: float, roll_rad: float, truth: CameraPose) -> float:
     """The error of tilt and roll together, were the heading right."""
-    rotation = rotation_from_angles(tilt_rad, roll_rad, truth.heading_rad)
-    off = angle_between(quaternion_from_rotation(rotation), truth.quaternion_wxyz)
-    return math.degrees(float(off))
+    return angle_deg(replace(truth, tilt_rad=tilt_rad, roll_rad=roll_rad), truth)
 
 
 def _table(results: Sequence[PaperResult]) -> str:

@@ -7,7 +7,12 @@ import pytest
 import torch
 from numpy.testing import assert_allclose
 
-from models.baselines.differentiable_ransac import best_pose, expected_loss, rotation_of_turn
+from models.baselines.differentiable_ransac import (
+    best_pose,
+    expected_loss,
+    rotation_of,
+    rotation_of_turn,
+)
 from models.baselines.scene_coordinates import (
     mean_places_off,
     patch_pixels,
@@ -68,7 +73,7 @@ def test_the_expected_loss_falls_along_its_slope():
     noisy = torch.tensor(places + rng.normal(0, 0.05, places.shape), requires_grad=True)
 
     def off(pose):
-        centre = -(torch.linalg.matrix_exp(_cross(pose[:3])).T @ pose[3:])
+        centre = -(rotation_of(pose[:3]).T @ pose[3:])
         return torch.linalg.vector_norm(centre - torch.tensor(POSE.centre_m))
 
     loss = expected_loss(noisy, rays, off, 8, np.random.default_rng(1))
@@ -79,12 +84,6 @@ def test_the_expected_loss_falls_along_its_slope():
     after = expected_loss(moved, rays, off, 8, np.random.default_rng(1))
     fallen = float(loss.detach() - after)
     assert fallen == pytest.approx(1e-3 * float(torch.linalg.vector_norm(slope)), rel=0.05)
-
-
-def _cross(turn):
-    zero = torch.zeros((), dtype=turn.dtype)
-    x, y, z = turn
-    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3)
 
 
 def textured(count, rng):
