@@ -20,7 +20,7 @@ from models.geometry.rotation import Array
 _POINTS = 4
 _DRAWS = 10  # for a hypothesis, until four points make a pose
 _THRESHOLD = 10.0 / 1000  # of the focal length: ten pixels of a usual lens, as in DSAC++
-_SHARPNESS = 0.5 / _THRESHOLD * 10
+_SHARPNESS = 5 / _THRESHOLD  # of the edge between in and out: a tenth of the threshold wide
 _SCORE_SCALE = 0.1
 _DIFFERENCE = 1e-3  # metres
 _FAR = 1e3  # of a pose that four moved points no longer make

@@ -8,7 +8,6 @@ its speed could be told, are gone. That is the method's, not the picture's size.
 """
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -81,8 +80,8 @@ def train_posenet(
     alpha: float,
     epochs: int,
     on_share: Callable[[float], None] = lambda _: None,
-) -> tuple[TrajectoryPoseNet, float]:
-    """A network trained on the poses, walks and loss of a plan of the paper's, and the seconds.
+) -> TrajectoryPoseNet:
+    """A network trained on the poses, walks and loss of a plan of the paper's.
 
     Raises:
         DegenerateGeometryError: the camera sees no ground to walk on.
@@ -92,7 +91,6 @@ def train_posenet(
     poses = grid_poses(plan.prior_pose, plan.recipe.spread)
     repeats = np.repeat(np.arange(len(poses)), plan.recipe.walks_per_pose)
     data = _image_set(plan, poses.take(repeats), rng)
-    begun = time.monotonic()
     network = TrajectoryPoseNet(data.images.shape[1])
     optimizer = torch.optim.Adam(network.parameters(), lr=_LEARNING_RATE)
     batches = math.ceil(len(data.images) / _BATCH)
@@ -105,7 +103,7 @@ def train_posenet(
             optimizer.step()
             on_share((epoch + (number + 1) / batches) / epochs)
     network.eval()
-    return network, time.monotonic() - begun
+    return network
 
 
 def read_windows(

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from models.errors import DegenerateGeometryError
 from models.evaluation.alarms.creep_years import NUMBERS, CreepCase, CreepPlan, creep_cases
-from service.studies.lines_file import code_hash
+from service.studies.code_hash import code_hash
 from service.studies.runs import process_pool, with_bar, write_results
 
 _TABLE_WIDTH = 120

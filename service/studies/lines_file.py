@@ -1,6 +1,5 @@
 """Rows of a study in a file, a line each as they come: what was ended goes on where it was."""
 
-import hashlib
 import json
 import multiprocessing
 import os
@@ -12,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import ShapeError
-
-_MODELS = Path(__file__).parent.parent.parent / "models"
+from service.studies.code_hash import code_hash
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,13 +28,15 @@ class LinesFile:
     """Rows in a file of JSON lines under a heading; `rows` are those that were found in it.
 
     Figures of two versions of the estimator are never mixed: the heading has a hash of its code.
+    Where `rows_tell_code`, they are told apart by whoever reads the rows.
 
     Raises:
         ShapeError: the file was begun by other code, or a line in it is broken.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, rows_tell_code: bool = False) -> None:
         self.path = path
+        self._rows_tell_code = rows_tell_code
         self.rows: list[dict[str, Any]] = []
         if path.exists() and path.stat().st_size:
             self.heading = self._read()
@@ -63,22 +63,12 @@ class LinesFile:
             self.rows = [json.loads(line) for line in lines]
         except (ValueError, TypeError) as error:
             raise ShapeError(f"{self.path}: no file of outcomes: {error!r}") from error
-        if heading.code != code_hash():
+        if not self._rows_tell_code and heading.code != code_hash():
             raise ShapeError(
                 f"{self.path}: begun {heading.begun} by other code of models/ "
                 f"({heading.code}, now {code_hash()}); name another file, or remove it"
             )
         return heading
-
-
-def code_hash() -> str:
-    """Twelve digits that change with the code between tracks and pose, not with the studies."""
-    digest = hashlib.sha256()
-    for path in sorted(_MODELS.rglob("*.py")):
-        place = path.relative_to(_MODELS)
-        if place.parts[0] != "evaluation":
-            digest.update(str(place).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:12]
 
 
 def _heading_now() -> Heading:

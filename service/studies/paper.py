@@ -19,6 +19,7 @@ from models.evaluation.paper.part import PAPERS_OWN, PaperCase, PaperResult
 from models.evaluation.paper.parts import PARTS
 from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
+from service.studies.code_hash import code_hash
 from service.studies.lines_file import LinesFile
 from service.studies.pages import markers, write_between
 from service.studies.runs import as_they_end, process_pool, shared_values, write_results
@@ -48,8 +49,7 @@ def run_paper(
         page: with markers to write the tables between, or None.
 
     Raises:
-        ShapeError: there is no part of a name, results in the folder are of other code, or the
-            page lacks the markers of a part.
+        ShapeError: there is no part of a name, or the page lacks the markers of a part.
     """
     console = Console()
     for name in parts:
@@ -77,7 +77,7 @@ def _run_part(
     console: Console,
 ) -> None:
     part = PARTS[name]
-    kept, results = _kept(out, name)
+    kept, results = _kept(out, name, console)
     known = {each.case for each in results}
     cases = [
         case
@@ -143,13 +143,25 @@ def _run(
         figures = PARTS[case.part].run(case, folder, report)
     except CalibrationError as error:
         return str(error)
-    return PaperResult(case=case, figures=figures, seconds=time.monotonic() - begun)
+    return PaperResult(
+        case=case, figures=figures, seconds=time.monotonic() - begun, code=_code(case)
+    )
 
 
-def _kept(out: Path, name: str) -> tuple[LinesFile, list[PaperResult]]:
-    """The file of a part's results, and those that are in it."""
-    file = LinesFile(out / f"{name}.jsonl")
-    return file, [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in file.rows]
+def _code(case: PaperCase) -> str:
+    return code_hash(PARTS[case.part].made_by(case))
+
+
+def _kept(
+    out: Path, name: str, console: Console | None = None
+) -> tuple[LinesFile, list[PaperResult]]:
+    """The file of a part's results, and those in it that today's code has made."""
+    file = LinesFile(out / f"{name}.jsonl", rows_tell_code=True)
+    found = [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in file.rows]
+    results = [each for each in found if each.code == _code(each.case)]
+    if console is not None and len(results) < len(found):
+        console.print(f"{name}: {len(found) - len(results)} results of other code are left out")
+    return file, results
 
 
 def _begun(out: Path, name: str) -> bool:
@@ -166,7 +178,7 @@ def _draw_efficiency(out: Path) -> None:
     trained = [
         each
         for each in chain.from_iterable(kept)
-        if "training_s" in each.figures and each.case.scene == PAPERS_OWN
+        if "training_cpu_s" in each.figures and each.case.scene == PAPERS_OWN
     ]
     if trained:
         plot_efficiency(trained, out / "efficiency.png")

@@ -146,5 +146,10 @@ DSAC = PaperPart(
     says="table 2: scene coordinates of pictures of single walks, and a pose by RANSAC",
     cases=_cases,
     run=_run,
+    made_by=lambda _: (
+        "models.baselines.differentiable_ransac",
+        "models.baselines.scene_coordinates",
+        "models.baselines.posenet",
+    ),
     table=_table,
 )

@@ -7,6 +7,14 @@ from pathlib import Path
 Figures = dict[str, float]
 OnShare = Callable[[float], None]
 
+# What a regressor's figures are made by, and those of what is served.
+TRAINED = (
+    "models.regression.training",
+    "models.regression.prediction",
+    "models.estimation.averaged",
+    "models.simulation.knocked",
+)
+SERVED_BY = ("models.evaluation.protocol.flow_runs", "models.evaluation.protocol.learned")
 PAPERS_OWN = "town_centre"  # of the paper's scenes the one that can be had
 
 _MADE_UP = "wildtrack"  # boxes there are projected cylinders of one size
@@ -24,11 +32,12 @@ class PaperCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperResult:
-    """The figures of a case by name, and how long it took."""
+    """The figures of a case by name, how long it took, and the hash of the code that made them."""
 
     case: PaperCase
     figures: Figures
     seconds: float
+    code: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +45,14 @@ class PaperPart:
     """One table or figure of the paper, beside ours.
 
     `cases` names the cases of some scenes; `run` answers one from its scene's folder and is told
-    whom to tell which share is done; `table` is Markdown of the results that there are, and `plot`
-    draws them into a PNG.
+    whom to tell which share is done; `made_by` names the modules whose code makes a case's figures;
+    `table` is Markdown of the results that there are, and `plot` draws them into a PNG.
     """
 
     says: str
     cases: Callable[[Sequence[str]], list[PaperCase]]
     run: Callable[[PaperCase, Path, OnShare], Figures]
+    made_by: Callable[[PaperCase], tuple[str, ...]]
     table: Callable[[Sequence[PaperResult]], str]
     plot: Callable[[Sequence[PaperResult], Path], None] | None = None
 

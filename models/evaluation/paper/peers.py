@@ -12,6 +12,7 @@ from models.baselines.box_heights import pose_by_box_heights
 from models.estimation.parameters import without_offset
 from models.evaluation.paper.measures import KNOCKS, outcomes_of
 from models.evaluation.paper.part import (
+    SERVED_BY,
     Figures,
     OnShare,
     PaperCase,
@@ -63,6 +64,10 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     }
 
 
+def _made_by(case: PaperCase) -> tuple[str, ...]:
+    return SERVED_BY if case.variant == SERVED else ("models.baselines.box_heights",)
+
+
 def _table(results: Sequence[PaperResult]) -> str:
     rows = []
     for variant in _VARIANTS:
@@ -94,5 +99,6 @@ PEERS = PaperPart(
     says=f"peers: {KNOCKS} knocks of up to 8 deg and 15 % on the scenes with real boxes",
     cases=_cases,
     run=_run,
+    made_by=_made_by,
     table=_table,
 )

@@ -26,13 +26,13 @@ def plot_efficiency(results: Sequence[PaperResult], path: Path) -> None:
     kinds = sorted({_kind(each) for each in results})
     for number, kind in enumerate(kinds):
         own = [each.figures for each in results if _kind(each) == kind]
-        seconds = [each["training_s"] for each in own]
+        seconds = [each["training_cpu_s"] for each in own]
         for panel, name in ((left, "centred_height_m"), (right, "centred_deg")):
             panel.plot(
                 seconds, [each[name] for each in own], "o", color=f"C{number}", label=kind, ms=4
             )
     for panel, label in ((left, "height off, m"), (right, "angle off, deg")):
-        panel.set(xlabel="training, s", ylabel=label, xscale="log", ylim=(0, None))
+        panel.set(xlabel="training, CPU-s", ylabel=label, xscale="log", ylim=(0, None))
     left.legend(fontsize=6)
     figure.savefig(path, dpi=110)
 

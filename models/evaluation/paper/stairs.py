@@ -15,6 +15,8 @@ from models.evaluation.injectors.lens_and_ground import ramp, stairs
 from models.evaluation.injectors.view import view_of
 from models.evaluation.paper.measures import centred_plan, errors_of, middle_errors, outcomes_of
 from models.evaluation.paper.part import (
+    SERVED_BY,
+    TRAINED,
     Figures,
     OnShare,
     PaperCase,
@@ -112,5 +114,6 @@ STAIRS = PaperPart(
     says="table 4: stairs and ramps in a part of the picture, medians of the seeds",
     cases=_cases,
     run=_run,
+    made_by=lambda case: SERVED_BY if case.variant == SERVED else TRAINED,
     table=_table,
 )

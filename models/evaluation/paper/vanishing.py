@@ -124,5 +124,6 @@ VANISHING_POINTS = PaperPart(
     says="table 3: orthogonal vanishing points of a walker's heads and feet",
     cases=_cases,
     run=_run,
+    made_by=lambda _: ("models.baselines.vanishing_points", "models.simulation.heads"),
     table=_table,
 )

@@ -60,7 +60,7 @@ def test_it_learns_a_toy(monkeypatch):
     near = PoseRange(height_step_m=1.0, angle_rad=math.radians(2))
     plan = replace(PLAN, recipe=replace(PLAN.recipe, walks_per_pose=2, spread=near))
     data = posenet._image_set(plan, posenet.grid_poses(POSE, near), np.random.default_rng(1))
-    network, _ = train_posenet(plan, alpha=10.0, epochs=16)
+    network = train_posenet(plan, alpha=10.0, epochs=16)
     with torch.inference_mode():
         output = network(data.images)
     middle = torch.cat([data.height_m.median()[None], data.quaternion.mean(dim=0)])

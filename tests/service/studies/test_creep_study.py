@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 
 from models.evaluation.alarms.creep_years import CreepCase, CreepPlan, Life, creep_case
+from service.studies.code_hash import code_hash
 from service.studies.creep import _kept, creep_table, run_creep_study
-from service.studies.lines_file import code_hash
 
 PLAN = CreepPlan(tracks_a_day=18.0, reference_tracks=200, alarms_a_year=1.0, days=60, still_days=0)
 CASE = CreepCase(

@@ -52,6 +52,16 @@ def test_a_part_goes_on_where_it_was_ended(tmp_path):
     assert page.read_text() == f"{begin}\n{table}\n{end}"
     assert len((tmp_path / f"{part}.jsonl").read_text().splitlines()) == len(lines)
 
+    # What other code made is told and left out.
+    first, second = (json.loads(line) for line in kept[1:])
+    old = [kept[0], json.dumps(first | {"code": "0" * 12}), json.dumps(second)]
+    (tmp_path / f"{part}.jsonl").write_text("\n".join([*old, ""]))
+    tables = paper(SCENE, "--out", tmp_path, "--parts", part, "--tables")
+    assert "1 results of other code" in tables.output
+    table = (tmp_path / f"{part}.md").read_text()
+    assert first["case"]["variant"] not in table
+    assert second["case"]["variant"] in table
+
 
 def test_a_part_that_is_none_is_named(tmp_path):
     refused = paper(tmp_path, "--out", tmp_path, "--parts", "tables")

@@ -48,17 +48,23 @@ def test_a_slow_clock_makes_people_hurry_and_is_doubted():
 
 
 def test_the_table_names_the_floor():
-    told = {"deg": 1.0, "training_s": 1.0, "walking_speed_mps": 3.5, "clock_doubted": 1.0}
+    figures = {
+        f"{SLOW_CLOCK} at {speed:g} m/s": {"height_m": abs(speed - 3.4) + 0.1, "deg": 1.0}
+        for speed in SPEEDS_MPS
+    } | {
+        "served": {"walking_speed_mps": 1.4, "clock_doubted": 0.0},
+        "served, a clock 2.5 times too slow": {"walking_speed_mps": 3.5, "clock_doubted": 1.0},
+    }
     results = [
         PaperResult(
-            case=PaperCase(
-                part="speed-sweep", scene="a", variant=f"{SLOW_CLOCK} at {speed:g} m/s", seed=0
-            ),
-            figures={"height_m": abs(speed - 3.4) + 0.1, **told},
+            case=PaperCase(part="speed-sweep", scene="a", variant=variant, seed=0),
+            figures=found,
             seconds=1.0,
+            code="",
         )
-        for speed in SPEEDS_MPS
+        for variant, found in figures.items()
     ]
+    assert set(figures) <= {each.variant for each in SPEED_SWEEP.cases(["a"])}
     assert parted(results[0].case.variant) == (SLOW_CLOCK, 0.2)
     row = SPEED_SWEEP.table(results).splitlines()[2].split(" | ")
     assert row[2:5] == ["20 of 20", "3.4", "3.50, which it doubts"]
