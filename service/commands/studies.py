@@ -194,6 +194,10 @@ def paper(
     seeds: Annotated[
         int | None, typer.Option(min=1, help="At most so many seeds for now; all unless said.")
     ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help="Cases alone that match, as 'paper* on town_centre'; may be repeated."),
+    ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Cases at once, a core each.")] = 2,
     tables: Annotated[
         bool, typer.Option("--tables", help="Run nothing: tables of what the folder has.")
@@ -211,6 +215,7 @@ def paper(
             scenes,
             parts=[name for name in parts.split(",") if name],
             most_seeds=seeds,
+            only=only or [],
             processes=0 if tables else processes,
             out=out,
             page=write,

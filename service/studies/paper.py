@@ -4,6 +4,7 @@ import platform
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import asdict
+from fnmatch import fnmatch
 from functools import partial
 from importlib.metadata import version
 from itertools import chain
@@ -33,6 +34,7 @@ def run_paper(
     *,
     parts: Sequence[str],
     most_seeds: int | None,
+    only: Sequence[str] = (),
     processes: int,
     out: Path,
     page: Path | None = None,
@@ -43,6 +45,7 @@ def run_paper(
         scenes: folders with `camera.json` and `tracks.csv`.
         parts: names of `PARTS`; all where there are none.
         most_seeds: cases with a seed of this or more are left for later; None leaves none.
+        only: patterns of "<variant> on <scene>"; other cases are left for later. None leave none.
         processes: cases at once, a core each; with 0 none is run, and tables alone are written.
         out: of `<part>.jsonl` (a result a line, as they come), `<part>.md`, figures, and
             `manifest.json`.
@@ -61,7 +64,12 @@ def run_paper(
         load_scene(folder)  # a wrong path fails before the first hour of training, not after
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
-        _run_part(name, folders, most_seeds, processes, out, page, console)
+        cases = [
+            case
+            for case in PARTS[name].cases(sorted(folders))
+            if (most_seeds is None or case.seed < most_seeds) and _meant(case, only)
+        ]
+        _run_part(name, cases, folders, processes, out, page, console)
     _draw_efficiency(out)
     _write_manifest(out)
     console.print(f"{out}/manifest.json says by what, when and how long")
@@ -69,8 +77,8 @@ def run_paper(
 
 def _run_part(
     name: str,
+    cases: Sequence[PaperCase],
     folders: dict[str, Path],
-    most_seeds: int | None,
     processes: int,
     out: Path,
     page: Path | None,
@@ -79,13 +87,9 @@ def _run_part(
     part = PARTS[name]
     kept, results = _kept(out, name, console)
     known = {each.case for each in results}
-    cases = [
-        case
-        for case in part.cases(sorted(folders))
-        if case not in known and (most_seeds is None or case.seed < most_seeds)
-    ]
     if processes:
-        for found in _found(cases, folders, processes, console):
+        left = [case for case in cases if case not in known]
+        for found in _found(left, folders, processes, console):
             kept.add([asdict(found)])
             results.append(found)
     text = f"{part.says}\n\n{part.table(results)}" if results else f"{part.says}: nothing yet\n"
@@ -168,8 +172,16 @@ def _begun(out: Path, name: str) -> bool:
     return (out / f"{name}.jsonl").exists()
 
 
+def _meant(case: PaperCase, only: Sequence[str]) -> bool:
+    return not only or any(fnmatch(_row_name(case), pattern) for pattern in only)
+
+
+def _row_name(case: PaperCase) -> str:
+    return f"{case.variant} on {case.scene}"
+
+
 def _name(case: PaperCase) -> str:
-    return f"{case.part}, {case.variant} on {case.scene or 'no scene'}, seed {case.seed}"
+    return f"{case.part}, {_row_name(case)}, seed {case.seed}"
 
 
 def _draw_efficiency(out: Path) -> None:

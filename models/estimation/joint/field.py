@@ -35,42 +35,31 @@ class FieldShape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Field:
-    """A linear model of the mean: a level, four directions, and bumps centred at (K, 2).
-
-    A field without directions has a level and bumps only. A prior variance for each of its P
-    coefficients is in `prior_variance` (P,); `prior_mean` (P,) is the level and zeros.
-    """
+class Bumps:
+    """Bumps exp(-|x - x_k|^2 / 2 l^2) of one length, centred at (K, 2) on a square grid."""
 
     centres: Array
     length_m: float
-    directional: bool
-    prior_mean: Array
-    prior_variance: Array
 
-    def freer(self, share: float) -> "Field":
-        """The same field with that share of its freedom, the level's apart."""
-        variance = self.prior_variance * share**2
-        variance[0] = self.prior_variance[0]
-        return replace(self, prior_variance=variance)
-
-    def features(self, measured: Measured) -> Array:
-        """The rows (M, P) that the coefficients are multiplied by."""
+    def features(self, measured: Measured, directional: bool) -> Array:
+        """The rows (M, P) that coefficients are multiplied by: 1, four of directions, the bumps."""
         exponents, pair = exponents_at(measured.place, self.centres, self.length_m)
         falls = np.exp(exponents, out=exponents)
-        direction = measured.direction if self.directional else _NO_WAY
+        direction = measured.direction if directional else _NO_WAY
         assert direction is not None
-        return features_of(falls, pair, self.directional, direction)
+        return features_of(falls, pair, directional, direction)
 
-    def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
+    def slopes(
+        self, measured: Measured, features: Array, coefficients: Array, directional: bool
+    ) -> Array:
         """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
-        first = 5 if self.directional else 1
+        first = 5 if directional else 1
         # Three products with a vector take half as long as one with a matrix of three columns.
         pulls = np.zeros((3, features.shape[1]))
         pulls[:2, first:] = coefficients[first:] * self.centres.T
         pulls[2, first:] = coefficients[first:]
         direction, d_direction = _NO_WAY, _NO_CHANGE
-        if self.directional:
+        if directional:
             assert measured.direction is not None
             assert measured.d_direction is not None
             direction, d_direction = measured.direction, measured.d_direction
@@ -82,10 +71,55 @@ class Field:
             measured.place,
             measured.d_place,
             coefficients,
-            self.directional,
+            directional,
             direction,
             d_direction,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """A linear model of the mean: a level, four directions, and bumps centred at (K, 2).
+
+    A field without directions has a level and bumps only. A prior variance for each of its P
+    coefficients is in `prior_variance` (P,); `prior_mean` (P,) is the level and zeros. `abrupt`
+    are finer bumps beside them, the last of the coefficients, where a site asks for such.
+    """
+
+    centres: Array
+    length_m: float
+    directional: bool
+    prior_mean: Array
+    prior_variance: Array
+    abrupt: Bumps | None = None
+
+    def freer(self, share: float) -> "Field":
+        """The same field with that share of its freedom, the level's apart."""
+        variance = self.prior_variance * share**2
+        variance[0] = self.prior_variance[0]
+        return replace(self, prior_variance=variance)
+
+    def features(self, measured: Measured) -> Array:
+        """The rows (M, P) that the coefficients are multiplied by."""
+        features = self._smooth.features(measured, self.directional)
+        if self.abrupt is None:
+            return features
+        return np.hstack([features, self.abrupt.features(measured, False)[:, 1:]])
+
+    def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
+        """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
+        if self.abrupt is None:
+            return self._smooth.slopes(measured, features, coefficients, self.directional)
+        smooth = coefficients.size - len(self.abrupt.centres)
+        slopes = self._smooth.slopes(
+            measured, features[:, :smooth], coefficients[:smooth], self.directional
+        )
+        own = slice(smooth - 1, None)  # the first of these is taken for a level, which has no slope
+        return slopes + self.abrupt.slopes(measured, features[:, own], coefficients[own], False)
+
+    @property
+    def _smooth(self) -> Bumps:
+        return Bumps(centres=self.centres, length_m=self.length_m)
 
 
 def field_over(measured: Measured, shape: FieldShape) -> Field:

@@ -12,7 +12,7 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
-from models.estimation.joint.fit import assumed, fit_pose, held_out_log_likelihood, learn
+from models.estimation.joint.fit import assumed, fit_pose
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
@@ -22,8 +22,10 @@ from models.estimation.joint.speed_reference import (
     USUAL_STATURES_M,
     SpeedReference,
     channels_of,
+    learned_at,
     pose_prior,
 )
+from models.estimation.joint.suiting import as_free_as_told, with_room_for_stairs
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -58,8 +60,6 @@ _TOPS_SPREAD = Spread(
 )
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
 _SPREAD_ROUNDS = 5
-_FREEDOMS = (0.03, 0.3, 1.0)  # of the field's variation by place and direction, shares of the most
-_LEAST_GAIN = 1.0  # of the log likelihood, for a freer field to be worth it
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
 _DOUBT_RAD = float(np.radians(4.0))
@@ -121,8 +121,9 @@ def learn_speed_reference(
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
     blank = assumed_speed_reference(observations, prior, walk)
-    blank = _suited(observations, prior, blank, seed)
-    site = _learned(observations, prior, blank, _SPREAD_ROUNDS)
+    blank = as_free_as_told(observations, prior, blank, seed)
+    blank = with_room_for_stairs(observations, prior, blank)
+    site = learned_at(observations, prior, blank, _SPREAD_ROUNDS)
     whole = fit_pose(
         channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
     )
@@ -166,7 +167,7 @@ def relearned(
         if site.statures is None
         else assumed(site.statures.field, site.statures.spread),
     )
-    return _learned(observations, prior, blank, 0)
+    return learned_at(observations, prior, blank, 0)
 
 
 def _doubt(
@@ -196,56 +197,6 @@ def _doubt(
     return None
 
 
-def _suited(
-    observations: Observations, prior: CameraPose, blank: SpeedReference, seed: int
-) -> SpeedReference:
-    """A blank site whose speeds may vary by place and direction as much as its tracks show.
-
-    One half of the tracks must predict the other: a field that is freer than the site needs costs
-    every estimate some of its precision.
-    """
-    rng = np.random.default_rng(seed)
-    halves = []
-    for _ in range(_FOLDS // 2):
-        order = rng.permutation(observations.tracks)
-        first, second = np.array_split(order, 2)
-        halves += [(np.sort(first), np.sort(second)), (np.sort(second), np.sort(first))]
-    at = plane_parameters_of(prior)
-    # One spread for all, so that they differ in what they predict alone.
-    spread = _learned(observations, prior, blank, 1).speeds.spread
-    best, found = -np.inf, blank
-    for freedom in _FREEDOMS:
-        speeds = assumed(blank.speeds.field.freer(freedom), blank.speeds.spread)
-        tried = replace(blank, speeds=speeds, statures=None)
-        candidate_site = replace(tried, speeds=replace(tried.speeds, spread=spread))
-        log_likelihood = 0.0
-        for known, unknown in halves:
-            site = _learned(of_tracks(observations, known), prior, candidate_site, 0)
-            log_likelihood += held_out_log_likelihood(
-                measure_speeds(of_tracks(observations, unknown).steps, at, prior.heading_rad),
-                site.speeds,
-            )
-        if log_likelihood > best + _LEAST_GAIN * len(halves):
-            best, found = log_likelihood, replace(tried, statures=blank.statures)
-    return found
-
-
-def _learned(
-    observations: Observations, prior: CameraPose, blank: SpeedReference, rounds: int
-) -> SpeedReference:
-    at = plane_parameters_of(prior)
-    speeds = learn(
-        measure_speeds(observations.steps, at, prior.heading_rad),
-        blank.speeds,
-        spread_rounds=rounds,
-    )
-    statures = None
-    if blank.statures is not None:
-        tops = measure_statures(observations.tops, at, prior.heading_rad)
-        statures = learn(tops, blank.statures, spread_rounds=rounds)
-    return replace(blank, speeds=speeds, statures=statures)
-
-
 def _with_spreads(blank: SpeedReference, site: SpeedReference) -> SpeedReference:
     """The blank site's fields with the learned site's spreads."""
     statures = None
@@ -272,7 +223,7 @@ def _pose_variance_inflation(
         for known, unknown in (parts, parts[::-1]):
             if min(known.walkers, unknown.walkers) < 2:
                 continue
-            site = _learned(known, prior, blank, 0)
+            site = learned_at(known, prior, blank, 0)
             fit = fit_pose(channels_of(unknown, site, prior), at, pose_prior(prior))
             error = fit.candidate - at - offset
             squared = float(error @ np.linalg.solve(fit.covariance, error)) / 3

@@ -3,12 +3,12 @@
 Ours: pose = estimate - offset, which is learned while the pose is known.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from models.estimation.joint.fit import Channel, Learned, PosePrior
+from models.estimation.joint.fit import Channel, Learned, PosePrior, learn
 from models.estimation.joint.measures import measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations
 from models.estimation.parameters import plane_parameters_of
@@ -91,6 +91,26 @@ def channels_of(
             )
         )
     return found
+
+
+def learned_at(
+    observations: Observations, prior: CameraPose, blank: SpeedReference, rounds: int
+) -> SpeedReference:
+    """A site whose fields are learned of tracks at the prior pose; the spread in so many rounds.
+
+    `blank` says from what, and what the fields may do.
+    """
+    at = plane_parameters_of(prior)
+    speeds = learn(
+        measure_speeds(observations.steps, at, prior.heading_rad),
+        blank.speeds,
+        spread_rounds=rounds,
+    )
+    statures = None
+    if blank.statures is not None:
+        tops = measure_statures(observations.tops, at, prior.heading_rad)
+        statures = learn(tops, blank.statures, spread_rounds=rounds)
+    return replace(blank, speeds=speeds, statures=statures)
 
 
 def pose_prior(prior: CameraPose) -> PosePrior:
