@@ -13,6 +13,7 @@ from statistics import fmean
 
 import torch
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from models.errors import CalibrationError, ShapeError
@@ -126,7 +127,7 @@ def _found(
             shares.pop(number, None)
             ended += 1
             if isinstance(found, str):
-                console.print(f"[red]{_name(cases[number])}:[/] {found}")
+                console.print(f"[red]{escape(_name(cases[number]))}:[/] {escape(found)}")
             else:
                 yield found
 

@@ -36,8 +36,8 @@ _SD = 0.5  # of a bump
 _MOST_BUMPS = 80
 _MOVING_MPS = 0.3  # who stands is no evidence of stairs
 _FEWEST_IN_CELL, _SIGMAS_IN_CELL = 3, 2.0
-_FEWEST_CELLS, _FEWEST_TRACKS, _SIGMAS = 2, 5, 4.5
-_SOME = 1 / 6  # who are not slower: stairs slow all people down, a shop window some
+_FEWEST_CELLS, _FEWEST_TRACKS, _SIGMAS = 2, 8, 4.5
+_ALIKE = 1.5  # of the people's spread: stairs slow all people down, a shop window some
 _OWN_SD = 0.1  # of people in one place, before any are seen
 _SD_OF_MEDIAN = math.sqrt(math.pi / 2)  # of Gaussian values, over that of their mean
 _AROUND = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
@@ -163,8 +163,8 @@ def _abrupt_cells(by_cell: dict[Cell, Rows], deviations: _Deviations) -> list[Ce
             continue
         away = values if signs[cluster[0]] else -values
         halves = [float(np.median(half)) for half in np.array_split(away, 2)]
-        sure = _sigmas(values) > _SIGMAS and min(halves) > _ABRUPT / 2
-        if sure and np.quantile(away, _SOME) > 0:
+        alike = float(np.median(away)) > _ALIKE * _spread(away)
+        if alike and min(halves) > _ABRUPT / 2 and _sigmas(values) > _SIGMAS:
             found.append((_sigmas(values), cluster))
     kept: list[Cell] = []
     for _, cluster in sorted(found, reverse=True):
@@ -178,8 +178,13 @@ def _sigmas(values: Array) -> float:
     middle = float(np.median(values))
     if abs(middle) < _ABRUPT:
         return 0.0
-    sd = SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - middle))) + _OWN_SD
-    return abs(middle) * math.sqrt(len(values)) / (_SD_OF_MEDIAN * sd)
+    sd = _SD_OF_MEDIAN * (_spread(values) + _OWN_SD)
+    return abs(middle) * math.sqrt(len(values)) / sd
+
+
+def _spread(values: Array) -> float:
+    """The standard deviation of most values."""
+    return SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))
 
 
 def _clusters(signs: dict[Cell, bool]) -> Iterable[list[Cell]]:

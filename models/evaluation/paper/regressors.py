@@ -54,13 +54,24 @@ def _walk(**changes: Any) -> Change:
 
 # The authors' public code trains on 5,145 walks, 15 of each of 7 x 7 x 7 poses, for 25 epochs.
 _COARSE = PoseRange(height_step_m=1.0, angle_step_rad=math.radians(5))
+_reduced = _recipe(spread=_COARSE, walks_per_pose=15, epochs=25)
+_LEFT_OPEN = {
+    "steps of 1 s": _walk(step_s=1.0),
+    "up to 35 points": _walk(max_points=35),
+    "learning rate 1e-4": _recipe(learning_rate=1e-4),
+    "learning rate falls to 0": _recipe(schedule="cosine"),
+}
+
+
+def _both(one: Change, other: Change) -> Change:
+    return lambda plan: other(one(plan))
+
+
 VARIANTS: dict[str, Change] = {
     PAPER: lambda plan: plan,
-    "paper, steps of 1 s": _walk(step_s=1.0),
-    "paper, up to 35 points": _walk(max_points=35),
-    "paper, learning rate 1e-4": _recipe(learning_rate=1e-4),
-    "paper, learning rate falls to 0": _recipe(schedule="cosine"),
-    AUTHORS_CODE: _recipe(spread=_COARSE, walks_per_pose=15, epochs=25),
+    **{f"{PAPER}, {name}": change for name, change in _LEFT_OPEN.items()},
+    AUTHORS_CODE: _reduced,
+    **{f"{AUTHORS_CODE}, {name}": _both(_reduced, change) for name, change in _LEFT_OPEN.items()},
 }
 
 

@@ -39,6 +39,7 @@ def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     rows.append((DEFAULT, scenes, _SEEDS))
     rows.append((AUTHORS_CODE, scenes, _SEEDS))
     own = [variant for variant in VARIANTS if variant != AUTHORS_CODE]
+    own.sort(key=lambda variant: not variant.startswith(AUTHORS_CODE))
     rows += [(variant, left_open, _SEEDS) for variant in own]
     rows.append((PAPER, others, _SEEDS))
     return [

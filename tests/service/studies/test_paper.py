@@ -1,14 +1,19 @@
 """`surefoot paper`: what is there is not run again, and the manifest says by what."""
 
 import json
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from models.evaluation.paper.part import PaperCase, PaperResult
+from models.evaluation.paper.parts import PARTS
 from service.cli import app
 from service.studies.pages import markers
 from tests.conftest import SCENES
 
+ROOT = Path(__file__).parents[3]
+KEPT, PAGE = ROOT / ".readme" / "paper", ROOT / "models" / "PAPER.md"
 SCENE = SCENES / "pets2009_s1l2_1_v001"
 needs_scenes = pytest.mark.skipif(not SCENE.exists(), reason=f"no recorded scenes in {SCENES}")
 
@@ -63,7 +68,34 @@ def test_a_part_goes_on_where_it_was_ended(tmp_path):
     assert second["case"]["variant"] in table
 
 
+@needs_scenes
+@pytest.mark.slow
+def test_some_cases_alone_are_run(tmp_path):
+    asked = ("--only", "tops of boxes on *", "--only", "* on nowhere")
+    only = paper(SCENE, "--out", tmp_path, "--parts", "vanishing-points", *asked)
+    assert only.exit_code == 0, only.output
+    (line,) = (tmp_path / "vanishing-points.jsonl").read_text().splitlines()[1:]
+    assert json.loads(line)["case"]["variant"] == "tops of boxes"
+
+
 def test_a_part_that_is_none_is_named(tmp_path):
     refused = paper(tmp_path, "--out", tmp_path, "--parts", "tables")
     assert refused.exit_code == 1
     assert "'tables'" in refused.output
+
+
+@pytest.mark.parametrize("name", list(PARTS))
+def test_the_page_says_what_is_kept(name):
+    """The tables of models/PAPER.md are those of the results in .readme/paper."""
+    lines = (KEPT / f"{name}.jsonl").read_text().splitlines()[1:]
+    newest = {
+        found.case: found
+        for found in (
+            PaperResult(**{**row, "case": PaperCase(**row["case"])})
+            for row in map(json.loads, lines)
+        )
+    }
+    part = PARTS[name]
+    text = f"{part.says}\n\n{part.table(list(newest.values()))}"
+    begin, end = markers(name, "surefoot paper --write")
+    assert f"{begin}\n{text}\n{end}" in PAGE.read_text()

@@ -19,7 +19,7 @@ from models.simulation.walkers import WalkConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FLIGHT_M = 1.5
-SITE, DIRECTION = 3, 1
+SITE, DIRECTION = 6, 1
 
 
 def places_of(tracks, pose=PRIOR):
@@ -98,8 +98,8 @@ def test_a_pose_beside_stairs_is_nearer_the_truth(climbed, reference, monkeypatc
     with_room = np.abs(off(reference))
     monkeypatch.setattr(suiting, "abrupt_bumps", lambda *_: None)
     without = np.abs(off(learned(climbed[0])))
-    assert np.hypot(*with_room[:2]) < 0.5 * np.hypot(*without[:2])
-    assert with_room[2] < 0.5 * without[2]
+    assert np.hypot(*with_room[:2]) < 0.7 * np.hypot(*without[:2])
+    assert with_room[2] < 0.7 * without[2]
 
 
 def test_what_is_stored_is_read(climbed, reference):
