@@ -14,10 +14,17 @@ def panels(count: int) -> tuple[Any, Sequence[Any]]:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(1, count, figsize=(4.5 * count, 3.2), constrained_layout=True)
+    figure, axes = pyplot.subplots(1, count, figsize=(4.5 * count, 3.8), constrained_layout=True)
     for each in axes:
         each.grid(alpha=0.3)
     return figure, axes
+
+
+def save_with_legend(figure: Any, labelled: Any, path: Path) -> None:
+    """Write a figure with the names of what is in one of its panels below them all."""
+    handles, names = labelled.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=2, fontsize=7)
+    figure.savefig(path, dpi=110)
 
 
 def plot_efficiency(results: Sequence[PaperResult], path: Path) -> None:
@@ -33,8 +40,7 @@ def plot_efficiency(results: Sequence[PaperResult], path: Path) -> None:
             )
     for panel, label in ((left, "height off, m"), (right, "angle off, deg")):
         panel.set(xlabel="training, CPU-s", ylabel=label, xscale="log", ylim=(0, None))
-    left.legend(fontsize=6)
-    figure.savefig(path, dpi=110)
+    save_with_legend(figure, left, path)
 
 
 def _kind(result: PaperResult) -> str:

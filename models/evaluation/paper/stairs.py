@@ -13,7 +13,7 @@ from statistics import median
 from models.evaluation.injectors.catalogue import Fault
 from models.evaluation.injectors.lens_and_ground import ramp, stairs
 from models.evaluation.injectors.view import view_of
-from models.evaluation.paper.measures import centred_plan, errors_of, middle_errors, outcomes_of
+from models.evaluation.paper.measures import errors_of, middle_errors, outcomes_of
 from models.evaluation.paper.part import (
     SERVED_BY,
     TRAINED,
@@ -25,16 +25,24 @@ from models.evaluation.paper.part import (
     by_row,
     markdown,
 )
-from models.evaluation.paper.regressors import DEFAULT, SERVED, served_answer
+from models.evaluation.paper.regressors import (
+    AUTHORS_CODE,
+    DEFAULT,
+    SERVED,
+    plan_of,
+    served_answer,
+)
 from models.evaluation.protocol.cases import KNOCKED
 from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import averaged_of
 from models.regression.prediction import predict_windows
+from models.regression.recipe import TrainingPlan
 from models.regression.training import train
 
 _HIGHEST_M, _HIGHEST_SHARE = 2.0, 0.25  # of a flight: a floor's half, and of the camera's height
 _RAMP = 0.1
 _GROUNDS = ("flat", "stairs", "ramp")
+_VARIANTS = (SERVED, DEFAULT, AUTHORS_CODE)
 _SEEDS = (0, 1, 2)
 _KNOCKS = 4  # a seed
 
@@ -42,7 +50,7 @@ _KNOCKS = 4  # a seed
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     return [
         PaperCase(part="stairs", scene=scene, variant=variant, seed=seed)
-        for variant in (SERVED, DEFAULT)
+        for variant in _VARIANTS
         for seed in _SEEDS
         for scene in scenes
     ]
@@ -52,7 +60,7 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
     scene = load_scene(folder)
     if case.variant == SERVED:
         return _served(scene, case.seed)
-    return _averaged(scene, case.seed, on_share)
+    return _averaged(scene, plan_of(scene, case.variant, case.seed), on_share)
 
 
 def _faults(scene: Scene) -> dict[str, Fault | None]:
@@ -66,13 +74,13 @@ def _faults(scene: Scene) -> dict[str, Fault | None]:
     return dict(zip(_GROUNDS, faults, strict=True))
 
 
-def _averaged(scene: Scene, seed: int, on_share: OnShare) -> Figures:
-    plan = centred_plan(scene, DEFAULT, seed)
+def _averaged(scene: Scene, plan: TrainingPlan, on_share: OnShare) -> Figures:
     network, _ = train(plan, lambda at: on_share(at.step / at.steps))
     predict = partial(predict_windows, network, plan=plan)
+    view = view_of(scene)
     figures: Figures = {}
     for ground, fault in _faults(scene).items():
-        tracks = scene.tracks if fault is None else fault.inject(scene.tracks, view_of(scene), seed)
+        tracks = scene.tracks if fault is None else fault.inject(scene.tracks, view, plan.seed)
         estimate = averaged_of(predict, plan, [track.trajectory for track in tracks])
         height_m, angle_deg = errors_of(estimate, scene)
         figures |= {f"{ground}_height_m": height_m, f"{ground}_deg": angle_deg}

@@ -154,7 +154,7 @@ def _at(found: dict[float, Figures], speed_mps: float) -> str:
 
 def plot_sweep(results: Sequence[PaperResult], path: Path) -> None:
     """Height and angle error over training speed, a line for each scene and recipe."""
-    from models.evaluation.paper.plots import panels
+    from models.evaluation.paper.plots import panels, save_with_legend
 
     figure, (left, right) = panels(2)
     swept = _swept(results)
@@ -167,8 +167,7 @@ def plot_sweep(results: Sequence[PaperResult], path: Path) -> None:
                        label=f"{scene}, {recipe}")  # fmt: skip
     left.set(xlabel="training speed, m/s", ylabel="height off, m", ylim=(0, None))
     right.set(xlabel="training speed, m/s", ylabel="angle off, deg", ylim=(0, None))
-    left.legend(fontsize=6)
-    figure.savefig(path, dpi=110)
+    save_with_legend(figure, left, path)
 
 
 SPEED_SWEEP = PaperPart(
