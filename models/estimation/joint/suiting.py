@@ -143,6 +143,8 @@ def with_abrupt(field: Field, bumps: Bumps) -> Field:
 
 
 def _rows_by_cell(cells: Rows) -> dict[Cell, Rows]:
+    if not len(cells):  # nobody moves
+        return {}
     keys, number = np.unique(cells, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
     parts = np.split(order, np.cumsum(np.bincount(number.ravel()))[:-1])

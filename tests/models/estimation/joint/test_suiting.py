@@ -77,6 +77,11 @@ def test_where_nobody_climbs_nothing_is_found(level):
     assert learned(level[0]).speeds.field.abrupt is None
 
 
+def test_where_nobody_moves_nothing_is_found(level):
+    slow = [replace(track, time_s=track.time_s * 20) for track in level[0]]
+    assert learned(slow).speeds.field.abrupt is None
+
+
 def test_where_some_dawdle_nothing_is_found(level):
     """A third of the people take one stretch at a third of their pace: a shop window."""
     places = places_of(level[0])
