@@ -10,6 +10,7 @@ from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from statistics import fmean
+from typing import Any
 
 import torch
 from rich.console import Console
@@ -162,11 +163,16 @@ def _kept(
 ) -> tuple[LinesFile, list[PaperResult]]:
     """The file of a part's results, and those in it that today's code has made."""
     file = LinesFile(out / f"{name}.jsonl", rows_tell_code=True)
-    found = [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in file.rows]
+    found = results_of(file.rows)
     results = [each for each in found if each.code == _code(each.case)]
     if console is not None and len(results) < len(found):
         console.print(f"{name}: {len(found) - len(results)} results of other code are left out")
     return file, results
+
+
+def results_of(rows: Sequence[dict[str, Any]]) -> list[PaperResult]:
+    """The results of a part's rows, as they were kept."""
+    return [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in rows]
 
 
 def _begun(out: Path, name: str) -> bool:

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from models.evaluation.paper.part import PaperCase, PaperResult
 from models.evaluation.paper.parts import PARTS
 from service.cli import app
 from service.studies.pages import markers
+from service.studies.paper import results_of
 from tests.conftest import SCENES
 
 ROOT = Path(__file__).parents[3]
@@ -87,14 +87,8 @@ def test_a_part_that_is_none_is_named(tmp_path):
 @pytest.mark.parametrize("name", list(PARTS))
 def test_the_page_says_what_is_kept(name):
     """The tables of models/PAPER.md are those of the results in .readme/paper."""
-    lines = (KEPT / f"{name}.jsonl").read_text().splitlines()[1:]
-    newest = {
-        found.case: found
-        for found in (
-            PaperResult(**{**row, "case": PaperCase(**row["case"])})
-            for row in map(json.loads, lines)
-        )
-    }
+    _, *rows = map(json.loads, (KEPT / f"{name}.jsonl").read_text().splitlines())
+    newest = {each.case: each for each in results_of(rows)}
     part = PARTS[name]
     text = f"{part.says}\n\n{part.table(list(newest.values()))}"
     begin, end = markers(name, "surefoot paper --write")

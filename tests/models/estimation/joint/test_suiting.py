@@ -22,9 +22,9 @@ FLIGHT_M = 1.5
 SITE, DIRECTION = 6, 1
 
 
-def places_of(tracks, pose=PRIOR):
+def places_of(tracks):
     uv = np.concatenate([track.uv for track in tracks])
-    places, valid = ground_from_pixel(LENS, pose.rotation, pose.centre_m, uv)
+    places, valid = ground_from_pixel(LENS, PRIOR.rotation, PRIOR.centre_m, uv)
     return places[valid]
 
 
