@@ -4,6 +4,7 @@ import platform
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import asdict
+from difflib import get_close_matches
 from fnmatch import fnmatch
 from functools import partial
 from importlib.metadata import version
@@ -54,7 +55,8 @@ def run_paper(
         page: with markers to write the tables between, or None.
 
     Raises:
-        ShapeError: there is no part of a name, or the page lacks the markers of a part.
+        ShapeError: there is no part of a name, no case that a pattern matches, or the page lacks
+            the markers of a part.
     """
     console = Console()
     for name in parts:
@@ -64,14 +66,16 @@ def run_paper(
     folders = {folder.name: folder for folder in scenes}
     for folder in scenes:
         load_scene(folder)  # a wrong path fails before the first hour of training, not after
+    cases = {name: PARTS[name].cases(sorted(folders)) for name in chosen}
+    _refuse_what_matches_nothing(only, list(chain.from_iterable(cases.values())))
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
-        cases = [
+        meant = [
             case
-            for case in PARTS[name].cases(sorted(folders))
+            for case in cases[name]
             if (most_seeds is None or case.seed < most_seeds) and _meant(case, only)
         ]
-        _run_part(name, cases, folders, processes, out, page, console)
+        _run_part(name, meant, folders, processes, out, page, console)
     _draw_efficiency(out)
     _write_manifest(out)
     console.print(f"{out}/manifest.json says by what, when and how long")
@@ -177,6 +181,14 @@ def results_of(rows: Sequence[dict[str, Any]]) -> list[PaperResult]:
 
 def _begun(out: Path, name: str) -> bool:
     return (out / f"{name}.jsonl").exists()
+
+
+def _refuse_what_matches_nothing(only: Sequence[str], cases: Sequence[PaperCase]) -> None:
+    names = sorted({_row_name(case) for case in cases})
+    for pattern in only:
+        if not any(fnmatch(name, pattern) for name in names):
+            near = get_close_matches(pattern, names, n=3, cutoff=0.0)
+            raise ShapeError(f"only: no case matches {pattern!r}; near it: {', '.join(near)}")
 
 
 def _meant(case: PaperCase, only: Sequence[str]) -> bool:

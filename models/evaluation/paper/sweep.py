@@ -163,7 +163,7 @@ def plot_sweep(results: Sequence[PaperResult], path: Path) -> None:
     for (scene, recipe), found in swept.items():
         for panel, name in ((left, "height_m"), (right, "deg")):
             errors = [figures[name] for figures in found.values()]
-            panel.plot(list(found), errors, styles[recipe], color=colors[scene],
+            panel.plot(list(found), errors, styles[recipe], color=colors[scene], marker=".",
                        label=f"{scene}, {recipe}")  # fmt: skip
     left.set(xlabel="training speed, m/s", ylabel="height off, m", ylim=(0, None))
     right.set(xlabel="training speed, m/s", ylabel="angle off, deg", ylim=(0, None))

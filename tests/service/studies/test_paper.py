@@ -71,7 +71,7 @@ def test_a_part_goes_on_where_it_was_ended(tmp_path):
 @needs_scenes
 @pytest.mark.slow
 def test_some_cases_alone_are_run(tmp_path):
-    asked = ("--only", "tops of boxes on *", "--only", "* on nowhere")
+    asked = ("--only", "tops of boxes on *")
     only = paper(SCENE, "--out", tmp_path, "--parts", "vanishing-points", *asked)
     assert only.exit_code == 0, only.output
     (line,) = (tmp_path / "vanishing-points.jsonl").read_text().splitlines()[1:]
@@ -82,6 +82,20 @@ def test_a_part_that_is_none_is_named(tmp_path):
     refused = paper(tmp_path, "--out", tmp_path, "--parts", "tables")
     assert refused.exit_code == 1
     assert "'tables'" in refused.output
+
+
+@needs_scenes
+def test_a_pattern_that_matches_no_case_is_named(tmp_path):
+    """Else a night's run ends at once, and says that all is well."""
+    asked = ("--only", "paper at 1.0 m/s on *", "--only", "paper at 2.4 m/s on *")
+    refused = paper(SCENE, "--out", tmp_path / "out", "--parts", "speed-sweep", *asked)
+    assert refused.exit_code == 1
+    said = " ".join(refused.output.split())
+    assert "no case matches 'paper at 1.0 m/s on *'" in said
+    assert (
+        "near it: paper at 1" in said
+    )  # names as they are written here: 1.8, and 1 without a nought
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("name", list(PARTS))
