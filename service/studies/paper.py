@@ -1,17 +1,13 @@
 """`surefoot paper`: the paper's tables beside ours, part by part, in a folder."""
 
-import platform
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import asdict
 from difflib import get_close_matches
 from fnmatch import fnmatch
 from functools import partial
-from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from statistics import fmean
-from typing import Any
 
 import torch
 from rich.console import Console
@@ -23,13 +19,11 @@ from models.evaluation.paper.part import PAPERS_OWN, PaperCase, PaperResult
 from models.evaluation.paper.parts import PARTS
 from models.evaluation.paper.plots import plot_efficiency
 from models.evaluation.scenes import load_scene
-from service.studies.code_hash import code_hash
-from service.studies.lines_file import LinesFile
 from service.studies.pages import markers, write_between
-from service.studies.runs import as_they_end, process_pool, shared_values, write_results
+from service.studies.paper_kept import code_of, is_begun, kept_results, write_manifest
+from service.studies.runs import as_they_end, process_pool, shared_values
 
 _COMMAND = "surefoot paper --write"
-_VERSIONS = ("numpy", "scipy", "opencv-python-headless", "torch", "surefoot")
 
 
 def run_paper(
@@ -77,7 +71,7 @@ def run_paper(
         ]
         _run_part(name, meant, folders, processes, out, page, console)
     _draw_efficiency(out)
-    _write_manifest(out)
+    write_manifest(out)
     console.print(f"{out}/manifest.json says by what, when and how long")
 
 
@@ -91,7 +85,7 @@ def _run_part(
     console: Console,
 ) -> None:
     part = PARTS[name]
-    kept, results = _kept(out, name, console)
+    kept, results = kept_results(out, name, console)
     known = {each.case for each in results}
     if processes:
         left = [case for case in cases if case not in known]
@@ -154,33 +148,8 @@ def _run(
     except CalibrationError as error:
         return str(error)
     return PaperResult(
-        case=case, figures=figures, seconds=time.monotonic() - begun, code=_code(case)
+        case=case, figures=figures, seconds=time.monotonic() - begun, code=code_of(case)
     )
-
-
-def _code(case: PaperCase) -> str:
-    return code_hash(PARTS[case.part].made_by(case))
-
-
-def _kept(
-    out: Path, name: str, console: Console | None = None
-) -> tuple[LinesFile, list[PaperResult]]:
-    """The file of a part's results, and those in it that today's code has made."""
-    file = LinesFile(out / f"{name}.jsonl", rows_tell_code=True)
-    found = results_of(file.rows)
-    results = [each for each in found if each.code == _code(each.case)]
-    if console is not None and len(results) < len(found):
-        console.print(f"{name}: {len(found) - len(results)} results of other code are left out")
-    return file, results
-
-
-def results_of(rows: Sequence[dict[str, Any]]) -> list[PaperResult]:
-    """The results of a part's rows, as they were kept."""
-    return [PaperResult(**{**row, "case": PaperCase(**row["case"])}) for row in rows]
-
-
-def _begun(out: Path, name: str) -> bool:
-    return (out / f"{name}.jsonl").exists()
 
 
 def _refuse_what_matches_nothing(only: Sequence[str], cases: Sequence[PaperCase]) -> None:
@@ -205,7 +174,7 @@ def _name(case: PaperCase) -> str:
 
 def _draw_efficiency(out: Path) -> None:
     """Errors over training time, of whatever was trained for the paper's own scene."""
-    kept = [_kept(out, name)[1] for name in ("regressors", "posenet") if _begun(out, name)]
+    kept = [kept_results(out, name)[1] for name in ("regressors", "posenet") if is_begun(out, name)]
     trained = [
         each
         for each in chain.from_iterable(kept)
@@ -213,22 +182,3 @@ def _draw_efficiency(out: Path) -> None:
     ]
     if trained:
         plot_efficiency(trained, out / "efficiency.png")
-
-
-def _write_manifest(out: Path) -> None:
-    """By what, on what and how long each part took, of all that the folder has."""
-    told = {}
-    for name in PARTS:
-        if not _begun(out, name):
-            continue
-        kept, results = _kept(out, name)
-        told[name] = {
-            "heading": asdict(kept.heading),
-            "cases": len(results),
-            "seeds": sorted({each.case.seed for each in results}),
-            "scenes": sorted({each.case.scene for each in results}),
-            "seconds": sum(each.seconds for each in results),
-            "seconds_a_case": fmean(each.seconds for each in results) if results else None,
-        }
-    versions = {name: version(name) for name in _VERSIONS} | {"python": platform.python_version()}
-    write_results(out / "manifest.json", versions=versions, parts=told)

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from models.evaluation.paper.parts import PARTS
 from service.cli import app
 from service.studies.pages import markers
-from service.studies.paper import results_of
+from service.studies.paper_kept import results_of
 from tests.conftest import SCENES
 
 ROOT = Path(__file__).parents[3]
