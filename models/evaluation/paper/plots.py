@@ -1,21 +1,24 @@
 """The one style of the study's figures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from models.evaluation.paper.part import PaperResult
+from models.evaluation.paper.part import Figures, PaperResult
 
 
-def panels(count: int) -> tuple[Any, Sequence[Any]]:
-    """A figure of some panels beside one another."""
+def panels(columns: int, rows: int = 1) -> tuple[Any, Any]:
+    """A figure of panels (rows, columns), those of a row beside one another."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(1, count, figsize=(4.5 * count, 3.8), constrained_layout=True)
-    for each in axes:
+    size = (4.5 * columns, 3.8 if rows == 1 else 2.5 * rows)
+    figure, axes = pyplot.subplots(
+        rows, columns, figsize=size, constrained_layout=True, squeeze=False
+    )
+    for each in axes.flat:
         each.grid(alpha=0.3)
     return figure, axes
 
@@ -29,7 +32,7 @@ def save_with_legend(figure: Any, labelled: Any, path: Path) -> None:
 
 def plot_efficiency(results: Sequence[PaperResult], path: Path) -> None:
     """Errors over seconds of training: the paper's figure of efficiency, of one scene's runs."""
-    figure, (left, right) = panels(2)
+    figure, ((left, right),) = panels(2)
     kinds = sorted({_kind(each) for each in results})
     for number, kind in enumerate(kinds):
         own = [each.figures for each in results if _kind(each) == kind]
@@ -41,6 +44,29 @@ def plot_efficiency(results: Sequence[PaperResult], path: Path) -> None:
     for panel, label in ((left, "height off, m"), (right, "angle off, deg")):
         panel.set(xlabel="training, CPU-s", ylabel=label, xscale="log", ylim=(0, None))
     save_with_legend(figure, left, path)
+
+
+def plot_speeds(swept: Mapping[tuple[str, str], Mapping[float, Figures]], path: Path) -> None:
+    """Errors over the training speed in m/s, of each scene and recipe: the paper's figure.
+
+    A row for each recipe, a line for each scene.
+    """
+    recipes = list(dict.fromkeys(recipe for _, recipe in swept))
+    scenes = sorted({scene for scene, _ in swept})
+    figure, rows = panels(2, len(recipes))
+    for (scene, recipe), found in swept.items():
+        for panel, name in zip(rows[recipes.index(recipe)], ("height_m", "deg"), strict=True):
+            errors = [figures[name] for figures in found.values()]
+            color = f"C{scenes.index(scene)}"
+            panel.plot(list(found), errors, "-", color=color, marker=".", label=scene)
+    fastest = max(speed for found in swept.values() for speed in found)
+    for recipe, row in zip(recipes, rows, strict=True):
+        for panel, label in zip(row, ("height off, m", "angle off, deg"), strict=True):
+            panel.set(ylabel=label, xlim=(0, 1.03 * fastest), ylim=(0, None))
+            panel.set_title(recipe, fontsize=9)
+    for panel in rows[-1]:
+        panel.set(xlabel="training speed, m/s")
+    save_with_legend(figure, max(rows, key=lambda row: len(row[0].lines))[0], path)
 
 
 def _kind(result: PaperResult) -> str:

@@ -22,6 +22,7 @@ from models.evaluation.paper.part import (
     markdown,
     own_first,
 )
+from models.evaluation.paper.plots import plot_speeds
 from models.evaluation.paper.regressors import AUTHORS_CODE, DEFAULT, PAPER, SERVED, plan_of
 from models.evaluation.scenes import Scene, load_scene
 from models.evaluation.studies.centred_run import averaged_of
@@ -152,22 +153,9 @@ def _at(found: dict[float, Figures], speed_mps: float) -> str:
     return f"{figures['height_m']:.2f}, {figures['deg']:.1f}"
 
 
-def plot_sweep(results: Sequence[PaperResult], path: Path) -> None:
-    """Height and angle error over training speed, a line for each scene and recipe."""
-    from models.evaluation.paper.plots import panels, save_with_legend
-
-    figure, (left, right) = panels(2)
-    swept = _swept(results)
-    styles = dict(zip(RECIPES, ("-", ":", "--", "-."), strict=True))
-    colors = {scene: f"C{at}" for at, scene in enumerate(sorted({scene for scene, _ in swept}))}
-    for (scene, recipe), found in swept.items():
-        for panel, name in ((left, "height_m"), (right, "deg")):
-            errors = [figures[name] for figures in found.values()]
-            panel.plot(list(found), errors, styles[recipe], color=colors[scene], marker=".",
-                       label=f"{scene}, {recipe}")  # fmt: skip
-    left.set(xlabel="training speed, m/s", ylabel="height off, m", ylim=(0, None))
-    right.set(xlabel="training speed, m/s", ylabel="angle off, deg", ylim=(0, None))
-    save_with_legend(figure, left, path)
+def _plot(results: Sequence[PaperResult], path: Path) -> None:
+    if swept := _swept(results):  # else the service alone has answered yet
+        plot_speeds(swept, path)
 
 
 SPEED_SWEEP = PaperPart(
@@ -176,5 +164,5 @@ SPEED_SWEEP = PaperPart(
     run=_run,
     made_by=_made_by,
     table=_table,
-    plot=plot_sweep,
+    plot=_plot,
 )

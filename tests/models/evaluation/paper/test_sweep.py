@@ -69,3 +69,16 @@ def test_the_table_names_the_floor():
     row = SPEED_SWEEP.table(results).splitlines()[2].split(" | ")
     assert row[2:5] == ["20 of 20", "3.4", "3.50, which it doubts"]
     assert row[7] == "2.10, 1.0"  # at 1.4 m/s
+
+
+def test_nothing_is_drawn_of_the_service_alone(tmp_path):
+    case = PaperCase(part="speed-sweep", scene="a", variant="served", seed=0)
+    told = {"walking_speed_mps": 1.4, "clock_doubted": 0.0}
+    trained = replace(case, variant=f"{SLOW_CLOCK} at 1.4 m/s")
+    served = PaperResult(case=case, figures=told, seconds=1.0, code="")
+    assert SPEED_SWEEP.plot is not None
+    SPEED_SWEEP.plot([served], tmp_path / "none.png")
+    assert not (tmp_path / "none.png").exists()
+    one = replace(served, case=trained, figures={"height_m": 0.1, "deg": 1.0})
+    SPEED_SWEEP.plot([served, one], tmp_path / "one.png")
+    assert (tmp_path / "one.png").stat().st_size > 1000
