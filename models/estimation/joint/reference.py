@@ -13,7 +13,6 @@ from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import FieldShape, field_over
 from models.estimation.joint.fit import assumed, fit_pose
-from models.estimation.joint.freedom import as_free_as_told
 from models.estimation.joint.hierarchy import Spread
 from models.estimation.joint.measures import Measured, measure_speeds, measure_statures
 from models.estimation.joint.observations import Observations, of_tracks
@@ -26,7 +25,7 @@ from models.estimation.joint.speed_reference import (
     learned_at,
     pose_prior,
 )
-from models.estimation.joint.stairs import with_room_for_stairs
+from models.estimation.joint.suiting import as_free_as_told, with_room_for_stairs
 from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array

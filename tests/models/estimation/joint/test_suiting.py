@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from models.estimation.joint import stairs as joint_stairs
+from models.estimation.joint import suiting
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
 from models.estimation.joint.reference import learn_speed_reference
@@ -101,7 +101,7 @@ def test_a_pose_beside_stairs_is_nearer_the_truth(climbed, reference, monkeypatc
         return joint_estimate(seen(climbed[1]), PRIOR, known).values - plane_parameters_of(KNOCKED)
 
     with_room = np.abs(off(reference))
-    monkeypatch.setattr(joint_stairs, "abrupt_bumps", lambda *_: None)
+    monkeypatch.setattr(suiting, "abrupt_bumps", lambda *_: None)
     without = np.abs(off(learned(climbed[0])))
     assert np.hypot(*with_room[:2]) < 0.7 * np.hypot(*without[:2])
     assert with_room[2] < 0.7 * without[2]
