@@ -15,8 +15,8 @@ from models.drift.chart import (
 )
 from models.drift.group_scores import SCORES, Usual, scores_at
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
-from models.estimation.joint.reference import relearned
 from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.reference.learning import relearned
 from models.flow.folds import Fold, Folds
 from models.flow.likelihood import walkers_of
 from models.flow.reference import candidate_of

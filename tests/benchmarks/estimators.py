@@ -20,7 +20,7 @@ from rich.console import Console
 
 from models.drift.change_point import find_change
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.reference import learn_flow
 from models.simulation.walkers import WalkConfig

@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from models.estimation.joint.observing import observe
-from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.reference.learning import learn_speed_reference
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose

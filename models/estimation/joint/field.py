@@ -99,6 +99,18 @@ class Field:
         variance[0] = self.prior_variance[0]
         return replace(self, prior_variance=variance)
 
+    def with_abrupt(self, bumps: Bumps, sd: float) -> "Field":
+        """The same field with finer bumps beside it, by which a place may vary so much more."""
+        count = len(bumps.centres)
+        return replace(
+            self,
+            abrupt=bumps,
+            prior_mean=np.concatenate([self.prior_mean, np.zeros(count)]),
+            prior_variance=np.concatenate(
+                [self.prior_variance, np.full(count, sd**2 / _BUMP_SHARE)]
+            ),
+        )
+
     def features(self, measured: Measured) -> Array:
         """The rows (M, P) that the coefficients are multiplied by."""
         features = self._smooth.features(measured, self.directional)

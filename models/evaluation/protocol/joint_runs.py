@@ -5,8 +5,8 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.joint.reference import assumed_speed_reference, learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
+from models.estimation.reference.learning import assumed_speed_reference, learn_speed_reference
 from models.evaluation.protocol.cases import (
     KNOCKED,
     Answer,

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.joint.speed_reference import SpeedReference
+from models.estimation.reference.learning import learn_speed_reference
 from models.evaluation.protocol.cases import Answer, ProtocolCase
 from models.recalibration import CameraSite, Observations, WalkConfig, learn_site, observe
 

@@ -8,7 +8,7 @@ import pytest
 from models.drift.change_point import FEWEST_BESIDE, find_change
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import of_tracks
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.simulation.knocked import Knock
 from models.simulation.walkers import WalkConfig
 from models.trajectory import by_end

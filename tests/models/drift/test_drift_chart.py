@@ -25,7 +25,7 @@ from models.drift.group_scores import SCORES, GroupScores, Usual, score_groups
 from models.errors import CheckpointError
 from models.estimation.joint.observations import of_tracks
 from models.estimation.joint.observing import observe
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.folds import fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.simulation.site import SiteConfig, draw_lanes, walk_site

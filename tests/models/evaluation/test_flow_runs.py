@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.evaluation.protocol.cases import ProtocolCase, judge_answer
 from models.evaluation.protocol.flow_runs import fused, registration
 from models.evaluation.protocol.joint_runs import joint, joint_feet

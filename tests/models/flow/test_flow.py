@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import Steps
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.compiled.step import slope_of, step_on_ground
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import likelihood, walkers_of

@@ -8,7 +8,7 @@ import pytest
 
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observing import observe
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.fusion import fused_estimate
 from models.flow.likelihood import walkers_of
 from models.flow.path_test import UsualFit

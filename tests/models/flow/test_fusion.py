@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.estimate import joint_estimate, joint_near
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.ends import apart
 from models.flow.fusion import fused_estimate
 from models.flow.reference import candidate_of, learn_flow

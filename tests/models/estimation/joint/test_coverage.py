@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
+from models.estimation.reference.learning import learn_speed_reference
 from models.simulation.knocked import Knock
 from models.simulation.walkers import WalkConfig
 from tests.models.sites import PRIOR, seen, tracks_of

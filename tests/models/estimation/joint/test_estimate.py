@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
-from models.estimation.joint.reference import (
+from models.estimation.parameters import plane_parameters_of
+from models.estimation.reference.learning import (
     assumed_speed_reference,
     learn_speed_reference,
     shrink_offset,
 )
-from models.estimation.parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
 from models.simulation.site import Lane, SiteConfig, walk_site

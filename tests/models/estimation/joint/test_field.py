@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from models.estimation.joint.field import Bumps, FieldShape, field_over
 from models.estimation.joint.measures import Measured
 from models.estimation.joint.observations import Rows
-from models.estimation.joint.suiting import with_abrupt
 
 SHAPE = FieldShape(level=0.3, level_sd=0.1, length_m=6.0, place_sd=0.1, direction_sd=0.08)
 
@@ -57,7 +56,7 @@ def test_slopes_are_those_of_differences(number, fine):
     field = field_over(here, SHAPE)
     if fine:
         centres = 2.0 * np.array([[0, 0], [1, 0], [1, 1]])
-        field = with_abrupt(field, Bumps(centres=centres, length_m=2.0))
+        field = field.with_abrupt(Bumps(centres=centres, length_m=2.0), 0.5)
     coefficients = np.random.default_rng(3).normal(size=field.prior_mean.size)
     step = 1e-6
 

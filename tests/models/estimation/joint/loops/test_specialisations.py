@@ -10,7 +10,7 @@ from models.drift.change_point import find_change
 from models.estimation.joint import loops
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.observations import of_tracks
-from models.estimation.joint.reference import learn_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.simulation.walkers import WalkConfig
 from models.trajectory import by_end
 from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of

@@ -6,16 +6,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from models.estimation.joint import suiting
 from models.estimation.joint.estimate import joint_estimate
+from models.estimation.joint.field import field_over
+from models.estimation.joint.fit import assumed
+from models.estimation.joint.observations import Rows
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
-from models.estimation.joint.reference import learn_speed_reference
 from models.estimation.parameters import plane_parameters_of
+from models.estimation.reference import stairs as room_for_stairs
+from models.estimation.reference.learning import learn_speed_reference
 from models.evaluation.injectors.lens_and_ground import stairs
 from models.evaluation.injectors.view import View
 from models.evaluation.scenes import SceneTrack
 from models.geometry.ground import ground_from_pixel
 from models.simulation.walkers import WalkConfig
+from tests.models.estimation.joint.test_field import SHAPE, measured_at
+from tests.models.estimation.joint.test_hierarchy import SPREAD
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FLIGHT_M = 1.5
@@ -101,7 +106,7 @@ def test_a_pose_beside_stairs_is_nearer_the_truth(climbed, reference, monkeypatc
         return joint_estimate(seen(climbed[1]), PRIOR, known).values - plane_parameters_of(KNOCKED)
 
     with_room = np.abs(off(reference))
-    monkeypatch.setattr(suiting, "abrupt_bumps", lambda *_: None)
+    monkeypatch.setattr(room_for_stairs, "abrupt_bumps", lambda *_: None)
     without = np.abs(off(learned(climbed[0])))
     assert np.hypot(*with_room[:2]) < 0.7 * np.hypot(*without[:2])
     assert with_room[2] < 0.7 * without[2]
@@ -115,3 +120,29 @@ def test_what_is_stored_is_read(climbed, reference):
     )
     assert_array_equal(after.values, before.values)
     assert_array_equal(after.covariance, before.covariance)
+
+
+def test_no_more_places_have_room_than_may():
+    """Twenty people slow down at eight places of two cells, 3 x 4 cells with their neighbours."""
+    x, y, person = (each.ravel() for each in np.meshgrid(range(34), range(4), range(20)))
+    order = np.argsort(person, kind="stable")
+    x, y, person = x[order], y[order], person[order]
+    slow = (x % 4 == 1) & (x < 32) & ((y == 1) | (y == 2))
+    value = np.log(1.4) + np.random.default_rng(4).normal(0, 0.05, len(x)) - 0.9 * slow
+    measured = replace(
+        measured_at(np.column_stack([x, y]) * 2.0),
+        value=value,
+        rows=Rows(
+            owner_idx=person,
+            linked=np.zeros(len(x), dtype=bool),
+            time_s=np.zeros(len(x)),
+            when=np.zeros(len(x)),
+            owners=20,
+        ),
+    )
+    field = field_over(measured, replace(SHAPE, level=float(np.log(1.4))))
+    bumps = room_for_stairs.abrupt_bumps(measured, assumed(field, SPREAD))
+    # Six of the eight: seven would be 84 bumps, and 80 are allowed.
+    columns, counts = np.unique(bumps.centres[:, 0] // 8, return_counts=True)
+    assert list(counts) == [12] * 6
+    assert len(np.unique(bumps.centres, axis=0)) == 72

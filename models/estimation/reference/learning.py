@@ -25,8 +25,9 @@ from models.estimation.joint.speed_reference import (
     learned_at,
     pose_prior,
 )
-from models.estimation.joint.suiting import as_free_as_told, with_room_for_stairs
 from models.estimation.parameters import plane_parameters_of
+from models.estimation.reference.freedom import as_free_as_told
+from models.estimation.reference.stairs import with_room_for_stairs
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
