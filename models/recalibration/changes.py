@@ -10,7 +10,7 @@ from models.drift.confirmation import moved_beyond_doubt
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.fit import Near
 from models.estimation.joint.observations import Observations, of_tracks
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.flow.after_change import widened
 from models.flow.fusion import FusedEstimate, by_speeds_alone, fused_estimate
 from models.flow.likelihood import walkers_of

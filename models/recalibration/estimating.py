@@ -8,7 +8,7 @@ import numpy as np
 from models.drift.verdict import Drift, DriftLimits, asks_again, drift_between, pose_after
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.flow.fusion import FusedEstimate, by_speeds_alone
 from models.geometry.pose import CameraPose
 from models.recalibration.changes import posed, search_change

@@ -7,7 +7,8 @@ import numpy as np
 from models.drift.chart_learning import learn_chart
 from models.estimation.joint.observations import Observations, check_in_time, of_tracks
 from models.estimation.joint.speed_reference import SpeedReference
-from models.estimation.reference.learning import assumed_speed_reference, learn_speed_reference
+from models.estimation.reference.assumed import assumed_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.flow.folds import Grains, fold_maps
 from models.flow.reference import candidate_of, learn_flow
 from models.geometry.intrinsics import Intrinsics

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.reasons import Reason, Value
 from service.alerting.presence import silence_of
 from service.cameras.standing import MOVED, Standing

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from models.errors import TooFewTrajectoriesError
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.evaluation.protocol.cases import RANGES, ProtocolCase, draw_case
 from models.evaluation.protocol.partings import HALVES_IN_TIME, HALVES_OF_PEOPLE
 from models.evaluation.scenes import load_scene

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sqlalchemy.orm import Session
 
 from models.drift.verdict import DriftLimits
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig

@@ -17,7 +17,7 @@ from models.estimation.averaged import (
 )
 from models.estimation.joint.estimate import JointEstimate
 from models.estimation.joint.packing import reference_from_bytes
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.flow.fusion import FusedEstimate
 from models.flow.packing import flow_from_bytes
 from models.reasons import Reason

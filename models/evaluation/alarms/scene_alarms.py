@@ -16,7 +16,7 @@ from models.drift.chart_learning import drawn_blocks
 from models.drift.group_scores import score_groups
 from models.drift.verdict import DriftLimits, judge
 from models.estimation.joint.observations import of_tracks
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.evaluation.alarms.results import DAYS, AlarmResults, knocks_of
 from models.evaluation.alarms.watch import first_alarm, watch_over
 from models.evaluation.protocol.cases import STILL, draw_case

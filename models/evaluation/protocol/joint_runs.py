@@ -6,7 +6,8 @@ from models.errors import TooFewTrajectoriesError
 from models.estimation.joint.estimate import JointEstimate, joint_estimate
 from models.estimation.joint.observations import Observations, of_tracks
 from models.estimation.parameters import plane_parameters_of
-from models.estimation.reference.learning import assumed_speed_reference, learn_speed_reference
+from models.estimation.reference.assumed import assumed_speed_reference
+from models.estimation.reference.learning import learn_speed_reference
 from models.evaluation.protocol.cases import (
     KNOCKED,
     Answer,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.estimation.joint.observations import of_tracks
-from models.estimation.reference.learning import FEWEST_WALKERS
+from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.evaluation.protocol.served import served_pose
 from models.recalibration import (
     CameraSite,

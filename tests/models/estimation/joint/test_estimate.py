@@ -11,11 +11,8 @@ from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
 from models.estimation.parameters import plane_parameters_of
-from models.estimation.reference.learning import (
-    assumed_speed_reference,
-    learn_speed_reference,
-    shrink_offset,
-)
+from models.estimation.reference.assumed import assumed_speed_reference
+from models.estimation.reference.learning import learn_speed_reference, shrink_offset
 from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
 from models.simulation.site import Lane, SiteConfig, walk_site
