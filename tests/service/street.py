@@ -31,12 +31,17 @@ KNOCKED = CameraPose(
 LANES = SiteConfig(aside_m=0.8, standing_share=0.0)
 
 
+def lately_s() -> float:
+    """Whole seconds of a clock that is hours behind ours, so that nobody walks ahead of time."""
+    return math.floor(time.time()) - 20_000.0
+
+
 class Street:
     """People who walk past a camera one after the other, and the camera's service."""
 
     def __init__(self, http: Any, settings: Any) -> None:
         self.go_on(http, settings)
-        self.clock_s = math.floor(time.time()) - 20_000.0
+        self.clock_s = lately_s()
         self.seed = 0
         self.seen: list[Trajectory] = []
         self._bodies: list[dict[str, Any]] = []

@@ -1,15 +1,13 @@
 """The same people come to the same pose and alerts, to the printed digits, whichever database."""
 
-import math
 import shutil
-import time
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
 from tests.conftest import CAMERA
-from tests.service.street import KNOCKED, PRIOR, Street
+from tests.service.street import KNOCKED, PRIOR, Street, lately_s
 from tests.stores import server
 
 pytestmark = pytest.mark.skipif(not server.wanted(), reason="PostgreSQL only")
@@ -38,7 +36,7 @@ def test_a_knocked_camera_is_told_of_to_the_same_digits(settings, migrated, tmp_
     shutil.copytree(migrated, tmp_path / "file")
     file = settings.model_copy(update={"data_dir": tmp_path / "file", "database_url": None})
     # lately: of older people the words tell how many hours ago they walked, which goes on meanwhile
-    begun_s = math.floor(time.time()) - 20_000.0
+    begun_s = lately_s()
     on_server, on_file = told_on(settings, begun_s), told_on(file, begun_s)
     assert on_server == on_file
     assert on_file[-1][0]["state"] == "drifting"

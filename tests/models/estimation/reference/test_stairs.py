@@ -9,7 +9,6 @@ from numpy.testing import assert_array_equal
 from models.estimation.joint.estimate import joint_estimate
 from models.estimation.joint.field import field_over
 from models.estimation.joint.fit import assumed
-from models.estimation.joint.observations import Rows
 from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
 from models.estimation.parameters import plane_parameters_of
 from models.estimation.reference import stairs as room_for_stairs
@@ -129,20 +128,12 @@ def test_no_more_places_have_room_than_may():
     x, y, person = x[order], y[order], person[order]
     slow = (x % 4 == 1) & (x < 32) & ((y == 1) | (y == 2))
     value = np.log(1.4) + np.random.default_rng(4).normal(0, 0.05, len(x)) - 0.9 * slow
-    measured = replace(
-        measured_at(np.column_stack([x, y]) * 2.0),
-        value=value,
-        rows=Rows(
-            owner_idx=person,
-            linked=np.zeros(len(x), dtype=bool),
-            time_s=np.zeros(len(x)),
-            when=np.zeros(len(x)),
-            owners=20,
-        ),
-    )
+    measured = measured_at(np.column_stack([x, y]) * 2.0)
+    rows = replace(measured.rows, owner_idx=person, owners=20)
+    measured = replace(measured, value=value, rows=rows)
     field = field_over(measured, replace(SHAPE, level=float(np.log(1.4))))
     bumps = room_for_stairs.abrupt_bumps(measured, assumed(field, SPREAD))
     # Six of the eight: seven would be 84 bumps, and 80 are allowed.
-    columns, counts = np.unique(bumps.centres[:, 0] // 8, return_counts=True)
+    _, counts = np.unique(bumps.centres[:, 0] // 8, return_counts=True)
     assert list(counts) == [12] * 6
     assert len(np.unique(bumps.centres, axis=0)) == 72
