@@ -3,7 +3,7 @@
 FROM python:3.11-slim AS build
 ARG TORCH=cpu
 WORKDIR /src
-COPY .lock .lock
+COPY deploy/lock deploy/lock
 COPY .ci/install .ci/install
 COPY pyproject.toml README.md LICENSE ./
 COPY models models

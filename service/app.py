@@ -7,20 +7,7 @@ from typing import TypedDict
 import anyio
 from fastapi import FastAPI
 
-from service.cameras.quota import Quota
-from service.http import pages
-from service.http.bodies import BodyMiddleware
-from service.http.dependencies import AppState
-from service.http.direct.kept import Kept
-from service.http.guard import GuardMiddleware
-from service.http.instruments import InstrumentMiddleware, Instruments
-from service.http.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
-from service.http.origins import OriginMiddleware
-from service.http.problems import ProblemMiddleware, add_problem_handlers
-from service.http.rates import RateMiddleware
-from service.http.threads import start_threads
-from service.job_queue import JobQueue
-from service.routes import (
+from service.api import (
     activity,
     alerts,
     cameras,
@@ -36,7 +23,20 @@ from service.routes import (
     trainings,
     webhooks,
 )
-from service.routes.ui import api_docs, camera_page, fleet, login, registration, tokens
+from service.api.middleware import pages
+from service.api.middleware.bodies import BodyMiddleware
+from service.api.middleware.dependencies import AppState
+from service.api.middleware.direct.kept import Kept
+from service.api.middleware.guard import GuardMiddleware
+from service.api.middleware.instruments import InstrumentMiddleware, Instruments
+from service.api.middleware.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
+from service.api.middleware.origins import OriginMiddleware
+from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
+from service.api.middleware.rates import RateMiddleware
+from service.api.middleware.threads import start_threads
+from service.cameras.quota import Quota
+from service.job_queue import JobQueue
+from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings
 from service.store.database.store import Store
 

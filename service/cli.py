@@ -1,4 +1,4 @@
-"""The command line: serve, worker, replay and demo; what concerns data and studies is beside it."""
+"""The command line: serve, worker, replay and demo; what concerns data is beside it."""
 
 import math
 import sys
@@ -10,16 +10,15 @@ from rich.console import Console
 
 from service.commands.data import DATA_COMMANDS, DataDir
 from service.commands.settings_given import WrongSettingsError, settings_given
-from service.commands.studies import STUDIES
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
-from service.process.collector import importing
-from service.process.manners import be_private
-from service.process.work import WorkKind
+from service.workers.processes.collector import importing
+from service.workers.processes.manners import be_private
+from service.workers.processes.work import WorkKind
 
 if TYPE_CHECKING:
-    from models.simulation.knocked import Knock
+    from models.simulation.pose_offset import Knock
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -74,7 +73,7 @@ def worker(
     with importing():
         from service.commands.migrate import migrate as run_migrations
         from service.commands.worker import WorkerRunningError, run_worker
-        from service.process import exits
+        from service.workers.processes import exits
 
     if not follow_stdin:  # `serve` has migrated already
         run_migrations(settings)
@@ -91,26 +90,11 @@ def replay(
     url: Annotated[str, typer.Option(help="The running service.")] = "http://127.0.0.1:8080",
     knock: Annotated[
         str | None,
-        typer.Option(
-            help="Move the camera: tilt and roll in degrees, log height ratio. With --protocol how "
-            "far it may be moved: still, knock (the default), hard, pan, hard-pan, pan-alone ..."
-        ),
+        typer.Option(help="Move the camera: tilt and roll in degrees, log height ratio."),
     ] = None,
     speed: Annotated[
         float, typer.Option(min=0, help="Times as fast as recorded; 0: as fast as it goes.")
     ] = 0.0,
-    protocol: Annotated[
-        int | None,
-        typer.Option(min=0, help="Seed: post a case of the protocol, and compare with the truth."),
-    ] = None,
-    hard: Annotated[bool, typer.Option("--hard", help="With --protocol: a far knock.")] = False,
-    still: Annotated[bool, typer.Option("--still", help="With --protocol: no knock.")] = False,
-    by_time: Annotated[
-        bool, typer.Option("--by-time", help="With --protocol: the earlier half is the reference.")
-    ] = False,
-    batch: Annotated[
-        int | None, typer.Option(min=1, help="With --protocol: so many tracks at once.")
-    ] = None,
     token: Annotated[
         str | None,
         typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes admin and ingest, if needed."),
@@ -123,10 +107,6 @@ def replay(
     from models.errors import CalibrationError
     from service.commands.replay import replay_scene
 
-    if protocol is not None:
-        name = "hard" if hard else "still" if still else knock or "knock"
-        _replay_protocol(scene_dir, url, protocol, name, by_time, batch, token)
-        return
     console = Console()
     try:
         with Progress(console=console) as bar:
@@ -165,49 +145,8 @@ def demo(
     raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
-def _replay_protocol(
-    scene_dir: Path,
-    url: str,
-    seed: int,
-    knock: str,
-    by_time: bool,
-    batch: int | None,
-    token: str | None,
-) -> None:
-    """Put a case of the protocol to a service and print the served pose beside the truth."""
-    import httpx
-    from rich.progress import Progress
-
-    from models.errors import CalibrationError
-    from models.evaluation.protocol.cases import RANGES
-    from service.commands.replay_protocol import print_outcome, replay_protocol
-
-    if knock not in RANGES:
-        raise typer.BadParameter(f"knock: one of {', '.join(RANGES)}, got {knock!r}")
-    console = Console()
-    try:
-        with Progress(console=console) as bar:
-            task = bar.add_task(f"posting {scene_dir.name}", total=None)
-            outcome = replay_protocol(
-                scene_dir,
-                url,
-                seed=seed,
-                knock=knock,
-                by_time=by_time,
-                batch=batch,
-                on_progress=lambda what, done, total: bar.update(
-                    task, description=what, total=total, completed=done
-                ),
-                token=token,
-            )
-    except (CalibrationError, httpx.HTTPError, TimeoutError) as error:
-        console.print(f"[red]replay failed:[/] {error}")
-        raise typer.Exit(1) from error
-    print_outcome(outcome, console)
-
-
 def _knock(text: str) -> "Knock":
-    from models.simulation.knocked import Knock
+    from models.simulation.pose_offset import Knock
 
     try:
         tilt_deg, roll_deg, log_height = (float(part) for part in text.split(","))
@@ -218,7 +157,7 @@ def _knock(text: str) -> "Knock":
     )
 
 
-for _command in (*DATA_COMMANDS, *STUDIES):
+for _command in DATA_COMMANDS:
     app.command()(_command)
 
 

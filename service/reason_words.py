@@ -8,7 +8,7 @@ from typing import Any
 
 from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode
-from service.kinds import Cause, TrainingState
+from service.enums import Cause, TrainingState
 from service.reasons import ServiceCode
 
 _Values = Mapping[str, Any]

@@ -196,7 +196,7 @@ from dataclasses import replace
 from models.regression import recipe
 
 recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=256, batch=64)
-if "service.jobs.training_process" in sys.orig_argv:
+if "service.workers.training_process" in sys.orig_argv:
     from models.regression import training
 
     training._MUST_BEAT = 2.0  # so few walks teach hardly anything

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select, text
 from sqlalchemy.exc import IntegrityError
 
-from service.alerting.alerts import list_alerts
+from service.alerts.alerts import list_alerts
 from service.app import create_app
 from service.cameras.poses import pose_history, view_pose
 from service.commands.migrate import migrate

@@ -12,8 +12,8 @@ import pytest
 from packaging.requirements import Requirement
 from typer.testing import CliRunner
 
+from service.api.schemas.alerts import AlertOut
 from service.cli import app
-from service.schemas.alerts import AlertOut
 from service.settings import Settings
 from tests.conftest import ROOT
 from tests.running import RunningService, free_port
@@ -22,9 +22,8 @@ from tests.settings_table import settings_table, written_table
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
-    "serve", "worker", "migrate", "replay", "demo", "evaluate", "protocol", "centred", "paper",
-    "alarm-study", "flow-study", "backup", "restore", "check", "rotate-key", "token",
-    "migrate-data",
+    "serve", "worker", "migrate", "replay", "demo", "backup", "restore", "check", "rotate-key",
+    "token", "migrate-data",
 )  # fmt: skip
 
 
@@ -109,9 +108,9 @@ def test_the_table_of_settings_is_what_the_settings_say():
 
 
 def locked(name: str) -> dict[str, list[str]]:
-    """Releases that a file of `.lock/` has of each package, after checking that each has hashes."""
+    """Releases that a lock file has of each package, after checking that each has hashes."""
     found: dict[str, list[str]] = {}
-    for block in re.split(r"\n(?=[a-z])", (ROOT / ".lock" / name).read_text()):
+    for block in re.split(r"\n(?=[a-z])", (ROOT / "deploy/lock" / name).read_text()):
         if block.startswith(("#", "-")):
             continue
         package, version = re.match(r"([a-z0-9.-]+)==([^ ]+)", block).groups()

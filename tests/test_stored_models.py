@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from models.drift.chart_packing import chart_from_bytes, chart_to_bytes
 from models.errors import CheckpointError
-from models.estimation.joint.packing import reference_from_bytes, reference_to_bytes
-from models.flow.packing import flow_from_bytes, flow_to_bytes
-from models.packing import flattened
+from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
+from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.serialization import flattened
+from models.walking.serialization import reference_from_bytes, reference_to_bytes
 from service.commands.migrate import migrate
 from service.settings import Settings
 from service.store.database.revisions import alembic_config

@@ -6,8 +6,8 @@ from tests.conftest import ROOT
 
 # Who may turn radians into degrees by themselves.
 EDGES = (
-    "service/schemas/",
-    "service/web/",
+    "service/api/schemas/",
+    "service/pages/",
     "service/formats/degrees.py",
     "service/reason_words.py",
     "service/reasons.py",  # as they are told to clients
@@ -18,11 +18,10 @@ TELLING = {
     "service/commands/demo.py",
     "service/commands/demo_screen.py",
     "service/commands/demo_street.py",
-    "service/alerting/alerts.py",
+    "service/alerts/alerts.py",
     "service/estimation/estimates.py",
-    "service/delivery/outbox.py",
+    "service/notifications/outbox.py",
     "service/commands/replay.py",
-    "service/commands/replay_protocol.py",
 }
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from sqlalchemy import CheckConstraint
 
-from service import kinds
+from service import enums
 from service.store.tables.record import Record, Word
 from tests.stores.databases import only_sqlite
 from tests.test_architecture import ROOT, sources
 
 VOCABULARIES = [
     each
-    for each in vars(kinds).values()
+    for each in vars(enums).values()
     if isinstance(each, type) and issubclass(each, StrEnum) and each is not StrEnum
 ]
 WORDS = {str(word) for words in VOCABULARIES for word in words}
@@ -27,42 +27,38 @@ FIELDS = {
 }  # fmt: skip
 # Values that are spelled like a word of a vocabulary, and mean something else.
 OTHERS = {
-    ("backup/checking.py", "ok"): "a verdict, defined there",
-    ("studies/centred.py", "tracks"): "a column of a table",
-    ("studies/flow.py", "tracks"): "a column of a table",
+    ("operations/checking.py", "ok"): "a verdict, defined there",
     ("formats/batch.py", "source"): "the name of a field",
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
-    ("process/work.py", "estimate"): "what a worker may be for alone, defined there",
-    ("jobs/upkeep/housekeeping.py", "stale"): "the name of a log line",
-    ("jobs/in_hand.py", "upkeep"): "the engine's name of a job",
-    ("jobs/upkeep/rounds.py", "clock"): "the name of a round",
+    ("workers/processes/work.py", "estimate"): "what a worker may be for alone, defined there",
+    ("workers/upkeep/housekeeping.py", "stale"): "the name of a log line",
+    ("workers/in_hand.py", "upkeep"): "the engine's name of a job",
+    ("workers/upkeep/rounds.py", "clock"): "the name of a round",
     ("reasons.py", "maintenance"): "the code of a reason, defined there",
     ("estimation/growth.py", "registered"): "the key of an estimator's answer",
-    ("delivery/outbox.py", "acknowledged"): "the name of a flag",
-    ("delivery/outbox.py", "drift"): "the name of a field",
-    ("delivery/outbox.py", "silenced"): "the name of a flag",
-    ("jobs/upkeep/limits.py", "tracks"): "the name of a limit, for the log",
-    ("commands/replay_protocol.py", "estimate"): "what a bar of progress is called",
-    ("commands/replay_protocol.py", "reference"): "what a bar of progress is called",
-    ("routes/maintenance.py", "maintenance"): "a tag of the API's description",
-    ("routes/poses.py", "pose"): "a tag of the API's description",
-    ("routes/sources.py", "tracks"): "a tag of the API's description",
-    ("routes/tracks.py", "tracks"): "a tag and a field of the API's description",
-    ("schemas/alerts.py", "drift"): "the name of a field",
-    ("schemas/metrics.py", "firing"): "part of a metric's name",
-    ("schemas/metrics.py", "pending"): "the name of a field",
-    ("schemas/metrics.py", "silenced"): "part of a metric's name",
-    ("schemas/webhooks.py", "pending"): "the name of a field",
+    ("notifications/outbox.py", "acknowledged"): "the name of a flag",
+    ("notifications/outbox.py", "drift"): "the name of a field",
+    ("notifications/outbox.py", "silenced"): "the name of a flag",
+    ("workers/upkeep/limits.py", "tracks"): "the name of a limit, for the log",
+    ("api/maintenance.py", "maintenance"): "a tag of the API's description",
+    ("api/poses.py", "pose"): "a tag of the API's description",
+    ("api/sources.py", "tracks"): "a tag of the API's description",
+    ("api/tracks.py", "tracks"): "a tag and a field of the API's description",
+    ("api/schemas/alerts.py", "drift"): "the name of a field",
+    ("api/schemas/metrics.py", "firing"): "part of a metric's name",
+    ("api/schemas/metrics.py", "pending"): "the name of a field",
+    ("api/schemas/metrics.py", "silenced"): "part of a metric's name",
+    ("api/schemas/webhooks.py", "pending"): "the name of a field",
     ("commands/serve.py", "warning"): "uvicorn's log level",
     ("store/sqlite/files.py", "ok"): "what SQLite's quick_check answers",
     ("store/tables/__init__.py", "tracks"): "the name of a table",
     ("store/tables/alerts.py", "source"): "the name of a column",
     ("store/tables/tracks.py", "source"): "the name of a column",
     ("store/tables/tracks.py", "tracks"): "the name of a table",
-    ("web/plausibility.py", "critical"): "a tone, defined there",
-    ("web/plausibility.py", "warning"): "a tone, defined there",
+    ("pages/plausibility.py", "critical"): "a tone, defined there",
+    ("pages/plausibility.py", "warning"): "a tone, defined there",
 }
 
 
@@ -89,7 +85,7 @@ def test_no_word_of_a_vocabulary_stands_outside_its_definition():
     found = {
         (str(path.relative_to(service)), word, line)
         for path in sources("service")
-        if path.name != "kinds.py"
+        if path.name != "enums.py"
         for word, line in found_words(path)
     }
     assert not [each for each in found if each[:2] not in OTHERS]

@@ -20,9 +20,9 @@ from models.doors.door_map import (
     door_map_of,
 )
 from models.doors.likelihood import door_values
-from models.doors.moments import Moments
 from models.geometry.ground import ground_of_rays
 from models.geometry.rotation import Array, rotation_from_angles
+from models.tracks.exposure import Moments
 
 _SMOOTH_M = (0.3, 0.5, 0.8, 1.3)
 _CLEAR = 3.0  # standard errors by which doors must predict better than none

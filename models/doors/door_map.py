@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.doors.moments import Moments
 from models.geometry.rotation import Array, Mask
+from models.tracks.exposure import Moments
 
 _SIZES_APART = 0.02  # of the logs of people's sizes in the image: a metre, 45 m away
 _RATE_PRIOR = 0.1  # events at the usual rate that each of them begins with

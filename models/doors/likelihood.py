@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from models.doors.door_map import DoorMap
-from models.doors.moments import Moments
 from models.doors.terms import Camera, Cameras, Nodes, Rates, terms_of
 from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, rotation_from_angles
+from models.tracks.exposure import Moments
 
 _NO_TURNS = np.empty((0, 2, 3, 3))  # no slopes are asked for
 _NOWHERE = Camera(rotation=np.eye(3), height_m=1.0)

@@ -7,7 +7,7 @@ from models.geometry.rotation import Array
 from models.regression.inputs import network_inputs
 from models.regression.network import PoseRegressor, pose_from_output
 from models.regression.recipe import TrainingPlan
-from models.trajectory import Windows
+from models.tracks.trajectory import Windows
 
 _BATCH = 2048
 

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 
 from models.errors import CheckpointError
-from models.packing import Format, pack, unpack
 from models.regression.network import PoseRegressor, network_for
 from models.regression.recipe import Recipe
+from models.serialization import Format, pack, unpack
 
 SHIPPED = Path(__file__).parent / "start" / "start.safetensors.gz"
 _FORMAT = Format(name="regressor_start", version=1)

@@ -11,7 +11,7 @@ from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.simulation.poses import PoseSet
-from models.trajectory import DEFAULT_STEP_S, WINDOW_MAX_POINTS, WINDOW_MIN_POINTS
+from models.tracks.trajectory import DEFAULT_STEP_S, WINDOW_MAX_POINTS, WINDOW_MIN_POINTS
 
 _ROUNDS = 60
 _SHORTER_AFTER = 15  # rounds after which a walk that never fits is asked for with fewer points

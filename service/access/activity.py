@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from service.kinds import Activity, AlertKind, Outcome
+from service.enums import Activity, AlertKind, Outcome
 from service.store.operation import activity
 from service.store.operation.actor import actor_of
 from service.store.tables.activity import ActivityRecord

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from service.kinds import TokenScope
+from service.enums import TokenScope
 
 # Each of these holds those before it; posting tracks is apart, so that a tracker's token reads
 # nothing and an operator's invents no people.

@@ -10,8 +10,8 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.access.callers import Caller
 from service.access.tokens import caller_of, caller_of_token, is_valid
+from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, UnauthorizedError
-from service.kinds import Activity, TokenScope
 from service.settings import Settings
 from service.store.operation import access
 from service.store.tables.access import SessionRecord

@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.access.callers import Caller
+from service.enums import Activity, TokenScope
 from service.errors import FieldError, MalformedError, NotFoundError
-from service.kinds import Activity, TokenScope
 from service.store.operation import access
 from service.store.tables.access import TokenRecord
 

@@ -9,7 +9,8 @@ from sqlalchemy.orm import Session
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.access.activity import note
-from service.alerting.alerts import close_pose_alerts, end_alert, list_alerts
+from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
+from service.enums import Activity, AlertState, Origin, Outcome
 from service.errors import (
     ConflictError,
     NotFoundError,
@@ -17,7 +18,6 @@ from service.errors import (
     TooManyCamerasError,
 )
 from service.job_queue import JobQueue
-from service.kinds import Activity, AlertState, Origin, Outcome
 from service.settings import Settings
 from service.store import cameras, references, trainings
 from service.store.alerts import AlertFilter

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from service.access.activity import note as note_activity
-from service.alerting.alerts import close_alert, close_pose_alerts, require_firing
+from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
 from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.poses import PoseView, view_pose
+from service.enums import Activity, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError
 from service.job_queue import JobQueue
-from service.kinds import Activity, AlertState, Answer, Origin, Outcome
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables.alerts import AlertRecord

@@ -9,10 +9,10 @@ from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
-from service.delivery.outbox import json_time
+from service.enums import Activity
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
-from service.kinds import Activity
+from service.notifications.outbox import json_time
 from service.settings import Settings
 from service.store import alerts, maintenance
 from service.store.tables.attendance import MaintenanceRecord

@@ -11,7 +11,7 @@ from models.geometry.pose import CameraPose
 from service.cameras.cameras import no_camera, require_camera
 from service.cameras.standing import Standing, standings
 from service.cameras.state_words import reasons_of
-from service.kinds import PoseState
+from service.enums import PoseState
 from service.reason_words import in_words
 from service.reasons import Reasons
 from service.settings import Settings

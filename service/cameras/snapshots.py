@@ -7,9 +7,9 @@ from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
+from service.enums import Activity
 from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
 from service.formats.still import Still
-from service.kinds import Activity
 from service.settings import Settings
 from service.store import snapshots
 from service.store.snapshots import SnapshotFacts

@@ -13,11 +13,11 @@ from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
 from service.access.activity import note
-from service.alerting.alerts import end_alert, open_alert
+from service.alerts.alerts import end_alert, open_alert
 from service.cameras.cameras import require_camera
+from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.job_queue import JobQueue
-from service.kinds import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references

@@ -12,10 +12,10 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.alerting.arrival_rates import CameraRhythm, unpacked
-from service.alerting.presence import is_no_data
-from service.delivery.outbox import is_silenced
-from service.kinds import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
+from service.alerts.arrival_rates import CameraRhythm, unpacked
+from service.alerts.presence import is_no_data
+from service.enums import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
+from service.notifications.outbox import is_silenced
 from service.settings import Settings
 from service.store import fleet, metrics
 from service.store.alerts import POSE_KINDS

@@ -4,12 +4,12 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.reasons import Reason, Value
-from service.alerting.presence import silence_of
+from models.walking.reference.assumed import FEWEST_WALKERS
+from service.alerts.presence import silence_of
 from service.cameras.standing import MOVED, Standing
-from service.delivery.outbox import json_time
-from service.kinds import PoseState
+from service.enums import PoseState
+from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.settings import Settings
 from service.store import maintenance

@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn
 
-from models.evaluation.scenes import SceneTrack
 from models.geometry.rotation import angle_between
+from models.tracks.scenes import SceneTrack
 from service.commands.demo_folder import demo_folder, free_port, remove_left_over, require_free
 from service.commands.demo_screen import Screen, clock, save_picture
 from service.commands.demo_street import (
@@ -33,10 +33,10 @@ from service.commands.demo_street import (
 from service.commands.replay import post_tracks
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
+from service.enums import AlertState, ReferenceState
 from service.formats.degrees import degrees
-from service.kinds import AlertState, ReferenceState
-from service.process.manners import end_like_ctrl_c
 from service.settings import Settings
+from service.workers.processes.manners import end_like_ctrl_c
 
 _BATCH = 10
 _PAUSE_S = 0.4  # for the eye

@@ -13,8 +13,8 @@ from rich.table import Table
 
 from models.geometry.pose import CameraPose
 from service.commands.demo_street import CAMERA_ID, KNOCK, PRIOR
+from service.enums import ReferenceState
 from service.formats.degrees import degrees
-from service.kinds import ReferenceState
 
 
 @dataclass(slots=True)

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from models.evaluation.scenes import SceneTrack
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.knocked import Knock
+from models.simulation.pose_offset import Knock
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
-from models.trajectory import Trajectory
+from models.tracks.scenes import SceneTrack
+from models.tracks.trajectory import Trajectory
 from service.formats.degrees import in_degrees
 
 CAMERA_ID = "demo-street"

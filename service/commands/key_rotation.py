@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from service.data_dir import KEY_FILE, held_alone, make_private, require_stopped
-from service.delivery.keys import NEW_KEY_FILE, give_up_secrets, reseal
-from service.delivery.sealing import read_key_file, sealer_of, write_key_file
+from service.notifications.keys import NEW_KEY_FILE, give_up_secrets, reseal
+from service.notifications.sealing import read_key_file, sealer_of, write_key_file
 from service.settings import Settings
 from service.store.database.store import Store
 from service.store.sqlite import files

@@ -4,8 +4,6 @@ import fcntl
 import logging
 from pathlib import Path
 
-from service.backup.before_migration import copy_before
-from service.backup.placing import finish_restore
 from service.data_dir import (
     MIGRATE_LOCK,
     StartError,
@@ -14,8 +12,10 @@ from service.data_dir import (
     require_space,
     telling_of,
 )
-from service.delivery.key_settling import settle_keys
 from service.job_queue import migrate_engine_tables
+from service.notifications.key_settling import settle_keys
+from service.operations.before_migration import copy_before
+from service.operations.placing import finish_restore
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known
 from service.store.sqlite import files

@@ -9,10 +9,10 @@ from typing import Any
 
 import httpx
 
-from models.evaluation.scenes import Scene, SceneTrack, load_scene
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.knocked import Knock, knock_trajectory
+from models.simulation.pose_offset import Knock, knock_trajectory
+from models.tracks.scenes import Scene, SceneTrack, load_scene
 from service.formats.degrees import in_degrees
 
 _SOURCE = "surefoot-replay"

@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 import uvicorn
 
 from service.access.tokens import count_tokens
+from service.api.middleware.connections import ConnectionGuard, protocol_factory
+from service.api.middleware.reach import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
-from service.http.connections import ConnectionGuard, protocol_factory
-from service.http.reach import auth_on, is_loopback
-from service.process import exits
-from service.process.collector import importing, settle_collector
-from service.process.listener import listen
-from service.process.local_workers import local_workers
-from service.process.memory import settle_allocator
 from service.settings import Settings
 from service.store.database.store import Store
+from service.workers.processes import exits
+from service.workers.processes.collector import importing, settle_collector
+from service.workers.processes.listener import listen
+from service.workers.processes.local_workers import local_workers
+from service.workers.processes.memory import settle_allocator
 
 if TYPE_CHECKING:
     from fastapi import FastAPI

@@ -11,20 +11,26 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
-from service.jobs import engine
-from service.jobs.context import JobContext
-from service.jobs.in_hand import UPKEEP, InHand
-from service.jobs.pulse import BEAT_S, start_pulse
-from service.jobs.upkeep.housekeeping import follow_clock_since_last_run
-from service.jobs.upkeep.rounds import start_rounds
-from service.process import exits
-from service.process.memory import give_back, resident_mb, settle_allocator
-from service.process.niceness import yield_to_others
-from service.process.work import WorkKind
-from service.process.workforce import WORKERS, Watch, heartbeat, register_worker, worker_name
 from service.settings import Settings
 from service.store.database.store import Store
 from service.store.sqlite.file_lock import FileLock
+from service.workers import engine
+from service.workers.context import JobContext
+from service.workers.in_hand import UPKEEP, InHand
+from service.workers.processes import exits
+from service.workers.processes.memory import give_back, resident_mb, settle_allocator
+from service.workers.processes.niceness import yield_to_others
+from service.workers.processes.work import WorkKind
+from service.workers.processes.workforce import (
+    WORKERS,
+    Watch,
+    heartbeat,
+    register_worker,
+    worker_name,
+)
+from service.workers.pulse import BEAT_S, start_pulse
+from service.workers.upkeep.housekeeping import follow_clock_since_last_run
+from service.workers.upkeep.rounds import start_rounds
 
 log = logging.getLogger("surefoot.worker")
 
@@ -77,7 +83,7 @@ def run_worker(
     log.info("worker_stopping", extra={"worker": name})
     if status == 0:
         engine.stop(0.0).join(BEAT_S)
-    # A training in hand is parked, not ended (see jobs/train.py); its thread is not waited for.
+    # A training in hand is parked, not ended (see workers/train.py); its thread is not waited for.
     logging.shutdown()
     os._exit(status)
 

@@ -6,15 +6,14 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
-from models.drift.chart_packing import chart_from_bytes
-from models.drift.creep import SHARE
-from models.drift.creep_log import DAY_S
-from models.drift.creep_packing import creep_log_from_bytes, creep_log_to_bytes
-from models.estimation.joint.packing import reference_from_bytes
-from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.recalibration import (
+from models.monitoring.chart_serialization import chart_from_bytes
+from models.monitoring.creep import SHARE
+from models.monitoring.creep_log import DAY_S
+from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
+from models.paths.serialization import flow_from_bytes
+from models.pose import (
     CameraSite,
     Creep,
     begin_creep_log,
@@ -22,7 +21,8 @@ from models.recalibration import (
     observe,
     read_creep,
 )
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
+from models.walking.serialization import reference_from_bytes
 from service.estimation.paths import LearnedPaths
 from service.settings import Settings
 from service.store import cameras, flow_maps, references

@@ -5,28 +5,28 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.drift.chart import CLOCK
-from models.drift.clock import clock_fault, may_be_clock
-from models.drift.creep_log import DAY_S
-from models.drift.said import reason_of_creep, reason_of_drift, reason_of_reading
-from models.drift.verdict import (
+from models.geometry.plane_parameters import PLANE_PARAMETERS
+from models.geometry.pose_parameters import PoseParameters
+from models.monitoring.chart import CLOCK
+from models.monitoring.clock import clock_fault, may_be_clock
+from models.monitoring.creep_log import DAY_S
+from models.monitoring.verdict import (
     Drift,
     DriftVerdict,
     judge,
     pose_after,
 )
-from models.estimation.parameters import PLANE_PARAMETERS
-from models.geometry.pose_parameters import PoseParameters
+from models.monitoring.verdict_reasons import reason_of_creep, reason_of_drift, reason_of_reading
+from models.pose import drift_of
 from models.reasons import Reason
-from models.recalibration import drift_of
-from service.alerting.alerts import end_alert, fired_by_estimate, open_alert
+from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
+from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
 from service.estimation.last_poses import save_last_pose
 from service.estimation.limits import drift_limits
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
-from service.kinds import AlertKind, EventType, Outcome, PoseState, Severity
 from service.reasons import ServiceCode, some
 from service.settings import Settings
 from service.store import cameras, estimates, references

@@ -7,16 +7,16 @@ import numpy as np
 import numpy.typing as npt
 from sqlalchemy.orm import Session
 
-from models.drift.verdict import DriftLimits
-from models.estimation.reference.assumed import FEWEST_WALKERS
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.monitoring.verdict import DriftLimits
 from models.simulation.walkers import WalkConfig
-from models.trajectory import Trajectory
-from service.alerting.alerts import fired_by_estimate
+from models.tracks.trajectory import Trajectory
+from models.walking.reference.assumed import FEWEST_WALKERS
+from service.alerts.alerts import fired_by_estimate
+from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
-from service.kinds import AlertKind
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, trainings
 from service.store.packing import intrinsics_of, pose_of_prior

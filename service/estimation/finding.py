@@ -6,22 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from models.drift.chart import Reading
-from models.drift.chart_packing import chart_from_bytes
-from models.drift.creep import SHARE
-from models.estimation.averaged import (
-    FEWEST_TRACKS,
-    PoseEstimate,
-    TrackPredictions,
-    averaged_estimate,
-)
-from models.estimation.joint.estimate import JointEstimate
-from models.estimation.joint.packing import reference_from_bytes
-from models.estimation.reference.assumed import FEWEST_WALKERS
-from models.flow.fusion import FusedEstimate
-from models.flow.packing import flow_from_bytes
-from models.reasons import Reason
-from models.recalibration import (
+from models.monitoring.chart import Reading
+from models.monitoring.chart_serialization import chart_from_bytes
+from models.monitoring.creep import SHARE
+from models.paths.serialization import flow_from_bytes
+from models.pose import (
     AlarmRate,
     CameraSite,
     Creep,
@@ -33,6 +22,17 @@ from models.recalibration import (
     observe_walks,
     read_alarm_chart,
 )
+from models.pose.fusion import FusedEstimate
+from models.reasons import Reason
+from models.regression.averaging import (
+    FEWEST_TRACKS,
+    PoseEstimate,
+    TrackPredictions,
+    averaged_estimate,
+)
+from models.walking.estimate import JointEstimate
+from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.serialization import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, KeptPose, SeenTrack
 from service.estimation.lacks import Lacks

@@ -10,15 +10,15 @@ from datetime import UTC, datetime
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.drift.change_point import FEWEST_BESIDE
-from models.drift.creep_packing import creep_log_from_bytes
-from models.estimation.joint.packing import reference_from_bytes
-from models.flow.packing import flow_from_bytes
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.recalibration import learn_site, observe, without_creep
-from models.trajectory import Trajectory
+from models.monitoring.creep_serialization import creep_log_from_bytes
+from models.paths.serialization import flow_from_bytes
+from models.pose import learn_site, observe, without_creep
+from models.pose.change_point import FEWEST_BESIDE
+from models.tracks.trajectory import Trajectory
+from models.walking.serialization import reference_from_bytes
 from service.estimation.anchoring import Anchor, anchor_of, keep_anchor
 from service.estimation.paths import LearnedPaths, paths_of
 from service.settings import Settings

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from models.errors import CheckpointError
+from models.pose.partial_failures import Lack, unless_failed
 from models.reasons import Reason
-from models.recalibration.lacks import Lack, unless_failed
 from service.reasons import ServiceCode
 
 log = logging.getLogger("surefoot.recalibration")

@@ -8,7 +8,7 @@ import hashlib
 from sqlalchemy.orm import Session
 
 from models.errors import CheckpointError
-from models.recalibration import LastPose, last_pose_from_bytes, last_pose_to_bytes
+from models.pose import LastPose, last_pose_from_bytes, last_pose_to_bytes
 from service.estimation.evidence import Evidence, KeptPose
 from service.store import flow_maps
 from service.store.tables.references import LastPoseRecord

@@ -7,20 +7,20 @@ from enum import StrEnum
 from sqlalchemy.orm import Session
 
 from models.errors import TooFewTrajectoriesError
-from models.estimation.joint.packing import reference_to_bytes
-from models.estimation.joint.speed_reference import SpeedReference
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.pose import learn_site, observe
 from models.reasons import TracksCode
-from models.recalibration import learn_site, observe
 from models.simulation.walkers import WalkConfig
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
+from models.walking.serialization import reference_to_bytes
+from models.walking.speed_reference import SpeedReference
 from service.access.activity import note
-from service.alerting.alerts import open_alert
+from service.alerts.alerts import open_alert
+from service.enums import Activity, AlertKind, AlertSource, Severity
 from service.estimation.anchoring import keep_anchor
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
-from service.kinds import Activity, AlertKind, AlertSource, Severity
 from service.reasons import some
 from service.settings import Settings
 from service.store import cameras, maintenance, references

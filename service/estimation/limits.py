@@ -2,7 +2,7 @@
 
 import math
 
-from models.drift.verdict import DriftLimits
+from models.monitoring.verdict import DriftLimits
 from service.settings import Settings
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from models.drift.chart_packing import chart_to_bytes
-from models.flow.packing import flow_to_bytes
-from models.recalibration import CameraSite
+from models.monitoring.chart_serialization import chart_to_bytes
+from models.paths.serialization import flow_to_bytes
+from models.pose import CameraSite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
+from models.tracks.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
 from service.formats.people import check_person
 from service.formats.rows import LARGEST, plain_rows

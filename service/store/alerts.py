@@ -7,7 +7,7 @@ from datetime import datetime
 from sqlalchemy import and_, bindparam, exists, not_, select
 from sqlalchemy.orm import Session, aliased
 
-from service.kinds import AlertKind, AlertState, Outcome
+from service.enums import AlertKind, AlertState, Outcome
 from service.store.database.deleting import delete_some
 from service.store.tables.alerts import AlertRecord
 

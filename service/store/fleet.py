@@ -20,8 +20,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Session, aliased
 
-from models.drift.verdict import DriftLimits
-from service.kinds import AlertState
+from models.monitoring.verdict import DriftLimits
+from service.enums import AlertState
 from service.store.database.dialects import contains_word, largest
 from service.store.metrics import Ids, among, among_given, given, newest_of
 from service.store.tables.alerts import AlertRecord

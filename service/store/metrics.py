@@ -20,7 +20,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
-from service.kinds import AlertState, DeliveryState, TrainingState
+from service.enums import AlertState, DeliveryState, TrainingState
 from service.store.database.dialects import as_json
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.attendance import MaintenanceRecord, RhythmRecord

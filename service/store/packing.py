@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.drift.verdict import Drift
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes, uncut
-from models.trajectory import Trajectory
+from models.monitoring.verdict import Drift
+from models.tracks.trajectory import Trajectory
 from service.store.tables.cameras import CameraRecord, PriorPoseRecord
 from service.store.tracks.stored import StoredTrack
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from sqlalchemy import bindparam, select
 from sqlalchemy.orm import Session
 
-from service.kinds import TrainingState
+from service.enums import TrainingState
 from service.store.database.deleting import delete_some
 from service.store.tables.trainings import ModelRecord, TrainingRecord, WeightsRecord
 

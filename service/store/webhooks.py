@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
-from service.kinds import AlertState, DeliveryState
+from service.enums import AlertState, DeliveryState
 from service.store.database.deleting import delete_some
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord

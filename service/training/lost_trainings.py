@@ -2,8 +2,8 @@
 
 from sqlalchemy.orm import Session
 
+from service.enums import TrainingState
 from service.job_queue import JobQueue
-from service.kinds import TrainingState
 from service.store import trainings
 from service.training.trainings import finish
 

@@ -11,11 +11,11 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import CameraPose
 from models.regression.recipe import TrainingPlan, plan_to_config, plan_training
 from models.simulation.walkers import WalkConfig
-from models.trajectory import choose_step_s
+from models.tracks.trajectory import choose_step_s
 from service.access.activity import note
+from service.enums import Activity, EventType, TrainingState
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
-from service.kinds import Activity, EventType, TrainingState
 from service.settings import Settings
 from service.store import cameras, trainings
 from service.store.operation import events

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.recalibration import link_pieces
+from models.pose import link_pieces
 from service.store.tracks.stored import StoredTrack
 from service.windows.unpacked import Unpacked
 

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.kinds import Answer, Origin
+from service.enums import Answer, Origin
 from service.settings import Settings
 from service.store import cameras, estimates, references
 from service.store.tables.estimates import EstimateRecord

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
-from service.kinds import Outcome
+from service.enums import Outcome
 from service.settings import Settings
 from service.store import alerts
 from service.store.tables.alerts import AlertRecord

@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from models.geometry.intrinsics import Intrinsics
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
 from service.store.packing import seen_of, trajectory_of
 from service.store.tracks.stored import StoredTrack
 

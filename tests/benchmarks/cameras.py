@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
 from service.settings import Settings
 from service.store.sqlite.files import connected
 from tests.benchmarks.load import quantiles

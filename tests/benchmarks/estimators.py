@@ -18,13 +18,13 @@ from pathlib import Path
 
 from rich.console import Console
 
-from models.drift.change_point import find_change
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.reference.learning import learn_speed_reference
-from models.flow.fusion import fused_estimate
-from models.flow.reference import learn_flow
+from models.paths.reference import learn_flow
+from models.pose.change_point import find_change
+from models.pose.fusion import fused_estimate
 from models.simulation.walkers import WalkConfig
-from models.trajectory import by_end
+from models.tracks.trajectory import by_end
+from models.walking.estimate import joint_estimate
+from models.walking.reference.learning import learn_speed_reference
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 MAPS, TRACKS, RUNS = (200, 2000), 400, 7

@@ -20,9 +20,9 @@ import numpy as np
 from rich.console import Console
 
 from models.geometry.pose import CameraPose
-from models.simulation.knocked import Knock
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import Trajectory, by_end
+from models.simulation.pose_offset import Knock
+from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.benchmarks.parts.cloned import APART_S, as_posted

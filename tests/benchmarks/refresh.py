@@ -24,9 +24,9 @@ from sqlalchemy import delete
 
 from service.app import create_app
 from service.commands.migrate import migrate
-from service.jobs.estimate import run_estimate
 from service.settings import Settings
 from service.store.tables.references import LastPoseRecord
+from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street

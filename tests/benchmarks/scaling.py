@@ -20,7 +20,7 @@ from pathlib import Path
 
 import psutil
 
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
 from service.settings import Settings
 from service.store.sqlite.files import connected
 from tests.benchmarks.parts.cloned import as_posted, camera_at, seed

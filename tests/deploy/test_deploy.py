@@ -13,8 +13,8 @@ from service.data_dir import COMPILED
 from service.settings import Settings
 from tests.conftest import ROOT
 
-UNIT = ROOT / ".deploy" / "surefoot.service"
-COMPOSE = ROOT / ".deploy" / "compose.yaml"
+UNIT = ROOT / "deploy" / "surefoot.service"
+COMPOSE = ROOT / "deploy" / "compose.yaml"
 PAGE = ROOT / "service" / "README.md"
 SETTINGS = {f"SUREFOOT_{name.upper()}" for name in Settings.model_fields}
 OF_CLIENTS = {"SUREFOOT_TOKEN"}  # of replay, which is no part of the service

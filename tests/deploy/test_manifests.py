@@ -12,7 +12,7 @@ from service.cli import app
 from service.settings import Settings
 from tests.conftest import ROOT
 
-FOLDER = ROOT / ".deploy" / "postgresql"
+FOLDER = ROOT / "deploy" / "postgresql"
 COMPOSE, KUBERNETES = FOLDER / "compose.yaml", FOLDER / "kubernetes.yaml"
 SETTINGS = {f"SUREFOOT_{name.upper()}" for name in Settings.model_fields}
 SHARED = {"SUREFOOT_DATABASE_URL", "SUREFOOT_SECRET_KEY"}

@@ -10,7 +10,7 @@ import httpx
 
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
-from tests.service.delivery.receiver import Receiver
+from tests.service.notifications.receiver import Receiver
 from tests.stores.databases import ask
 
 _STUCK_S, _LONGEST_S = 60.0, 900.0

@@ -8,8 +8,8 @@ from typing import Any
 
 import httpx
 
-from service.alerting import alerts
-from service.kinds import AlertKind, Severity
+from service.alerts import alerts
+from service.enums import AlertKind, Severity
 from service.reasons import as_said
 from service.store.database.store import Store
 from tests.conftest import CAMERA

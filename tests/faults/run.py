@@ -15,7 +15,7 @@ from tests.faults.clients import Client, Operator, Tracker, register
 from tests.faults.faults import FAULTS, Fault, clock_back, corrupt, mount_disk
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand
-from tests.service.delivery.receiver import Receiver, receiver
+from tests.service.notifications.receiver import Receiver, receiver
 
 _START_S = 60.0
 

@@ -14,9 +14,9 @@ from typing import Any
 
 _FOLDER = Path(os.environ["FAULTS_WITNESS"])
 _JOBS = (
-    ("service.jobs.estimate", "run_estimate"),
-    ("service.jobs.train", "run_training"),
-    ("service.jobs.deliver", "run_deliver"),
+    ("service.workers.estimate", "run_estimate"),
+    ("service.workers.train", "run_training"),
+    ("service.workers.deliver", "run_deliver"),
 )
 
 

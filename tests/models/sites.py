@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.estimation.joint.observations import Observations
-from models.estimation.joint.observing import observe
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.knocked import Knock
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import Trajectory
+from models.simulation.pose_offset import Knock
+from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.tracks.observations import Observations
+from models.tracks.observing import observe
+from models.tracks.trajectory import Trajectory
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(18), roll_rad=math.radians(1))

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.estimation.joint.observations import of_tracks
-from models.flow.after_change import least_covariance
-from models.flow.likelihood import walkers_of
-from models.flow.reference import candidate_of
-from models.flow.turn_detection import moved_within
-from models.recalibration import estimate_pose, learn_site
-from models.recalibration.changes import posed
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import by_end
+from models.paths.likelihood import walkers_of
+from models.paths.reference import candidate_of
+from models.paths.turn_detection import moved_within
+from models.pose import estimate_pose, learn_site
+from models.pose.after_change import least_covariance
+from models.pose.change_search import posed
+from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.tracks.observations import of_tracks
+from models.tracks.trajectory import by_end
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)

@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.doors.choosing import Part, best_door_grain
 from models.doors.door_map import DoorGrain, DoorMap, Nodes, around, count_at, door_map_of
 from models.doors.likelihood import anchored_door_scores, door_likelihood, door_values
-from models.doors.moments import BEGINS, ENDS, Moments, observe_moments
 from models.geometry.ground import pixel_from_ground
-from models.trajectory import Trajectory
+from models.tracks.exposure import BEGINS, ENDS, Moments, observe_moments
+from models.tracks.trajectory import Trajectory
 from tests.models.sites import LENS, PRIOR
 
 HEIGHT_M = 5.0

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 from models.errors import CheckpointError
-from models.estimation.joint.observations import of_tracks
-from models.evaluation.recordings import load_recording
 from models.geometry.pose import CameraPose
-from models.recalibration import (
-    doubts,
+from models.pose import (
     estimate_pose,
     last_pose_from_bytes,
     last_pose_to_bytes,
     learn_site,
     observe,
+    warm_start,
 )
-from models.simulation.knocked import Knock, knock_trajectory
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import by_end
+from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.tracks.observations import of_tracks
+from models.tracks.trajectory import by_end
+from studies.recordings import load_recording
 from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 
@@ -167,7 +167,7 @@ def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, peo
 @pytest.mark.parametrize("knock", [None, LARGE])
 def test_recorded_people_come_to_the_same(monkeypatch, knock):
     """The scene with the most people: as many as a window is refined with are in none of them."""
-    monkeypatch.setattr(doubts, "_FEWEST", 100)
+    monkeypatch.setattr(warm_start, "_FEWEST", 100)
     scene = load_recording(SCENES / "wildtrack_c6")[0]
     tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
     lens, pose, half = scene.intrinsics, scene.true_pose, len(tracks) // 2

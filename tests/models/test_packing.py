@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from safetensors.numpy import load
 
 from models.errors import CheckpointError
-from models.packing import Format, flattened, pack, restored, stored_as, under, unpack
+from models.serialization import Format, flattened, pack, restored, stored_as, under, unpack
 
 FORM = Format(name="site", version=3)
 VALUES = {

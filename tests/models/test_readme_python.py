@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.simulation.site import SiteConfig
+from models.simulation.simulated_site import SiteConfig
 from tests.models.sites import KNOCKED, PRIOR, near, tracks_of
 
 README = (Path(__file__).parents[2] / "models" / "README.md").read_text()

@@ -5,21 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.drift.change_point import find_change
-from models.drift.chart_learning import learn_chart
-from models.drift.group_scores import score_groups
-from models.drift.verdict import DriftLimits
 from models.errors import ShapeError, TooFewTrajectoriesError
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.observations import of_tracks
-from models.evaluation.protocol.cases import ProtocolCase
-from models.evaluation.protocol.flow_runs import fused
-from models.evaluation.protocol.learned import Learned
-from models.evaluation.protocol.served import served_pose
-from models.flow.folds import fold_maps
-from models.flow.fusion import by_speeds_alone
-from models.flow.reference import candidate_of
-from models.recalibration import (
+from models.monitoring.chart_learning import learn_chart
+from models.monitoring.group_scores import score_groups
+from models.monitoring.verdict import DriftLimits
+from models.paths.folds import fold_maps
+from models.paths.reference import candidate_of
+from models.pose import (
     AlarmRate,
     SecondLook,
     assume_site,
@@ -28,8 +20,16 @@ from models.recalibration import (
     observe,
     read_alarm_chart,
 )
-from models.simulation.site import SiteConfig
-from models.trajectory import by_end
+from models.pose.change_point import find_change
+from models.pose.fusion import by_speeds_alone
+from models.simulation.simulated_site import SiteConfig
+from models.tracks.observations import of_tracks
+from models.tracks.trajectory import by_end
+from models.walking.estimate import joint_estimate
+from studies.protocol.cases import ProtocolCase
+from studies.protocol.flow_runs import fused
+from studies.protocol.learned import Learned
+from studies.protocol.served import served_pose
 from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 import models
-from models.recalibration.warm_up import warm_up
+from models.pose.warm_up import warm_up
 
 ROOT = Path(models.__path__[0]).parent
 ASK = """
 import gc
 from models.compiled import _Compiled
-from models.recalibration import AlarmRate, estimate_pose, learn_site, observe, read_alarm_chart
-from models.recalibration.warm_up import warm_up
-from models.trajectory import by_end
+from models.pose import AlarmRate, estimate_pose, learn_site, observe, read_alarm_chart
+from models.pose.warm_up import warm_up
+from models.tracks.trajectory import by_end
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 
 def kinds():

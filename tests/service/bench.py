@@ -6,11 +6,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from models.estimation.joint.estimate import JointEstimate
-from models.estimation.parameters import PLANE_PARAMETERS
-from models.flow.fusion import FusedEstimate, by_speeds_alone
+from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
+from models.pose.fusion import FusedEstimate, by_speeds_alone
 from models.regression.recipe import plan_to_config
+from models.walking.estimate import JointEstimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.finding import Finding, asked_enough

@@ -11,7 +11,7 @@ from service.app import create_app
 from service.settings import Settings
 from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
-from tests.service.delivery.post_room import PostRoom
+from tests.service.notifications.post_room import PostRoom
 from tests.service.street import Street
 from tests.stores import databases
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.alerting.alerts import acknowledge_alert, open_alert
+from service.alerts.alerts import acknowledge_alert, open_alert
 from service.cameras.cameras import CameraSpec, register_camera
 from service.job_queue import JobQueue
 from service.reasons import as_said

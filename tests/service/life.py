@@ -12,30 +12,30 @@ import numpy as np
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from models.estimation.joint.observing import observe
-from models.estimation.joint.speed_reference import SpeedReference
-from models.estimation.reference.learning import learn_speed_reference
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
-from models.trajectory import Trajectory
-from service.alerting.staleness import StaleWatch
+from models.tracks.observing import observe
+from models.tracks.trajectory import Trajectory
+from models.walking.reference.learning import learn_speed_reference
+from models.walking.speed_reference import SpeedReference
+from service.alerts.staleness import StaleWatch
 from service.app import create_app
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.learning import LearnedReference, load_reference_period, save_reference
 from service.job_queue import JobQueue
-from service.jobs.context import JobContext
-from service.jobs.estimate import run_estimate
-from service.jobs.upkeep.housekeeping import run_reconcile
-from service.jobs.upkeep.retention import run_retention
 from service.settings import Settings
 from service.store import trainings
 from service.store.database.store import Store
 from service.store.tracks import tracks
 from service.training.trainings import begin_training, end_training, publish_model
 from service.windows.looking import begin_look, end_look
+from service.workers.context import JobContext
+from service.workers.estimate import run_estimate
+from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.retention import run_retention
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, made_up, moved
 from tests.service.shifted_clock import ShiftedClock

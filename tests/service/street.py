@@ -10,15 +10,15 @@ from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
-from models.recalibration import observe
+from models.pose import observe
 from models.simulation.poses import repeated_pose
-from models.simulation.site import Lane, SiteConfig, draw_lanes, walk_site
+from models.simulation.simulated_site import Lane, SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig, simulate_walks
-from models.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory
 from service.job_queue import JobQueue
-from service.jobs.context import JobContext
-from service.jobs.estimate import run_estimate
 from service.store.database.store import Store
+from service.workers.context import JobContext
+from service.workers.estimate import run_estimate
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(

@@ -10,8 +10,8 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, text
 
 from service.data_dir import StartError
-from service.delivery.key_settling import settle_keys
 from service.job_queue import migrate_engine_tables
+from service.notifications.key_settling import settle_keys
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known
 from service.store.postgresql.backend import postgresql_engine

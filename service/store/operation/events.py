@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.kinds import EventType
+from service.enums import EventType
 from service.store.database.deleting import delete_some
 from service.store.database.following import mark_entry, newest_settled, settled
 from service.store.tables.operation import EventRecord

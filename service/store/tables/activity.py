@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import Activity, AlertKind, Outcome
+from service.enums import Activity, AlertKind, Outcome
 from service.store.tables.record import Record, one_of
 
 

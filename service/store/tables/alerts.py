@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import JSON, Index, String, text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import (
+from service.enums import (
     AlertKind,
     AlertSource,
     AlertState,

@@ -40,7 +40,7 @@ class MaintenanceRecord(Record):
 
 
 class RhythmRecord(Record):
-    """How many people a camera usually sees when (`models.drift.rhythm`), and how late they come.
+    """How many people a camera usually sees when, and how late they come (`arrivals`).
 
     `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
     """

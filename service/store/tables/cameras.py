@@ -5,7 +5,7 @@ from datetime import datetime
 from sqlalchemy import ForeignKey, Index, LargeBinary, String, false
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import (
+from service.enums import (
     Origin,
 )
 from service.reasons import Reasons

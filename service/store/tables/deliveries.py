@@ -7,7 +7,7 @@ from sqlalchemy import JSON, ForeignKey, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from models.reasons import Reason
-from service.kinds import DeliveryState, MessageType, WebhookFormat
+from service.enums import DeliveryState, MessageType, WebhookFormat
 from service.reasons import Reasons
 from service.store.tables.record import Record, one_of
 

@@ -6,9 +6,9 @@ from typing import Any
 from sqlalchemy import Index
 from sqlalchemy.orm import Mapped, composite, mapped_column
 
-from models.drift.verdict import Drift
 from models.geometry.pose_parameters import PoseParameters
-from service.kinds import (
+from models.monitoring.verdict import Drift
+from service.enums import (
     PoseState,
 )
 from service.reasons import Reasons

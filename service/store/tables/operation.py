@@ -5,7 +5,7 @@ from typing import Any
 
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import (
+from service.enums import (
     EventType,
 )
 from service.store.tables.record import Record, one_of

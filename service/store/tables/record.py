@@ -18,7 +18,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase
 
-from service import kinds
+from service import enums
 from service.reasons import Reasons, from_json, to_json
 
 NAMING = {
@@ -29,20 +29,20 @@ NAMING = {
     "pk": "pk_%(table_name)s",
 }
 _STORED: tuple[type[StrEnum], ...] = (
-    kinds.Activity,
-    kinds.AlertKind,
-    kinds.AlertSource,
-    kinds.AlertState,
-    kinds.Answer,
-    kinds.DeliveryState,
-    kinds.EventType,
-    kinds.MessageType,
-    kinds.Origin,
-    kinds.Outcome,
-    kinds.PoseState,
-    kinds.Severity,
-    kinds.TrainingState,
-    kinds.WebhookFormat,
+    enums.Activity,
+    enums.AlertKind,
+    enums.AlertSource,
+    enums.AlertState,
+    enums.Answer,
+    enums.DeliveryState,
+    enums.EventType,
+    enums.MessageType,
+    enums.Origin,
+    enums.Outcome,
+    enums.PoseState,
+    enums.Severity,
+    enums.TrainingState,
+    enums.WebhookFormat,
 )
 
 

@@ -5,7 +5,7 @@ from datetime import datetime
 from sqlalchemy import Index, LargeBinary
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import (
+from service.enums import (
     Answer,
     Origin,
 )
@@ -19,7 +19,7 @@ class SiteReferenceRecord(Record):
 
     It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
     is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
-    said. `to_s` is when the last of them ended, `data` the site (`models.estimation.joint`).
+    said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
     `changed_s` when it started. `answer` is what a person said last of how the camera stands:
     estimates of before `answered_at` say nothing of it any more.
@@ -56,11 +56,11 @@ class SiteReferenceRecord(Record):
 
 
 class FlowMapRecord(Record):
-    """Where people walk at a reference's site (`models.flow`), learned of `tracks` tracks.
+    """Where people walk at a reference's site (`models.paths`), learned of `tracks` tracks.
 
-    `data` is None where too few of them walk. `chart` is the drift chart (`models.drift`) that goes
-    with it. `to_s` is when the last of them ended, `weight` what they count for together, of whom
-    older ones count less.
+    `data` is None where too few of them walk. `chart` is the drift chart (`models.monitoring`)
+    that goes with it. `to_s` is when the last of them ended, `weight` what they count for together,
+    of whom older ones count less.
     """
 
     __tablename__ = "flow_maps"
@@ -75,10 +75,10 @@ class FlowMapRecord(Record):
 
 
 class AnchorRecord(Record):
-    """The first flow map and drift chart of a reference: they never grow (`models.recalibration`).
+    """The first flow map and drift chart of a reference: they never grow (`models.pose`).
 
     `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
-    days since (`models.drift.creep_log`), up to `logged_to_s`; None as long as there is none.
+    days since (`models.monitoring.creep_log`), up to `logged_to_s`; None as long as there is none.
     """
 
     __tablename__ = "anchors"
@@ -93,7 +93,7 @@ class AnchorRecord(Record):
 
 
 class LastPoseRecord(Record):
-    """Where the next estimate against a reference may begin (`models.recalibration.doubts`).
+    """Where the next estimate against a reference may begin (`models.pose.warm_start`).
 
     `basis` tells what it hangs on beside the tracks: of another one it says nothing.
     """

@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Index, LargeBinary, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from service.kinds import (
+from service.enums import (
     TrainingState,
 )
 from service.store.tables.base import camera_key, foreign_key

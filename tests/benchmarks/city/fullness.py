@@ -20,11 +20,11 @@ from sqlalchemy import insert
 
 from service.commands.postgresql.moving import move
 from service.estimation.evidence import load_evidence
-from service.jobs.upkeep import limits
 from service.settings import Settings
 from service.store.database.store import Store
 from service.store.packing import pack
 from service.store.tables.tracks import TrackRecord
+from service.workers.upkeep import limits
 from tests.benchmarks.city.seeding import camera_id, seed_file
 from tests.conftest import track
 from tests.stores.server import Server

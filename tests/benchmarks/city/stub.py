@@ -10,7 +10,7 @@ from zlib import crc32
 
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
-from service.jobs import estimate
+from service.workers import estimate
 from tests.service.bench import made_up
 
 MOVED = 500  # of so many cameras one has moved

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from sqlalchemy import Column, Table
 
-from models.simulation.site import SiteConfig, draw_lanes, walk_site
-from models.trajectory import Trajectory, by_end
+from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
 from service.store.sqlite.files import connected

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from service.access.activity import note
-from service.kinds import Activity
+from service.enums import Activity
 from service.store.database.store import Store
 from tests.browser.camera.conftest import URL
 from tests.browser.conftest import axe, shoot, too_wide

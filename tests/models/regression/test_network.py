@@ -20,7 +20,7 @@ from models.regression.network import (
 from models.regression.prediction import predict_windows
 from models.regression.recipe import DEFAULT, PAPER, Recipe, TrainingPlan
 from models.simulation.walkers import WalkConfig
-from models.trajectory import Windows
+from models.tracks.trajectory import Windows
 
 
 def plan_of(lens: Intrinsics, pose: CameraPose, recipe: Recipe) -> TrainingPlan:

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from models.errors import ShapeError
-from models.estimation.averaged import average_windows, averaged_estimate
+from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.prediction import predict_windows
 from models.regression.recipe import PAPER, plan_training
 from models.regression.training import check_held_out, train
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
-from models.trajectory import Windows
+from models.tracks.trajectory import Windows
 
 
 def test_the_papers_numbers():

@@ -5,7 +5,7 @@ import pytest
 
 from models.errors import DegenerateGeometryError
 from models.geometry.ground import ground_from_pixel
-from models.simulation.cameras import CameraRange, draw_camera
+from studies.simulation.cameras import CameraRange, draw_camera
 
 
 def test_cameras_are_of_their_ranges_and_see_ground():

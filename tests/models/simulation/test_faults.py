@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.testing import assert_allclose
 
-from models.simulation.faults import FaultRange, SiteFaults, draw_faults, with_faults
 from models.simulation.walkers import Walks
+from studies.simulation.faults import FaultRange, SiteFaults, draw_faults, with_faults
 
 NONE = SiteFaults(
     switched=np.zeros(2), hidden=np.zeros(2), riding=np.zeros(2), rounding_px=np.zeros(2)

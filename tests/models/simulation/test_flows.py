@@ -9,10 +9,10 @@ from models.errors import DegenerateGeometryError
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.crowds import FlowConfig
-from models.simulation.flows import simulate_sites
 from models.simulation.poses import PoseSet, repeated_pose
 from models.simulation.walkers import WalkConfig, Walks
+from studies.simulation.crowds import FlowConfig
+from studies.simulation.flows import simulate_sites
 
 # One lane, no strays, steady people, no noise.
 ORDERLY = FlowConfig(

@@ -9,9 +9,9 @@ from fastapi.testclient import TestClient
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
+from service.api.middleware.reach import auth_on
+from service.api.middleware.scopes import NEEDS, need_of
 from service.app import create_app
-from service.http.reach import auth_on
-from service.http.scopes import NEEDS, need_of
 from service.store.database.store import Store
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem

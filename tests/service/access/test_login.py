@@ -7,8 +7,8 @@ from fastapi.testclient import TestClient
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
+from service.api.middleware.guard import COOKIE
 from service.app import create_app
-from service.http.guard import COOKIE
 from service.store.database.store import Store
 from service.store.tables.access import SessionRecord
 from tests.service.conftest import problem

@@ -5,8 +5,8 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 
+from service.api.middleware.scopes import NEEDS
 from service.app import create_app
-from service.http.scopes import NEEDS
 from service.store.tables.record import Record
 from tests.service.conftest import problem
 from tests.stores.databases import ask

@@ -13,11 +13,11 @@ import pytest
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
+from service.api.middleware.scopes import NEEDS
 from service.app import create_app
 from service.commands import tokens as token_commands
 from service.commands.replay import client_of
 from service.data_dir import StartError
-from service.http.scopes import NEEDS
 from service.settings import Settings
 from service.store.database.store import Store
 from tests.conftest import CAMERA

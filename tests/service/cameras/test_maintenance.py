@@ -4,15 +4,15 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.alerting.alerts import open_alert
+from service.alerts.alerts import open_alert
 from service.estimation.growth import load_growth, save_growth
 from service.estimation.learning import load_reference_period
 from service.estimation.paths import LearnedPaths
-from service.jobs.upkeep.limits import limits_of_camera
 from service.reasons import as_said
 from service.store import maintenance, references
 from service.store.tracks import tracks, windows
 from service.windows.references import window_of
+from service.workers.upkeep.limits import limits_of_camera
 from tests.conftest import track
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem

@@ -7,10 +7,8 @@ import subprocess
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
-from models.evaluation.scenes import load_scene
-from service.cli import app
+from models.tracks.scenes import load_scene
 from tests.conftest import SCENES, path_to_small_trainings
 from tests.running import wait_for
 
@@ -20,9 +18,9 @@ pytestmark = [
 ]
 
 
-def surefoot(*arguments: str, **environment: str) -> str:
+def surefoot(module: str, *arguments: str, **environment: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-m", "service.cli", *arguments],
+        [sys.executable, "-m", module, *arguments],
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
@@ -40,11 +38,11 @@ def averaged_of(service):
 
 @pytest.fixture(scope="session")
 def offline(once):
-    """What `surefoot centred` says of a scene, by a small training, in its folder."""
+    """What `python -m studies centred` says of a scene, by a small training, in its folder."""
 
     def make(folder):
         text = surefoot(
-            "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0",
+            "studies", "centred", str(SCENES / "town_centre"), "--epochs", "1", "--seeds", "0",
             "--speeds", "1.4", "--processes", "1", "--output", str(folder / "out.json"),
             "--plot", str(folder / "out.png"), PYTHONPATH=path_to_small_trainings(folder),
         )  # fmt: skip
@@ -55,7 +53,7 @@ def offline(once):
 
 def test_a_replay_through_http_is_the_offline_evaluation(training_service, offline):
     service = training_service
-    output = surefoot("replay", str(SCENES / "town_centre"), "--url", service.url)
+    output = surefoot("service.cli", "replay", str(SCENES / "town_centre"), "--url", service.url)
     assert "142 tracks accepted, 0 known already, 14 rejected" in " ".join(output.split())
     served = wait_for(lambda: averaged_of(service), timeout_s=180)
     (run,) = json.loads((offline / "out.json").read_text())["runs"]
@@ -72,37 +70,3 @@ def test_every_recorded_camera_can_be_loaded():
             truth = json.loads((folder / "camera.json").read_text())["true_pose"]
             assert math.degrees(scene.true_pose.tilt_rad) == pytest.approx(truth["tilt_deg"])
             assert len(scene.tracks) > 20
-
-
-def test_centred_prints_a_table_and_writes_json_and_a_plot(offline):
-    assert "town-centre" in (offline / "printed.txt").read_text()
-    (run,) = json.loads((offline / "out.json").read_text())["runs"]
-    assert (run["seed"], run["training_speed_mps"]) == (0, 1.4)
-    assert (offline / "out.png").stat().st_size > 5000
-
-
-def test_evaluate_knocks_a_scene_says_how_each_estimator_did_and_draws_it(tmp_path):
-    output, plots = tmp_path / "out.json", tmp_path / "plots"
-    surefoot(
-        "evaluate", str(SCENES / "meva_g336_school"), "--seeds", "1", "--knocks", "knock",
-        "--output", str(output), "--plots", str(plots),
-        PYTHONPATH=path_to_small_trainings(tmp_path),
-    )  # fmt: skip
-    outcomes = json.loads(output.read_text())["outcomes"]
-    assert len(outcomes) == 6  # estimators
-    assert {outcome["estimator"] for outcome in outcomes} >= {"joint"}
-    assert {outcome["knock"] for outcome in outcomes} == {"knock"}
-    for name in (
-        "drift-knock.png",
-        "ground-meva_g336_school.png",
-        "flow-meva_g336_school.png",
-        "flow-tracks.png",
-    ):
-        assert (plots / name).stat().st_size > 5000
-
-
-def test_evaluate_refuses_a_range_it_does_not_know(tmp_path):
-    asked = ["evaluate", str(SCENES / "town_centre"), "--knocks", "soft"]
-    answer = CliRunner().invoke(app, asked)
-    assert answer.exit_code == 1
-    assert "soft" in answer.output

@@ -8,8 +8,8 @@ import alembic.command
 import pytest
 from sqlalchemy import select
 
-from models.drift.creep_log import DAY_S
-from models.drift.creep_packing import creep_log_from_bytes
+from models.monitoring.creep_log import DAY_S
+from models.monitoring.creep_serialization import creep_log_from_bytes
 from service.estimation.anchoring import (
     compute_anchor_days,
     load_anchor_days,

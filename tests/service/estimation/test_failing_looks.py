@@ -8,9 +8,7 @@ import pytest
 from sqlalchemy import text, update
 
 from models.errors import CheckpointError
-from service.alerting.staleness import StaleWatch
-from service.jobs.estimate import run_estimate
-from service.jobs.upkeep import reconciliation
+from service.alerts.staleness import StaleWatch
 from service.reasons import ServiceCode
 from service.store import flow_maps, references, trainings
 from service.store.tables.cameras import CameraRecord
@@ -19,6 +17,8 @@ from service.store.tables.tracks import TrackRecord
 from service.training.trainings import begin_training, publish_model
 from service.windows.looking import rest_after_s
 from service.windows.requests import request_estimate
+from service.workers.estimate import run_estimate
+from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA
 from tests.service.street import KNOCKED, PRIOR, Street
 from tests.stores.queued import queued_cameras

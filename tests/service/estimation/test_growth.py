@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sqlalchemy import delete, select
 
-from models.flow.packing import flow_from_bytes
+from models.paths.serialization import flow_from_bytes
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.recalibration import last_pose_from_bytes
+from models.pose import last_pose_from_bytes
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.last_poses import basis_of, begin_of

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from models.recalibration import count_walks
-from models.trajectory import Trajectory
+from models.pose import count_walks
+from models.tracks.trajectory import Trajectory
 from service.store.packing import pack
 from service.store.tables.tracks import TrackRecord
 from service.windows.people import until_so_many

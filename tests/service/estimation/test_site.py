@@ -7,16 +7,16 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from models.estimation.joint.estimate import joint_estimate
-from models.estimation.joint.packing import reference_from_bytes
-from models.flow.packing import flow_from_bytes, flow_to_bytes
-from models.recalibration import estimate_pose, learn_site
+from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.pose import estimate_pose, learn_site
+from models.walking.estimate import joint_estimate
+from models.walking.serialization import reference_from_bytes
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
-from service.jobs.estimate import learn_if_due
 from service.store import references
 from service.windows.unpacked import Unpacked
+from service.workers.estimate import learn_if_due
 from tests.conftest import CAMERA, track
 from tests.service.estimation.conftest import WANTED
 from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall

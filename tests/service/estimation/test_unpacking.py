@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from service.jobs.estimate import run_estimate
 from service.store import flow_maps, references
 from service.store.packing import unpack
+from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
 

@@ -19,19 +19,19 @@ from pathlib import Path
 
 import pytest
 
-from service.backup.checking import check_data_dir
-from service.backup.placing import finish_restore
-from service.backup.restoring import restore_backup
-from service.backup.writing import write_backup
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone
-from service.delivery.keys import secret_of
+from service.notifications.keys import secret_of
+from service.operations.checking import check_data_dir
+from service.operations.placing import finish_restore
+from service.operations.restoring import restore_backup
+from service.operations.writing import write_backup
 from service.store import webhooks
 from service.store.database.revisions import known_revisions
 from service.store.database.store import Store
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
-from tests.service.delivery.test_sealing import hook
+from tests.service.notifications.test_sealing import hook
 from tests.test_migrations import put
 
 

@@ -6,7 +6,7 @@ import sys
 import pytest
 from sqlalchemy import text
 
-from service.http.direct.kept import Kept
+from service.api.middleware.direct.kept import Kept
 from service.store.database.store import Store
 from service.store.sqlite.changes import Changes
 

@@ -3,9 +3,9 @@
 import os
 import sqlite3
 
-from service.backup.checking import check_data_dir, repair_weights
 from service.commands.migrate import migrate
-from tests.service.delivery.test_sealing import hook
+from service.operations.checking import check_data_dir, repair_weights
+from tests.service.notifications.test_sealing import hook
 from tests.service.store.test_backup import with_model
 from tests.test_migrations import put
 

@@ -8,12 +8,12 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from service.alerting.staleness import StaleWatch
+from service.alerts.staleness import StaleWatch
 from service.job_queue import JobQueue
-from service.jobs.context import JobContext
-from service.jobs.upkeep.housekeeping import run_reconcile
-from service.jobs.upkeep.limits import limits_of_camera
 from service.store.database.store import Store
+from service.workers.context import JobContext
+from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.limits import limits_of_camera
 from tests.stores.databases import only_sqlite
 from tests.stores.rows import put_rows, row_of
 

@@ -13,10 +13,9 @@ from sqlalchemy.exc import DBAPIError
 
 from service.commands.migrate import migrate
 from service.data_dir import StartError
+from service.enums import EventType
 from service.errors import OverloadedError, StoreUnavailableError
 from service.job_queue import JobQueue
-from service.kinds import EventType
-from service.process.workforce import heartbeat, register_worker, take_setback, worker_name
 from service.setting_values import read_database_url
 from service.store import trainings
 from service.store.database.clock import now_in
@@ -24,6 +23,12 @@ from service.store.database.failures import failure_of
 from service.store.database.store import Store
 from service.store.operation import events, workers
 from service.training.weights import fetch_weights, share_weights
+from service.workers.processes.workforce import (
+    heartbeat,
+    register_worker,
+    take_setback,
+    worker_name,
+)
 from tests.stores import server
 from tests.stores.queued import queued_cameras
 

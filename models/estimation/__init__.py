@@ -1,1 +1,0 @@
-"""Tracks in, pose estimate out."""

@@ -1,1 +1,0 @@
-"""Recorded scenes, and how far estimates on them are from the truth."""

@@ -1,0 +1,275 @@
+"""The control chart: a CUSUM over walking groups, held against what a knock would make of them.
+
+For each of a grid of knocks, of tilt, roll, log height and heading, both ways and in three sizes,
+and for times that are too long or too short, the chart knows how the mean score of walking groups
+would
+change: it has seen the reference's people as a camera knocked so would. The statistic is the
+largest log likelihood ratio of any knock against none, over the newest 16 to 400 walking groups: a
+two-sided CUSUM for each parameter and size (Page 1954) in Lorden's and Lai's window-limited form,
+which is the same for one size and keeps its meaning where the reference is itself unsure: its noise
+is in the ratio, so that no number of new people makes a reference's own error a drift.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.geometry.rotation import Array
+from models.monitoring.group_scores import GroupScores
+from models.serialization import stored_as
+from models.walking.speed_reference import SpeedReference
+
+FEWEST = 16  # walking groups that a move is detected by
+LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
+CLOCK = 4  # beside the four of a pose: times that are too long
+# What a site's people do of themselves for hours on end, as moves of the camera, and of its clock:
+# about as those of recorded days did beyond chance (`studies/still_days`). Their pace differed by
+# 5 %, but 30 frames a second taken for 25, which is 18 %, must remain an alarm.
+HABITS = np.array([np.radians(0.1), np.radians(0.2), 0.01, np.radians(0.2), 0.03])
+# For days and seasons, of which too few are recorded to say: in rain and in winter they may walk
+# elsewhere, and faster.
+HABITS_OF_DAYS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
+RUN = 1000  # walking groups; levels are of so many in a row
+# The reference's noise counts for so much: whoever walks by on other days is another sample, too.
+OTHER_PEOPLE = 1.5
+_STRONGEST = 2.0  # times a knock of the grid, that it stands for
+_SUSPICION = 100.0  # times as many alarms
+_LEAST_LEVEL = 5.4  # of a run of endless normal walking groups that is wrong once in e runs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knocked:
+    """A knock of the grid: of tilt, roll, log height, heading or clock (0 to 4), and how far."""
+
+    parameter: int
+    size: float
+
+    @property
+    def step(self) -> Array:
+        """As a move (4,) of the camera."""
+        step = np.zeros(5)
+        step[self.parameter] = self.size
+        return step[:4]
+
+    @property
+    def stretch(self) -> float:
+        """By what times are too long."""
+        return float(np.exp(self.size)) if self.parameter == CLOCK else 1.0
+
+
+_ANGLES = tuple(float(np.radians(angle)) for angle in (1.0, 2.5, 6.0))
+# Of each parameter, the smallest first. 0.18 is 30 frames a second taken for 25.
+_SIZES = (_ANGLES, _ANGLES, (0.05, 0.12, 0.3), _ANGLES, (0.08, 0.18))
+KNOCKS = tuple(
+    Knocked(parameter=parameter, size=sign * size)
+    for parameter, sizes in enumerate(_SIZES)
+    for sign in (1, -1)
+    for size in sizes
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftChart:
+    """What groups' scores are like while a camera stands, and what each knock makes of them.
+
+    Scores are bounded around `middle` (14,) by five times their `width` (14,); of these, `mean`
+    (14,) and `covariance` (14, 14) are of the `walking_groups` of the reference and `responses`
+    (14, K) are what is added to the mean by each knock of the grid. `typical` and `tail` say how
+    high the statistic gets in runs of 1000 walking groups: its median, and its mean excess over
+    that. `speed_reference` is how people walk by the same tracks; a flow map of these goes with a
+    chart.
+    """
+
+    speed_reference: SpeedReference = stored_as("paces")
+    middle: Array
+    width: Array
+    mean: Array
+    covariance: Array
+    responses: Array
+    walking_groups: float = stored_as("parties")
+    typical: float
+    tail: float
+
+    def level(self, alarms_a_run: float) -> float:
+        """What the statistic passes so many times in a run of 1000 groups of a still camera."""
+        share = -np.expm1(-alarms_a_run)
+        learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
+        return max(learned, _LEAST_LEVEL - float(np.log(share))) * _unsure(
+            self.walking_groups, len(self.mean)
+        )
+
+    def bounded(self, scores: Array) -> Array:
+        """Scores (..., 14) in units of their width, none farther from the middle than 5."""
+        return np.clip((scores - self.middle) / self.width, -5.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tested:
+    """A statistic, and the level that it passes as rarely as false alarms are allowed."""
+
+    statistic: float
+    level: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether it is beyond its level."""
+        return self.statistic > self.level
+
+    @property
+    def excess(self) -> float:
+        """The statistic in units of its level."""
+        return self.statistic / self.level
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading(Tested):
+    """What a chart says of the newest walking groups.
+
+    `statistic` is compared with `level`: where it is below by now, the highest since the chart was
+    last calm for some walking groups in a row, so that it matters not after whom somebody looks.
+    `parameter` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
+    `walking_groups` how many say so and `track_idx` the first track of theirs. What is `suspicious`
+    would be an alarm were a hundred times as many allowed.
+    """
+
+    parameter: int
+    sign: int
+    walking_groups: int
+    track_idx: int
+    suspicious: bool
+
+
+def read_chart(
+    chart: DriftChart,
+    scores: GroupScores,
+    alarms_a_run: float,
+    *,
+    calm_ratio: float,
+    calm_groups: int,
+) -> Reading | None:
+    """What the chart says now; None of fewer than 16 walking groups.
+
+    Args:
+        chart: of the camera.
+        scores: of its walking groups, in the order of their ends.
+        alarms_a_run: how many false alarms 1000 walking groups may come to.
+        calm_ratio: of its level, below which the chart is calm.
+        calm_groups: how many walking groups in a row it must be, to have calmed down.
+    """
+    if len(scores.values) < FEWEST:
+        return None
+    most = int(LENGTHS[-1])
+    newest = chart.bounded(scores.values[-most:])
+    path = trace(ratios_of(chart), newest - chart.mean)
+    level = chart.level(alarms_a_run)
+    since = _last_calm(path.statistic < calm_ratio * level, calm_groups)
+    at = len(newest) - 1
+    if path.statistic[at] <= level:
+        at = since + int(path.statistic[since:].argmax())
+    knock = KNOCKS[int(path.knock_idx[at])]
+    walking_groups, statistic = int(path.walking_groups[at]), float(path.statistic[at])
+    return Reading(
+        statistic=statistic,
+        level=level,
+        parameter=knock.parameter,
+        sign=1 if knock.size > 0 else -1,
+        walking_groups=walking_groups,
+        track_idx=int(scores.last[-most:][at + 1 - walking_groups]),
+        suspicious=statistic > chart.level(_SUSPICION * alarms_a_run),
+    )
+
+
+def _last_calm(calm: npt.NDArray[np.bool_], walking_groups: int) -> int:
+    """The last place (T,) at which so many, or all so far, were calm; else the first of them."""
+    run = 0
+    since = 0
+    for at, is_calm in enumerate(calm):
+        run = run + 1 if is_calm else 0
+        if run >= walking_groups or run == at + 1:
+            since = at
+    return since
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ratios:
+    """How means of groups are held against knocks: weights (L, 14, K) and strengths (L, K)."""
+
+    weights: Array
+    strengths: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """The statistic (T,) after each of groups, the knock and the groups that it is of (T,)."""
+
+    statistic: Array
+    knock_idx: npt.NDArray[np.int64]
+    walking_groups: npt.NDArray[np.int64]
+
+
+def ratios_of(chart: DriftChart) -> Ratios:
+    """The weights of a chart for each number of newest walking groups."""
+    slopes = np.stack([slope_of(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
+    habits = (slopes * HABITS) @ (slopes * HABITS).T
+    weights, strengths = [], []
+    for length in LENGTHS:
+        noise = chart.covariance * (1 / length + OTHER_PEOPLE / chart.walking_groups) + habits
+        weights.append(np.linalg.solve(noise, chart.responses))
+        strengths.append(np.einsum("fk,fk->k", chart.responses, weights[-1]))
+    return Ratios(weights=np.array(weights), strengths=np.maximum(strengths, 1e-12))
+
+
+def trace(ratios: Ratios, apart: Array) -> Trace:
+    """The statistic after each of groups, whose scores less the mean are `apart` (T, 14)."""
+    count = len(apart)
+    sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
+    statistic = np.full(count, -np.inf)
+    knock_idx, walking_groups = np.zeros((2, count), dtype=np.int64)
+    for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
+        if length > count:
+            break
+        shown = (sums[length:] - sums[:-length]) @ weights / length
+        ratio = _ratio(shown, strengths)
+        best = ratio.argmax(axis=1)
+        value = ratio[np.arange(len(best)), best]
+        own = slice(length - 1, count)
+        higher = value > statistic[own]
+        statistic[own] = np.where(higher, value, statistic[own])
+        knock_idx[own] = np.where(higher, best, knock_idx[own])
+        walking_groups[own] = np.where(higher, length, walking_groups[own])
+    return Trace(statistic=statistic, knock_idx=knock_idx, walking_groups=walking_groups)
+
+
+def highest(ratios: Ratios, apart: Array) -> float:
+    """The highest statistic of `trace`, in a fraction of its time; -inf of fewer than 16 groups.
+
+    A ratio rises with what is shown, so of all groups the most shown for each knock will do.
+    """
+    sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
+    found = -np.inf
+    for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
+        if length > len(apart):
+            break
+        shown = (sums[length:] - sums[:-length]) @ weights / length
+        found = max(found, float(_ratio(shown.max(axis=0), strengths).max()))
+    return found
+
+
+def _ratio(shown: Array, strengths: Array) -> Array:
+    """The log likelihood ratios of knocks (..., K), each as strong as is likeliest in its reach."""
+    times = np.clip(shown / strengths, 1.0, _STRONGEST)
+    return np.asarray(times * shown - times**2 * strengths / 2)
+
+
+def slope_of(chart: DriftChart, parameter: int) -> Array:
+    """The response (14,) to a unit of a parameter, by its smallest knocks both ways."""
+    size = _SIZES[parameter][0]
+    on, back = (KNOCKS.index(Knocked(parameter=parameter, size=sign * size)) for sign in (1, -1))
+    return np.asarray((chart.responses[:, on] - chart.responses[:, back]) / (2 * size))
+
+
+def _unsure(walking_groups: float, scores: int) -> float:
+    """By how much a covariance of so few walking groups makes ratios too large, on average."""
+    freedom = walking_groups - 1
+    return float(min(freedom / max(freedom - scores - 1, freedom / 3), 3.0))

@@ -1,0 +1,121 @@
+"""Creep: a turn too slow for any window, told by what each day says against the first map.
+
+A map that grows takes a slow turn along with it, and no window of some days is long enough to see
+it. So the first chart of a site, with the map and the speeds of its reference, stays, and each day
+of people is held against it once (`creep_log`). From those of weeks in a row comes the largest
+standard score of any turn that grew evenly from some week on, or from the reference on, or that has
+been the same ever since: a generalised likelihood ratio test for a ramp, with three things in its
+noise that no number of people makes smaller. The reference is of few people, and wrong by the same
+on all days. Habits change where people walk and how fast, by the season (slowly) and by the day.
+Height and pace are such habits: no camera is said to sink.
+
+It is an alarm of its own, with a share of its own in the false ones that are allowed; whatever
+grows or slides elsewhere moves nothing of it. Only a new reference does.
+
+Source: Basseville and Nikiforov, "Detection of Abrupt Changes" (1993), section 7.2.4 for the ratio
+test with an unknown start; the ramp in the place of a jump is ours.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.geometry.rotation import Array
+from models.monitoring.chart import Tested
+from models.monitoring.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
+from models.quantiles import value_below
+
+SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
+ANGLES = (0, 1, 3)  # tilt, roll and heading creep
+_LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn with its own noise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Creep(Tested):
+    """What a log says: a camera's turn by now, at its likeliest.
+
+    `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
+    how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
+    """
+
+    parameter: int
+    by: float
+    sd: float
+    since_day: float
+
+
+def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
+    """What a log says of its newest weeks; None of too few people.
+
+    Args:
+        log: of the days.
+        alarms_a_year: how many false ones are allowed of the creep alone.
+        from_s: since when the camera has stood as it does, but for a creep; whole days count.
+    """
+    held = hold_to_ramps(log, from_s)
+    if held is None:
+        return None
+    chance = min(alarms_a_year / _LOOKS, 0.5) / 2
+    level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
+    statistics = held.shown**2 / held.known
+    row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
+    return Creep(
+        statistic=float(statistics[row, way]),
+        level=level,
+        parameter=ANGLES[int(row)],
+        by=float(held.shown[row, way] / held.known[row, way]),
+        sd=float(held.known[row, way] ** -0.5),
+        since_day=float(held.ramps.starts[way]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ramps:
+    """Ways (W,) to turn by one up to the day `now`: evenly from a day `starts` (W,) on, or at once.
+
+    The first is the one at once.
+    """
+
+    starts: Array
+    now: float
+
+    def at(self, days: Array) -> Array:
+        """How far (W, N) each is by some days (N,)."""
+        turned = np.maximum(days - self.starts[:, None], 0.0)
+        turned = turned / np.maximum(self.now - self.starts, 1e-9)[:, None]
+        turned[0] = 1.0
+        return np.asarray(turned)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """What weeks say of turns (3, W) of tilt, roll, heading along ramps: their pull and its weight.
+
+    A turn's likeliest size is `shown / known`, with a variance of `1 / known`.
+    """
+
+    ramps: Ramps
+    shown: Array
+    known: Array
+
+
+def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
+    """What the weeks of a log say of every ramp; None of too few people."""
+    weeks = weeks_of(log, from_s)
+    if weeks is None:
+        return None
+    later = weeks.first_day[weeks.first_day > log.since_day]
+    ramps = Ramps(starts=np.array([log.since_day, log.since_day, *later]), now=weeks.last_day)
+    ways = ramps.at(weeks.middle_day)
+    weighed = np.linalg.inv(noise_of(log, weeks))
+    pull = (weighed @ weeks.moves.ravel()).reshape(-1, NUMBERS)
+    return Held(
+        ramps=ramps,
+        shown=np.array([ways @ pull[:, number] for number in ANGLES]),
+        known=np.array(
+            [
+                np.einsum("wb,bc,wc->w", ways, weighed[number::NUMBERS, number::NUMBERS], ways)
+                for number in ANGLES
+            ]
+        ),
+    )

@@ -1,0 +1,128 @@
+"""What a walking group says of small moves of a camera: by how they walk, and where.
+
+Each walking group has fourteen scores. Three are slopes of the joint estimator's likelihood along
+tilt, roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that
+it says little after a large move. Three more are the same without that: how far off a pace is, held
+within bounds. Eight are how much likelier their places and ways were a little further on than a
+little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
+these tells a move, and how well, is learned of the site (`chart_learning`). The method: "The alarm"
+in `models/README.md`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.geometry.plane_parameters import plane_parameters_of
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+from models.paths.likelihood import Walkers, walkers_of
+from models.paths.reference import candidate_of
+from models.paths.registration import Site
+from models.paths.turn_detection import REACH, along_paths, groups_in_time
+from models.tracks.observations import Observations, Steps, check_in_time
+from models.walking.fit import Learned, per_track
+from models.walking.measures import Measured, measure_speeds, measure_statures
+from models.walking.speed_reference import SpeedReference, channels_of
+
+SCORES = 14
+# The reach, and a part of it: a map is smoothed by a metre, and has finer lines.
+_STEPS = np.concatenate([share * np.diag(REACH) for share in (1.0, 0.35)])
+_FARTHEST = 0.5  # of a log: a pace that is further off says no more than this
+_PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and paces are weighed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usual:
+    """What is usual before a camera: how people walk, and where, seen from the prior pose."""
+
+    prior: CameraPose
+    speed_reference: SpeedReference
+    paths: Site
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupScores:
+    """Scores (P, 14) of walking groups in the order of their last tracks (P,)."""
+
+    values: Array
+    last: npt.NDArray[np.int64]
+
+
+def score_groups(
+    observations: Observations, usual: Usual, walkers: Walkers | None = None
+) -> GroupScores:
+    """The scores of all walking groups among tracks, at the prior pose.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    check_in_time(observations)
+    if walkers is None:
+        walkers = walkers_of(observations, candidate_of(usual.prior))
+    _, _, last = groups_in_time(walkers)
+    return GroupScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
+
+
+def scores_at(
+    observations: Observations,
+    walkers: Walkers,
+    usual: Usual,
+    beside: Array,
+    stretch: float = 1.0,
+) -> Array:
+    """Scores (P, 14) at a pose beside the prior: some tilt, roll, log height, heading (4,) on.
+
+    By a clock whose times are longer by a factor, everybody is as much slower.
+    """
+    at = candidate_of(usual.prior) + beside
+    people, group_of, last = groups_in_time(walkers)
+    if not last.size:
+        return np.zeros((0, SCORES))
+    parameters = plane_parameters_of(usual.prior) + beside[:3]
+    observations = replace(observations, steps=_slowed(observations.steps, stretch))
+    walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
+    slopes = per_track(
+        channels_of(observations, usual.speed_reference, usual.prior), parameters
+    ).gradient
+    scores = np.concatenate(
+        [
+            -slopes,
+            _bounded(observations, walkers, usual, parameters),
+            along_paths(walkers, usual.paths, at, _STEPS),
+        ],
+        axis=1,
+    )
+    sums = np.zeros((last.size, SCORES))
+    np.add.at(sums, group_of, scores[people])
+    return np.asarray(sums / np.bincount(group_of)[:, None])
+
+
+def _slowed(steps: Steps, stretch: float) -> Steps:
+    return replace(steps, seconds=steps.seconds * stretch)
+
+
+def _bounded(
+    observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
+) -> Array:
+    """How far off paces are, and statures where boxes tell them, times what would mend it."""
+    heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
+    speeds = measure_speeds(walkers.steps, parameters, heading)
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2
+    if speed_reference.statures is not None:
+        tops = measure_statures(observations.tops, parameters, heading)
+        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / _STATURE_SD**2
+    return scores
+
+
+def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
+    """Mean (tracks, 3) of what is measured less what is usual, times its slopes by the pose."""
+    features = learned.field.features(measured)
+    residual = np.where(measured.valid, measured.value - features @ learned.mean, 0.0)
+    slopes = measured.d_value - learned.field.slopes(measured, features, learned.mean)
+    pull = -np.clip(residual, -_FARTHEST, _FARTHEST)[:, None] * slopes
+    sums = np.zeros((tracks, 3))
+    np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
+    number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)
+    return np.asarray(sums / np.maximum(number, 1)[:, None])

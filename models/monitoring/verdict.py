@@ -1,0 +1,192 @@
+"""The verdict: by the chart at once, by the pose twice; with hysteresis."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from models.geometry.plane_parameters import ANGLES
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PARAMETERS, PoseParameters
+from models.geometry.rotation import angle_between
+from models.monitoring.chart import Reading
+from models.monitoring.creep import Creep
+
+# What a clock that is wrong looks like in a pose is a height.
+_CHARTED = (*PARAMETERS, "height")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """Estimate minus prior pose: `by` how much, and the standard deviations of the estimate.
+
+    `identifiable` names the parameters that the tracks determine; the others stand here but count
+    nowhere. `angle_rad` is the whole rotation that the identifiable angles make.
+    """
+
+    by: PoseParameters
+    sd: PoseParameters
+    angle_rad: float
+    identifiable: tuple[str, ...]
+
+    def of(self, name: str) -> tuple[float, float]:
+        """A parameter's drift and its standard deviation: in metres for height, else in radians."""
+        return self.by.of(name), self.sd.of(name)
+
+    @property
+    def turned(self) -> bool:
+        """Whether an angle is identifiable."""
+        return bool(set(ANGLES) & set(self.identifiable))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftLimits:
+    """When a drift counts: beyond so many standard deviations and beyond a floor.
+
+    And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise.
+    """
+
+    sigmas: float
+    floor_rad: float
+    floor_m: float
+    people: int
+    clear_ratio: float
+
+    def of(self, name: str, sd: float) -> float:
+        """From where on a parameter's drift counts, given its standard deviation."""
+        floor = self.floor_m if name == "height" else self.floor_rad
+        return max(self.sigmas * sd, floor, 1e-12)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftVerdict:
+    """`streak` is 1 where the window is beyond the limits, -1 where it is below `clear_ratio`.
+
+    `excess` is the largest identifiable drift in units of its limit: 1 and more is beyond.
+    `drifted` names the parameters that have been beyond since the drift began; empty where there is
+    none.
+    """
+
+    streak: int
+    excess: float
+    drifted: tuple[str, ...]
+
+    @property
+    def drifting(self) -> bool:
+        """Whether the camera has moved, by now."""
+        return bool(self.drifted)
+
+
+def drift_between(
+    found: PoseParameters, sd: PoseParameters, identifiable: Sequence[str], prior: CameraPose
+) -> Drift:
+    """How far an estimate is from the prior pose; x and y count as unmoved.
+
+    Args:
+        found: what is estimated.
+        sd: its standard deviations.
+        identifiable: those of tilt, roll, height, heading that the tracks determine.
+        prior: the prior pose.
+    """
+    drift = Drift(
+        by=PoseParameters(
+            height_m=found.height_m - prior.height_m,
+            tilt_rad=min(max(found.tilt_rad, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
+            roll_rad=math.remainder(found.roll_rad - prior.roll_rad, 2 * math.pi),
+            heading_rad=math.remainder(found.heading_rad - prior.heading_rad, 2 * math.pi),
+        ),
+        sd=sd,
+        angle_rad=0.0,
+        identifiable=tuple(name for name in PARAMETERS if name in identifiable),
+    )
+    turned = pose_after(drift, prior)
+    return replace(
+        drift, angle_rad=float(angle_between(turned.quaternion_wxyz, prior.quaternion_wxyz))
+    )
+
+
+def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
+    """The prior pose moved by the identifiable drift; the rest stays the prior's."""
+    turn = 2 * math.pi
+    by = {name: drift.by.of(name) if name in drift.identifiable else 0.0 for name in PARAMETERS}
+    heading = prior.heading_rad + by["heading"]
+    return replace(
+        prior,
+        height_m=prior.height_m + by["height"],
+        tilt_rad=prior.tilt_rad + by["tilt"],
+        roll_rad=prior.roll_rad + by["roll"],
+        # Within one turn, as a prior pose has to be.
+        heading_rad=heading if abs(heading) <= turn else math.fmod(heading, turn),
+    )
+
+
+def asks_again(drift: Drift, limits: DriftLimits, *, drifting: bool) -> bool:
+    """Whether a verdict on a drift needs what the window says without its newest people."""
+    excess = max(_ratios(drift, limits).values(), default=0.0)
+    return excess < limits.clear_ratio if drifting else excess >= 1
+
+
+def judge(
+    drift: Drift,
+    limits: DriftLimits,
+    drifted: tuple[str, ...],
+    reading: Reading | None = None,
+    earlier: Drift | None = None,
+    creep: Creep | None = None,
+) -> DriftVerdict:
+    """The verdict on a window, given what had drifted before.
+
+    Drifting begins at once where the chart or the creep is beyond its level, and where an
+    identifiable parameter is beyond its limit, by the window and by the same without its newest
+    `people`: one outlier does not do it, and it matters not how many jobs have looked meanwhile.
+    The chart's level is of a rate of false alarms already, and far moves, which the chart is not
+    made for, are seen in the pose. It ends where both, the chart and the creep are below
+    `clear_ratio`. A parameter that is not identifiable is never beyond, and its drift does not end
+    until it is identifiable again or the chart, which asks for all four, is calm. Where nothing is
+    identifiable, nothing changes.
+
+    Args:
+        drift: of the window.
+        limits: what counts.
+        drifted: the parameters that have drifted, by the verdicts before; empty where none has.
+        reading: of the chart, where there is one.
+        earlier: of the window without its newest people; None where too few are left, or nobody
+            has asked (`asks_again`).
+        creep: of the weeks up to now, where there is an anchor.
+    """
+    ratios = _ratios(drift, limits)
+    crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
+    if not ratios and reading is None and not crept:
+        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
+    excess = max(ratios.values(), default=0.0)
+    beyond = _beyond(drift, limits)
+    charted = (_CHARTED[reading.parameter],) if reading is not None and reading.moved else crept
+    calm = all(said is None or said.excess < limits.clear_ratio for said in (reading, creep))
+    well = calm and _is_well(drift, limits, drifted, reading)
+    streak = 1 if beyond or charted else -1 if well else 0
+    if drifted:
+        drifted = tuple(n for n in PARAMETERS if n in drifted or n in beyond)
+        if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, reading):
+            drifted = ()
+    elif charted or (earlier is not None and beyond.items() & _beyond(earlier, limits).items()):
+        drifted = tuple(beyond) or charted
+    return DriftVerdict(streak=streak, excess=excess, drifted=drifted)
+
+
+def _ratios(drift: Drift, limits: DriftLimits) -> dict[str, float]:
+    """The identifiable parameters in units of their limits."""
+    found = {name: drift.of(name) for name in drift.identifiable}
+    return {name: abs(value) / limits.of(name, sd) for name, (value, sd) in found.items()}
+
+
+def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
+    """The identifiable parameters beyond their limits, and whether they have grown."""
+    found = _ratios(drift, limits).items()
+    return {name: drift.by.of(name) > 0 for name, ratio in found if ratio >= 1}
+
+
+def _is_well(
+    drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], reading: Reading | None
+) -> bool:
+    identifiable = set(drift.identifiable) if reading is None else set(PARAMETERS)
+    excess = max(_ratios(drift, limits).values(), default=0.0)
+    return excess < limits.clear_ratio and set(drifted) <= identifiable

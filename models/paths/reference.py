@@ -1,0 +1,166 @@
+"""Learn a site's flow from tracks at a known pose, and how registration errs there.
+
+Source: Godambe 1960, the information of an estimating function, H J^-1 H, whose J has the scatter
+of walking groups here, the noise of the map and what is not known of the bias.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.doors.door_map import DoorMap
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import array_of
+from models.geometry.rotation import Array
+from models.paths.cross_fit import CrossFit, cross_fit
+from models.paths.folds import Folds, Grains, fold_maps
+from models.paths.likelihood import walkers_of
+from models.paths.map.density_map import FlowMap
+from models.paths.map.view import Coverage
+from models.paths.path_test import UsualFit, usual_fit
+from models.paths.registration import Shape, Site
+from models.paths.site_doors import with_doors
+from models.paths.site_map import mapped
+from models.paths.turn_detection import StillScores, learn_scores
+from models.serialization import stored_as
+from models.tracks.observations import Observations
+
+_RUN = 6  # walking groups after one another
+# The inflation before any is seen, and how many runs that guess is worth.
+_ASSUMED_INFLATION, _ASSUMED_INFLATION_WEIGHT = 1.3, 5.0
+_LEFT_NOISE = 0.5  # of the bias's, after what cancels
+_ELSEWHERE = np.array([0.05, 0.05, 0.05, 0.15])  # of a person's scatter: how far off the bias is
+_FAR = np.array([np.radians(8), np.radians(8), 0.15, np.radians(8)])  # how far that pose is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowReference:
+    """The flow at a site, and how registration errs there.
+
+    `bias` (4,) is a person's mean score at the truth, by tilt, roll, log height and heading,
+    `bias_covariance` (4, 4) how unsure that is, `spread` (4,) how much people's scores scatter.
+    `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
+    peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
+    together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
+    its two tests go by. `doors` is None where there are none. `grains` are what map and
+    doors were learned by, for the next ones; None of what was stored before they were kept.
+    """
+
+    flow: FlowMap
+    coverage: Coverage
+    bias: Array
+    bias_covariance: Array
+    spread: Array
+    curvature_variance_inflation: float = stored_as("temper")
+    score_variance_inflation: float = stored_as("surprise")
+    people: float
+    still: StillScores
+    fit: UsualFit
+    doors: DoorMap | None = None
+    grains: Grains | None = None
+
+    def site(self, intrinsics: Intrinsics) -> Site:
+        """What walkers are registered to."""
+        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics, doors=self.doors)
+
+    def variance_inflation_for(self, people: float) -> float:
+        """How much larger squared errors are for so many people than the curvature says."""
+        return self.curvature_variance_inflation * self.map_noise(people)
+
+    def map_noise(self, people: float) -> float:
+        """The noise of map and walkers over that of the walkers.
+
+        Who made the map pulls the new people's pose as far as they would, were they new.
+        """
+        return 1 + people / self.people
+
+    def precision(self, shape: Shape, people: float, move: Array) -> Array:
+        """How much (4, 4) the map's part knows, by its shape some way (4,) from the prior pose.
+
+        Source: the inverse of the sandwich covariance (Godambe's information). On top of the
+        walkers' noise comes the map's, and what the bias is not known to be: at another pose, other
+        people walk at the edge of what is seen.
+        """
+        far = min(float(np.linalg.norm(move / _FAR)), 1.0)
+        elsewhere = np.diag((_ELSEWHERE * far * self.spread) ** 2)
+        scatter = self.score_variance_inflation * self.map_noise(people) * shape.noise
+        scatter = scatter + people**2 * (self.bias_covariance + elsewhere)
+        scatter = scatter + 1e-9 * np.trace(scatter) * np.eye(4)
+        return np.asarray(shape.curvature @ np.linalg.solve(scatter, shape.curvature))
+
+
+def candidate_of(pose: CameraPose) -> Array:
+    """Tilt, roll, log height, heading (4,) of a pose."""
+    return array_of(pose)
+
+
+def learn_flow(
+    observations: Observations,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    seed: int,
+    weights: Array | None = None,
+    folds: Folds | None = None,
+) -> FlowReference | None:
+    """The flow of tracks at the prior pose; None where fewer than 12 walking groups walk.
+
+    A map knows the tracks that it is made of too well. So each quarter of the walking groups is
+    held against a map of the others: what their scores are on average is the bias, how much more
+    they scatter in runs of walking groups after one another than walking groups do is the inflation
+    of their variance.
+
+    Args:
+        observations: of the tracks.
+        intrinsics: of the camera.
+        prior: where it stood.
+        seed: of the quarters and of the bootstrap.
+        weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
+        folds: of the same tracks and seed, where they have been made already.
+    """
+    at = candidate_of(prior)
+    if folds is None:
+        folds = fold_maps(observations, intrinsics, at, seed, weights)
+    if folds is None:
+        return None
+    crossed = cross_fit(folds.each, at)
+    inflation, scatter = _scatter(crossed)
+    parts_bent = float(np.trace(np.linalg.solve(scatter, crossed.curvature)))
+    count = float(crossed.people.sum())
+    # Each in the others' map and they in its: to first order, what noise does to the mean cancels.
+    bias = crossed.slopes.sum(axis=0) / count
+    unsure = _LEFT_NOISE * inflation * scatter / count**2
+    walkers = walkers_of(observations, at)
+    weights = np.ones(observations.tracks) if weights is None else weights
+    whole = mapped(walkers, weights, intrinsics, at, folds.grains.flow)
+    whole = with_doors(whole, walkers, weights, at, folds.grains.doors)
+    counted = weights[np.unique(walkers.steps.rows.owner_idx)]
+    return FlowReference(
+        flow=whole.flow,
+        coverage=whole.coverage,
+        doors=whole.doors,
+        bias=bias,
+        bias_covariance=unsure,
+        spread=np.sqrt(np.diag(scatter) / count),
+        curvature_variance_inflation=inflation * max(1.0, 4 / max(parts_bent, 1e-9)),
+        score_variance_inflation=inflation,
+        people=float(counted.sum() ** 2 / (counted**2).sum()),
+        still=learn_scores(crossed.scores, crossed.bent, seed),
+        fit=usual_fit(crossed.fits),
+        grains=folds.grains,
+    )
+
+
+def _scatter(crossed: CrossFit) -> tuple[float, Array]:
+    """The inflation of the scores' variance, and what it is of.
+
+    That is the scatter (4, 4) of the slopes' sum if walking groups are independent.
+    """
+    centred = crossed.slopes - crossed.slopes.mean(axis=0)
+    scatter = centred.T @ centred + 1e-9 * np.trace(centred.T @ centred) * np.eye(4)
+    whitened = np.linalg.solve(np.linalg.cholesky(scatter / len(centred)), centred.T).T
+    runs = len(centred) // _RUN
+    sums = whitened[: runs * _RUN].reshape(runs, _RUN, 4).sum(axis=1)
+    found = float((sums**2).mean() / _RUN)
+    weight = runs / (runs + _ASSUMED_INFLATION_WEIGHT)
+    return max(1.0, weight * found + (1 - weight) * _ASSUMED_INFLATION), scatter

@@ -1,0 +1,59 @@
+"""Learn a site, estimate a pose, read the alarm chart: recalibration, values in and values out.
+
+All that these three take and give can be imported from here.
+"""
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.monitoring.chart import Reading
+from models.monitoring.creep import Creep, read_creep
+from models.monitoring.creep_log import CreepLog
+from models.monitoring.verdict import Drift, DriftLimits
+from models.pose.alarms import AlarmRate, read_alarm_chart
+from models.pose.anchoring import begin_creep_log, log_creep, without_creep
+from models.pose.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
+from models.pose.learning import assume_site, learn_site
+from models.pose.partial_failures import Lack
+from models.pose.serialization import last_pose_from_bytes, last_pose_to_bytes
+from models.pose.site import CameraSite
+from models.pose.warm_start import LastPose
+from models.simulation.walkers import WalkConfig
+from models.tracks.linking import count_walks, link_pieces
+from models.tracks.observations import Observations
+from models.tracks.trajectory import Trajectory
+from models.tracks.walks import Walks, observe, observe_walks
+
+__all__ = [
+    "AlarmRate",
+    "CameraPose",
+    "CameraSite",
+    "Creep",
+    "CreepLog",
+    "Drift",
+    "DriftLimits",
+    "Intrinsics",
+    "Lack",
+    "LastPose",
+    "Observations",
+    "PoseFinding",
+    "Reading",
+    "SecondLook",
+    "Trajectory",
+    "WalkConfig",
+    "Walks",
+    "assume_site",
+    "begin_creep_log",
+    "count_walks",
+    "drift_of",
+    "estimate_pose",
+    "last_pose_from_bytes",
+    "last_pose_to_bytes",
+    "learn_site",
+    "link_pieces",
+    "log_creep",
+    "observe",
+    "observe_walks",
+    "read_alarm_chart",
+    "read_creep",
+    "without_creep",
+]

@@ -1,0 +1,70 @@
+"""What the drift chart says of tracks: that a camera has moved, long before a pose says how far."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.geometry.rotation import Mask
+from models.monitoring.chart import RUN, Reading, read_chart
+from models.monitoring.group_scores import score_groups
+from models.pose.site import CameraSite
+from models.tracks.observations import Observations, of_tracks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmRate:
+    """How many false alarms a year are allowed, and how many tracks come in one.
+
+    After an alarm the chart has calmed down once `calm_groups` in a row were below `calm_ratio`
+    of its level.
+    """
+
+    alarms_a_year: float
+    tracks_a_year: float
+    calm_ratio: float = 0.7
+    calm_groups: int = 12
+
+
+def read_alarm_chart(
+    tracks: Observations,
+    site: CameraSite,
+    rate: AlarmRate,
+    *,
+    counted: Mask | None = None,
+    first: int = 0,
+) -> Reading | None:
+    """What the chart says of tracks from the first one on, or else of all; None of too few.
+
+    None, too, of a site without a flow map or a chart.
+
+    Args:
+        tracks: of the window, in the order of their ends.
+        site: of the camera.
+        rate: of false alarms, which sets the level.
+        counted: which tracks (tracks,) count; all unless it is given. Once a person has said that
+            the camera is where it should be, the chart begins anew.
+        first: the first track after a change.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    if site.flow is None or site.chart is None:
+        return None
+    usual = site.usual(site.flow, site.chart)
+    every = np.arange(tracks.tracks) if counted is None else np.flatnonzero(counted)
+    for asked in (every[every >= first], every):
+        if not asked.size:
+            continue
+        seen = tracks if asked.size == tracks.tracks else of_tracks(tracks, asked)
+        scores = score_groups(seen, usual)
+        groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
+        reading = read_chart(
+            site.chart,
+            scores,
+            RUN * rate.alarms_a_year / groups_a_year,
+            calm_ratio=rate.calm_ratio,
+            calm_groups=rate.calm_groups,
+        )
+        if reading is not None:
+            return replace(reading, track_idx=int(asked[reading.track_idx]))
+    return None

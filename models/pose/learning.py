@@ -1,0 +1,89 @@
+"""Learn a site of tracks at a known pose: how people walk, where, and the chart of its drift."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+from models.monitoring.chart_learning import learn_chart
+from models.paths.folds import Grains, fold_maps
+from models.paths.reference import candidate_of, learn_flow
+from models.pose.site import CameraSite
+from models.simulation.walkers import WalkConfig
+from models.tracks.observations import Observations, check_in_time, of_tracks
+from models.walking.reference.assumed import assumed_speed_reference
+from models.walking.reference.learning import learn_speed_reference
+from models.walking.speed_reference import SpeedReference
+
+_USUAL_WALK = WalkConfig()
+
+
+def learn_site(
+    tracks: Observations,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    walk: WalkConfig = _USUAL_WALK,
+    *,
+    seed: int = 0,
+    speed_reference: SpeedReference | None = None,
+    weights: Array | None = None,
+    speed_tracks: int | None = None,
+    chart: bool = True,
+    grains: Grains | None = None,
+) -> CameraSite:
+    """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
+
+    A map that grows is learned anew of all tracks that are known to be of the prior pose, older
+    ones by less weight; how people walk there stays what the reference said, as an anchor.
+
+    Args:
+        tracks: of the reference, or of all that a map grows by, in the order of their ends.
+        intrinsics: of the camera.
+        prior: where it stood.
+        walk: how fast people are taken to walk before any are seen.
+        seed: of all that is drawn.
+        speed_reference: how people walk, where that was learned before: then it is not learned
+            again.
+        weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
+        speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
+        chart: whether the chart is wanted: it takes as long as all the rest.
+        grains: of the map that grows, which are kept for some hours.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step, and how people walk is not known.
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    check_in_time(tracks)
+    if speed_reference is None:
+        first = tracks if speed_tracks is None else _first(tracks, speed_tracks)
+        speed_reference = learn_speed_reference(first, prior, walk, seed)
+    site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
+    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, grains)
+    if folds is None:
+        return site
+    return replace(
+        site,
+        flow=learn_flow(tracks, intrinsics, prior, seed, weights, folds),
+        chart=learn_chart(tracks, prior, speed_reference, folds, seed) if chart else None,
+    )
+
+
+def assume_site(
+    tracks: Observations,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    walk: WalkConfig = _USUAL_WALK,
+) -> CameraSite:
+    """A site of which nothing is known yet but an assumed walking speed.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step.
+    """
+    speed_reference = assumed_speed_reference(tracks, prior, walk)
+    return CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
+
+
+def _first(tracks: Observations, count: int) -> Observations:
+    return of_tracks(tracks, np.arange(min(count, tracks.tracks)))

@@ -1,0 +1,141 @@
+"""What the joint estimator reads of tracks, as values: steps of walkers, tops of their boxes.
+
+Nothing here depends on the pose.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from models.errors import ShapeError
+from models.geometry.rotation import Array, Mask
+from models.tracks.exposure import Moments
+from models.tracks.head_foot import Uprights
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """Whose each of M rows is; the rows of a track stand together, in time order.
+
+    `owner_idx` (M,) is the track, `linked` (M,) says that a row follows the one before it without
+    a gap, `time_s` (M,) is when it was and `when` (M,) how long after the middle of its track's
+    rows, in units of 10 s. `owners` is the number of tracks, with and without rows.
+    """
+
+    owner_idx: npt.NDArray[np.int64]
+    linked: Mask
+    time_s: Array
+    when: Array
+    owners: int
+
+    def __len__(self) -> int:
+        return int(self.owner_idx.size)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """Pieces of walks about 1.5 s long: rays to both ends (M, 3), z = 1, and seconds (M,).
+
+    The ends lie along the longer chord around a step, in the image, as far apart as the step
+    went along it: what noise adds sideways is not walked. Left in, its share in a speed would
+    depend on the pose, and poses that hide noise would be taken for likely ones. `noisy_end_rays`
+    (M, 3) are the far ends if the chord is turned by one standard deviation of its own noise.
+    """
+
+    start_rays: Array
+    end_rays: Array
+    noisy_end_rays: Array
+    seconds: Array
+    rows: Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tops:
+    """Boxes: rays of the feet (M, 3), z = 1, and the undistorted y (M,) of the upper edges."""
+
+    foot_rays: Array
+    top_y: Array
+    rows: Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observations:
+    """All that is read of a set of tracks, and when each of them ended (tracks,).
+
+    `uprights` are of heads, `moments` of doors; None where nobody looked for any.
+    """
+
+    steps: Steps
+    tops: Tops
+    ended_s: Array
+    tracks: int
+    uprights: Uprights | None = None
+    moments: Moments | None = None
+
+    @property
+    def walkers(self) -> int:
+        """How many tracks have at least one step."""
+        return int(np.unique(self.steps.rows.owner_idx).size)
+
+
+def check_in_time(observations: Observations) -> None:
+    """Refuse tracks that are not in the order of their ends: what came after what counts here.
+
+    Raises:
+        ShapeError: a track that ended before the one before it.
+    """
+    early = np.flatnonzero(np.diff(observations.ended_s) < 0)
+    if early.size:
+        track = int(early[0]) + 1
+        before_s = float(observations.ended_s[track - 1] - observations.ended_s[track])
+        raise ShapeError(
+            f"tracks: must be in the order of their ends, got one at {track} that ended "
+            f"{before_s:g} s before the one at {track - 1}"
+        )
+
+
+def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Observations:
+    """The observations of some tracks only, given by ascending indices."""
+    renumber = np.full(observations.tracks, -1)
+    renumber[chosen] = np.arange(chosen.size)
+    tops = observations.tops
+    steps = steps_where(observations.steps, renumber[observations.steps.rows.owner_idx] >= 0)
+    every = np.ones(len(steps.rows), dtype=bool)
+    kept_tops = renumber[tops.rows.owner_idx] >= 0
+    return Observations(
+        steps=replace(steps, rows=_kept(steps.rows, every, renumber, chosen.size)),
+        tops=Tops(
+            foot_rays=tops.foot_rays[kept_tops],
+            top_y=tops.top_y[kept_tops],
+            rows=_kept(tops.rows, kept_tops, renumber, chosen.size),
+        ),
+        ended_s=observations.ended_s[chosen],
+        tracks=int(chosen.size),
+        uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
+        moments=None if observations.moments is None else observations.moments.of_tracks(chosen),
+    )
+
+
+def steps_where(steps: Steps, kept: Mask) -> Steps:
+    """Some of the steps; one whose step before it is not among them is linked to none."""
+    rows = steps.rows
+    linked = rows.linked.copy()
+    linked[1:] &= kept[:-1]
+    return Steps(
+        start_rays=steps.start_rays[kept],
+        end_rays=steps.end_rays[kept],
+        noisy_end_rays=steps.noisy_end_rays[kept],
+        seconds=steps.seconds[kept],
+        rows=_kept(replace(rows, linked=linked), kept, np.arange(rows.owners), rows.owners),
+    )
+
+
+def _kept(rows: Rows, kept: Mask, renumber: npt.NDArray[np.int64], owners: int) -> Rows:
+    return Rows(
+        owner_idx=renumber[rows.owner_idx[kept]],
+        linked=rows.linked[kept],
+        time_s=rows.time_s[kept],
+        when=rows.when[kept],
+        owners=owners,
+    )

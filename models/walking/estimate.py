@@ -1,0 +1,257 @@
+"""The joint estimate: one pose for all tracks, with a covariance, and what it leaves open.
+
+Ours: covariance = variance inflation * H^-1 + spread of other modes + what is not known of the
+offset; the modes are a mixture, weighed by their posterior at their ends. Heads, where they tell
+verticals, are a second Gaussian on tilt and roll.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.geometry.plane_parameters import (
+    PLANE_PARAMETERS,
+    PlaneEstimate,
+    identifiable_of,
+    plane_parameters_of,
+)
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
+from models.geometry.rotation import Array
+from models.reasons import Reason, TracksCode, Value
+from models.tracks.observations import Observations, of_tracks
+from models.walking.fit import Channel, Fit, Near, fit_pose
+from models.walking.groups import count_walking_groups
+from models.walking.heads.estimate import VerticalEstimate, joined, vertical_estimate
+from models.walking.speed_reference import (
+    PLAUSIBLE_OFFSET,
+    SpeedReference,
+    channels_of,
+    pose_prior,
+)
+from models.walking.starts import starts
+
+_STARTS = 2
+_START_TRACKS = 80
+_FEWEST_GROUPS = 5
+_HOPELESS = 12.0  # of that log likelihood, for another end to be named
+_SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointEstimate:
+    """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
+
+    `raw` (3,) is before that. `score` is its log likelihood, over the variance inflation, up to
+    what is the same for the same tracks. `identifiable` names those of tilt, roll, height that the
+    tracks determine; `reason` says what is missing, and is None where they determine all. `walkers`
+    is the number of tracks that were used, `walking_groups` that of people or groups who walked
+    independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other
+    poses (3,) that explain the tracks, if not as well. `verticals` is what their heads say, which
+    is part of `values`, and `by_speeds` what was said without them; None where they tell nothing.
+    `means` are the coefficients of the fields there.
+    """
+
+    values: Array
+    covariance: Array
+    raw: Array
+    bound: Array
+    score: float
+    walkers: int
+    walking_groups: int
+    identifiable: tuple[str, ...]
+    reason: Reason | None
+    others: tuple[Array, ...] = ()
+    verticals: VerticalEstimate | None = None
+    by_speeds: PlaneEstimate | None = None
+    means: tuple[Array, ...] = ()
+
+    @property
+    def near(self) -> Near:
+        """Where a fit of almost the same tracks may begin."""
+        return Near(raw=self.raw, means=self.means)
+
+    @property
+    def raw_parameters(self) -> PoseParameters:
+        """What `raw` is, named; it knows no heading."""
+        return PoseParameters.of_array(self.raw)
+
+    @property
+    def ends(self) -> tuple[Array, ...]:
+        """Where the search ended (3,) that explains the tracks, the best first; as `raw`."""
+        offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
+        return self.raw, *(other + offset for other in self.others)
+
+    def beside_strangers(self) -> tuple[Array, Array]:
+        """Values (3,) and covariance (3, 3) of people who are not the reference's.
+
+        How fast they walk where is known no better than at any other site; they stand as upright.
+        """
+        if self.verticals is None or self.by_speeds is None:
+            return self.values, self.covariance + np.diag(PLAUSIBLE_OFFSET**2)
+        wide = self.by_speeds.covariance + np.diag(PLAUSIBLE_OFFSET**2)
+        return joined(self.by_speeds.values, wide, self.verticals)
+
+
+def joint_estimate(
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    near: Sequence[Array] = (),
+    means: Sequence[Array] = (),
+) -> JointEstimate:
+    """The pose that explains all tracks best, whatever it was before.
+
+    Where it is known to be `near` one of the `ends` (3,) of an estimate of almost the same tracks,
+    with about its `means`, no other poses are looked at, and this one roughly.
+    """
+    channels = channels_of(observations, reference, prior)
+    hold = pose_prior(prior)
+    if not near:
+        few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
+        begin = starts(few, plane_parameters_of(prior), _STARTS)
+        first = _distinct([fit_pose(few, start, hold) for start in begin])
+        ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
+    else:
+        ends = _distinct([fit_pose(channels, start, hold, means, roughly=True) for start in near])
+    verticals = vertical_estimate(observations.uprights, reference.verticals)
+    return _said_of(observations, channels, ends, reference, verticals)
+
+
+def joint_near(
+    observations: Observations,
+    prior: CameraPose,
+    reference: SpeedReference,
+    candidate: Array,
+    joint: JointEstimate | None = None,
+    near: Near | None = None,
+) -> JointEstimate:
+    """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
+
+    How fast people are where, and which way, is another question once a camera has been panned.
+    What their heads say, the joint estimate's `verticals`, is not. Where it is known what almost
+    the same tracks said, it is looked for `near` that, roughly.
+    """
+    verticals, means = (None, ()) if joint is None else (joint.verticals, joint.means)
+    start = candidate[:3] + reference.offset
+    if near is not None:
+        start, means = near.raw, near.means
+    turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
+    channels = channels_of(observations, reference, turned)
+    fit = fit_pose(channels, start, pose_prior(prior), means, roughly=near is not None)
+    return _said_of(observations, channels, [fit], reference, verticals)
+
+
+def _said_of(
+    observations: Observations,
+    channels: Sequence[Channel],
+    ends: list[Fit],
+    reference: SpeedReference,
+    verticals: VerticalEstimate | None,
+) -> JointEstimate:
+    """What is said of the ends of fits, the best first, and of heads."""
+    if verticals is not None and not verticals.identifiable:
+        verticals = None
+    if verticals is not None:
+        ends = _by_heads(ends, verticals, reference)
+    best = ends[0]
+    covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
+    walking_groups = count_walking_groups(
+        channels[0].measure(candidate=best.candidate, sloped=False)
+    )
+    # One walking group is one draw of pace and pauses, however many tracks it has.
+    covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
+    values = best.candidate - reference.offset
+    covariance = covariance + reference.offset_covariance
+    by_speeds = None
+    if verticals is not None:
+        by_speeds = PlaneEstimate(values=values, covariance=covariance, tracks=observations.walkers)
+        values, covariance = joined(values, covariance, verticals)
+    sd = np.sqrt(np.diag(covariance))
+    identifiable = identifiable_of(PLANE_PARAMETERS, sd)
+    reason = _reason(identifiable, sd, covariance)
+    if walking_groups < _FEWEST_GROUPS:
+        identifiable = ()
+        reason = Reason(
+            code=TracksCode.TOO_FEW_GROUPS,
+            values={
+                "tracks": observations.walkers,
+                "parties": int(walking_groups),
+                "least_parties": _FEWEST_GROUPS,
+            },
+        )
+    return JointEstimate(
+        values=values,
+        covariance=covariance,
+        raw=best.candidate,
+        bound=best.bound,
+        score=best.score / reference.pose_variance_inflation,
+        walkers=observations.walkers,
+        walking_groups=walking_groups,
+        identifiable=identifiable,
+        reason=reason,
+        others=tuple(
+            end.candidate - reference.offset
+            for end in ends[1:]
+            if end.score > best.score - _HOPELESS * reference.pose_variance_inflation
+        ),
+        verticals=verticals,
+        by_speeds=by_speeds,
+        means=best.means,
+    )
+
+
+def _by_heads(ends: list[Fit], verticals: VerticalEstimate, reference: SpeedReference) -> list[Fit]:
+    """Ends whose scores have in them how likely the heads are there, the best first."""
+    inflation = reference.pose_variance_inflation
+    scored = []
+    for end in ends:
+        values = (end.candidate - reference.offset)[:2]
+        covariance = (end.covariance * inflation + reference.offset_covariance)[:2, :2]
+        likely = verticals.log_density(values, covariance)
+        scored.append(replace(end, score=end.score + inflation * likely))
+    return sorted(scored, key=lambda end: -end.score)
+
+
+def _some(observations: Observations) -> np.ndarray:
+    """Ascending indices of tracks, evenly spaced, enough for a start."""
+    walkers = np.unique(observations.steps.rows.owner_idx)
+    places = np.linspace(0, walkers.size - 1, min(_START_TRACKS, walkers.size)).astype(np.int64)
+    return np.asarray(walkers[places])
+
+
+def _distinct(ends: list[Fit]) -> list[Fit]:
+    """Ends that are not about the same pose, the best first."""
+    distinct: list[Fit] = []
+    for end in sorted(ends, key=lambda end: -end.score):
+        if all((np.abs(end.candidate - d.candidate) > _SAME_END).any() for d in distinct):
+            distinct.append(end)
+    return distinct
+
+
+def _elsewhere(ends: list[Fit], reference: SpeedReference) -> Array:
+    """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
+    best = ends[0]
+    odds = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
+    odds = odds / odds.sum()
+    apart = np.array([end.candidate - best.candidate for end in ends])
+    return np.asarray((apart * odds[:, None]).T @ apart)
+
+
+def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
+    """What is not identifiable; `alike` names two parameters that make up for one another."""
+    missing = [name for name in PLANE_PARAMETERS if name not in identifiable]
+    if not missing:
+        return None
+    said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
+    values: dict[str, Value] = {
+        said[name]: float(sd[PLANE_PARAMETERS.index(name)]) for name in missing
+    }
+    together = covariance / np.outer(sd, sd)
+    pairs = [(0, 2), (1, 2), (0, 1)]
+    first, second = max(pairs, key=lambda pair: abs(together[pair]))
+    if abs(together[first, second]) > 0.9:
+        values["alike"] = [PLANE_PARAMETERS[first], PLANE_PARAMETERS[second]]
+    return Reason(code=TracksCode.UNIDENTIFIABLE, values=values)

@@ -1,0 +1,76 @@
+"""How far people lean to the side at a candidate tilt and roll, with derivatives.
+
+A foot's ray f and its head's ray h span a plane through the camera, of normal n. An upright pole
+lies in a plane with the vertical g, so n' g = 0 there; else n' g is the angle by which what stands
+between f and h leans out of that plane, whatever its height and however far away it is.
+
+Source: Hartley and Zisserman 2004, Multiple View Geometry, section 8.6, for the images of verticals
+and their vanishing point; that the product is the lean itself is ours.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.geometry.ground import ground_of_rays
+from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.rotation import Array, Mask
+from models.geometry.vectors import aside_of, dot, norm
+from models.tracks.head_foot import Uprights
+
+_LEAST_SPAN = 1e-9  # of the product of two rays that are one
+_LEAST_WAY = 0.02  # of camera heights: who goes no farther stands
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leans:
+    """Leans (M,) at one candidate, radians, positive to the right in the picture.
+
+    `jacobian` (M, 2) are derivatives by tilt and roll; `column` (M,) what the leans would be were
+    the heads right above the feet in the picture; `sideways` (M,) how much of their way the people
+    walk to the right, -1 to 1, 0 for those who stand. `valid` (M,): foot and head span a plane, and
+    the foot is below the horizon; what is not is 0.
+    """
+
+    value: Array
+    jacobian: Array
+    column: Array
+    sideways: Array
+    valid: Mask
+
+
+def measure_leans(uprights: Uprights, angles: Array) -> Leans:
+    """The leans of people were the camera's tilt and roll (2,) those given."""
+    rotation, turns = rotation_and_turns(float(angles[0]), float(angles[1]), 0.0)
+    up = rotation[:, 2]
+    normals, spanned = _normals(uprights.foot_rays, uprights.head_rays)
+    columns, column_spanned = _normals(uprights.foot_rays, uprights.column_rays)
+    foot, falls = ground_of_rays(uprights.foot_rays, rotation, beyond=0.0)
+    valid = spanned & column_spanned & falls
+    turned = np.stack([rotation @ turn[:, 2] for turn in turns], axis=1)
+    return Leans(
+        value=np.where(valid, -normals @ up, 0.0),
+        jacobian=np.where(valid[:, None], -normals @ turned, 0.0),
+        column=np.where(valid, -columns @ up, 0.0),
+        sideways=np.where(valid, _sideways(uprights, rotation, foot), 0.0),
+        valid=valid,
+    )
+
+
+def _normals(feet: Array, heads: Array) -> tuple[Array, Mask]:
+    """Unit normals (M, 3) of the planes through rays, 0 where these are one, and where they are."""
+    product = np.cross(feet, heads)
+    length = norm(product)
+    spanned = length > _LEAST_SPAN
+    return product / np.where(spanned, length, np.inf)[:, None], spanned
+
+
+def _sideways(uprights: Uprights, rotation: Array, foot: Array) -> Array:
+    """How much of their ways (M,) on the ground lies to the right of the view of their feet."""
+    start, start_falls = ground_of_rays(uprights.from_rays, rotation, beyond=0.0)
+    end, end_falls = ground_of_rays(uprights.to_rays, rotation, beyond=0.0)
+    way = np.where((start_falls & end_falls)[:, None], end - start, 0.0)
+    length = norm(way)
+    right = -aside_of(foot)
+    across = dot(way, right) / np.maximum(length * norm(right), 1e-12)
+    return np.asarray(np.where(length > _LEAST_WAY, across, 0.0))

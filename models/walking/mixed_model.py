@@ -1,0 +1,226 @@
+"""A robust linear mixed model of logarithms, fitted by iterated re-weighting (IRLS) and EM.
+
+Row j of track i, at a time w after the track's middle, is y_ij = x_ij' beta + a_i + b_i w_ij +
+e_ij: the site's field, the track's own level and trend, and a deviation. a_i is Student-t between
+tracks, b_i Gaussian, e_ij Student-t within a track and a first-order autoregression. Rows that
+belong to something else (standing, sitting, a tracker's mistake) are outliers: a broad Gaussian of
+y itself, of which each track has a share of its own. Given the weights of rows and tracks it is a
+Gaussian mixed model, whose a_i and b_i are integrated out.
+
+Source: Laird and Ware 1982 for the mixed model and its EM; Lange, Little and Taylor 1989 for the
+Student-t's weights, (nu + 1) / (nu + u^2), at 4 degrees of freedom; the outliers are the mixture of
+Aitkin and Tunnicliffe Wilson 1980. Ours are weights by the predicted a_i, without its variance, the
+tracks' own shares, and a correlation by moments.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.geometry.rotation import Array, Mask
+from models.serialization import stored_as
+from models.tracks.observations import Rows
+from models.walking.loops.sums import moments_of_tracks, whitened
+from models.walking.loops.weights import (
+    FREEDOM,
+    log_likelihoods_apart,
+    weights_of_tracks,
+)
+
+# The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
+# average, say 1. Source: Lange, Little and Taylor 1989.
+FISHER = (FREEDOM + 3) / (FREEDOM + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """How logarithms scatter at a site.
+
+    `between_sd` of the levels of tracks, `trend_sd` of their trends in 10 s, `within_sd` of
+    deviations, `correlation` from one row to the next; the outliers' share, and their mean and
+    spread (of the value, not the residual).
+    """
+
+    between_sd: float
+    trend_sd: float
+    within_sd: float
+    correlation: float
+    outlier_share: float = stored_as("other_share")
+    outlier_mean: float = stored_as("other_mean")
+    outlier_sd: float = stored_as("other_sd")
+
+    @property
+    def of_tracks(self) -> tuple[float, float, float, float]:
+        """Standard deviations between tracks, of trends, within tracks, and the correlation."""
+        return (
+            float(self.between_sd),
+            float(self.trend_sd),
+            float(self.within_sd),
+            float(self.correlation),
+        )
+
+    @property
+    def of_outliers(self) -> tuple[float, float, float]:
+        """The outliers' share, mean and standard deviation."""
+        return float(self.outlier_share), float(self.outlier_mean), float(self.outlier_sd)
+
+    @property
+    def total_sd(self) -> float:
+        """Of one row of an unknown track."""
+        return float(np.hypot(self.between_sd, self.within_sd))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """What re-weighting found: rows (M,) and tracks (N,).
+
+    `inlier` (M,) is the probability of a row to be no outlier; `own` (N, 2) level and trend of
+    each track with their covariance `own_covariance` (N, 2, 2).
+    """
+
+    row: Array
+    track: Array
+    inlier: Array
+    own: Array
+    own_covariance: Array
+
+    def deviation(self, residual: Array, rows: Rows) -> Array:
+        """Residuals (M,) without their track's own level and trend."""
+        own = self.own[rows.owner_idx]
+        return np.asarray(residual - own[:, 0] - own[:, 1] * rows.when)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curvature:
+    """Half the second and the first derivatives of a misfit: matrix (P, P), gradient (P,).
+
+    The tracks' own levels and trends are integrated out.
+    """
+
+    matrix: Array
+    gradient: Array
+
+
+def reweigh(
+    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread, rounds: int = 3
+) -> Weights:
+    """Weights at given residuals (M,); rows that are not valid count for nothing."""
+    row, track, inlier, own, own_covariance = weights_of_tracks(
+        residual,
+        value,
+        valid,
+        rows.owner_idx,
+        rows.when,
+        rows.owners,
+        spread.of_tracks,
+        spread.of_outliers,
+        rounds,
+    )
+    return Weights(row=row, track=track, inlier=inlier, own=own, own_covariance=own_covariance)
+
+
+def curvature(
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> Curvature:
+    """Gauss-Newton sums over all tracks for residuals (M,) with derivatives (M, P)."""
+    white, lost = _whitened(jacobian, residual, weights, rows, spread)
+    lost = lost.reshape(-1, white.shape[1])
+    moment = white.T @ white - lost.T @ lost
+    return Curvature(matrix=moment[:-1, :-1], gradient=moment[:-1, -1])
+
+
+def track_curvatures(
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> Curvature:
+    """The same for each track by itself: matrix (N, P, P), gradient (N, P); for a small P."""
+    white, lost = _whitened(jacobian, residual, weights, rows, spread)
+    moment = moments_of_tracks(white, lost, rows.owner_idx)
+    return Curvature(matrix=moment[:, :-1, :-1], gradient=moment[:, :-1, -1])
+
+
+def _whitened(
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> tuple[Array, Array]:
+    return whitened(
+        np.ascontiguousarray(jacobian),
+        residual,
+        weights.row,
+        weights.track,
+        rows.owner_idx,
+        rows.linked,
+        rows.when,
+        spread.of_tracks,
+    )
+
+
+def composite_log_likelihoods(
+    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread
+) -> Array:
+    """The composite log likelihood (N,) of each track, by its rows apart; long ones are as short.
+
+    For comparing candidates far apart; a row above the horizon counts as all but impossible.
+    Source: Varin, Reid and Firth 2011, an independence likelihood; its weights are ours.
+    """
+    return log_likelihoods_apart(
+        residual, value, valid, rows.owner_idx, rows.owners, spread.total_sd, spread.of_outliers
+    )
+
+
+def hierarchical_log_likelihood(
+    residual: Array, weights: Weights, rows: Rows, spread: Spread
+) -> float:
+    """The h-likelihood (Lee and Nelder 1996), but for what the spread alone decides."""
+    half = (FREEDOM + 1) / 2
+    scaled = weights.deviation(residual, rows) / spread.within_sd
+    within = (weights.inlier * np.log1p(scaled**2 / FREEDOM)).sum()
+    # Correlated rows count as fewer.
+    within *= (1 - spread.correlation) / (1 + spread.correlation)
+    level, trend = weights.own.T
+    between = np.log1p((level / spread.between_sd) ** 2 / FREEDOM).sum()
+    return float(-half * (within + between) - 0.5 * ((trend / spread.trend_sd) ** 2).sum())
+
+
+def relearn(
+    residual: Array, value: Array, valid: Mask, rows: Rows, weights: Weights, spread: Spread
+) -> Spread:
+    """The spread that explains residuals best, given the weights: a step of EM."""
+    inlier_rows = np.bincount(rows.owner_idx, weights.inlier, rows.owners)
+    seen = inlier_rows > 1.5
+    if seen.sum() < 3:
+        return spread
+    own = weights.own[seen] ** 2 + np.diagonal(weights.own_covariance[seen], axis1=1, axis2=2)
+    between, trend = weights.track[seen] * own[:, 0], own[:, 1]
+    deviation = weights.deviation(residual, rows)
+    inlier = float(weights.inlier[valid].sum())
+    freedom = max(0.3, 1 - float(seen.sum()) / max(inlier, 1.0))
+    within = float((weights.row * deviation**2)[valid].sum()) / max(inlier, 1.0) / freedom
+    correlation = _correlation(deviation, weights.row, valid, rows, inlier / float(seen.sum()))
+    outlier_mean, outlier_sd = spread.outlier_mean, spread.outlier_sd
+    outlier = (1 - weights.inlier)[valid]
+    if outlier.sum() > 20:
+        outlier_mean = float((outlier * value[valid]).sum() / outlier.sum())
+        outlier_square = (outlier * (value[valid] - outlier_mean) ** 2).sum() / outlier.sum()
+        outlier_sd = float(np.sqrt(outlier_square))
+    return Spread(
+        between_sd=float(np.clip(np.sqrt(between.mean()), 0.02, 0.5)),
+        trend_sd=float(np.clip(np.sqrt(trend.mean()), 0.005, 0.3)),
+        within_sd=float(np.clip(np.sqrt(within), 0.01, 0.5)),
+        correlation=correlation,
+        outlier_share=float(np.clip((1 - weights.inlier)[valid].mean(), 0.02, 0.8)),
+        outlier_mean=float(np.clip(outlier_mean, -3.0, 1.0)),
+        outlier_sd=float(np.clip(outlier_sd, 0.3, 1.5)),
+    )
+
+
+def _correlation(
+    deviation: Array, weight: Array, valid: Mask, rows: Rows, usual_length: float
+) -> float:
+    later = np.flatnonzero(rows.linked & valid & np.roll(valid, 1))
+    shared = np.sqrt(weight[later] * weight[later - 1])
+    product = (shared * deviation[later] * deviation[later - 1]).sum()
+    power = 0.5 * (shared * (deviation[later] ** 2 + deviation[later - 1] ** 2)).sum()
+    if power <= 0:
+        return 0.0
+    raw = float(product / power)
+    # Taking a track's own mean off makes its rows look less alike than they are.
+    return float(np.clip(raw + 0.5 * (1 + 3 * raw) / max(usual_length, 2.0), 0.0, 0.8))

@@ -1,0 +1,290 @@
+"""Open, update and end alerts; one is open for a camera and kind, or for a group."""
+
+import secrets
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.access.activity import note as note_activity
+from service.alerts.groups import group_with
+from service.enums import (
+    Activity,
+    AlertActivity,
+    AlertKind,
+    AlertSource,
+    AlertState,
+    EventType,
+    MessageType,
+    Outcome,
+    Severity,
+)
+from service.errors import ConflictError, NotFoundError
+from service.formats.degrees import in_degrees
+from service.notifications.outbox import json_time, queue_alert
+from service.reasons import Reasons
+from service.settings import Settings
+from service.store import alerts, maintenance
+from service.store.alerts import AlertFilter
+from service.store.operation import activity, events
+from service.store.tables.activity import ActivityRecord
+from service.store.tables.alerts import AlertRecord
+from service.store.tracks import tracks
+
+_KEPT_AS = {
+    AlertActivity.OPENED: Activity.ALERT_OPENED,
+    AlertActivity.ESCALATED: Activity.ALERT_ESCALATED,
+    AlertActivity.ACKNOWLEDGED: Activity.ALERT_ACKNOWLEDGED,
+    AlertActivity.SILENCED: Activity.ALERT_SILENCED,
+    AlertActivity.SILENCE_ENDED: Activity.ALERT_SILENCE_ENDED,
+    AlertActivity.RESOLVED: Activity.ALERT_RESOLVED,
+}
+# What messages say of an activity; that an alert grew is told with what made it grow.
+_NOTIFIED_AS = {
+    AlertActivity.OPENED: MessageType.ALERT_OPENED,
+    AlertActivity.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
+    AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
+    AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
+    AlertActivity.RESOLVED: MessageType.ALERT_RESOLVED,
+}
+
+
+def open_alert(
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    kind: AlertKind,
+    severity: Severity,
+    drift: dict[str, Any],
+    changed_at: datetime | None,
+    *,
+    reasons: Reasons,
+    source: AlertSource = AlertSource.ESTIMATE,
+) -> AlertRecord | None:
+    """Open an alert, or bring the open one up to date; None where somebody is at the camera.
+
+    What a reference doubts does not overwrite what estimates have found; they take over its alert.
+    """
+    now = datetime.now(UTC)
+    attended = maintenance.under_way(session, camera_id, now) is not None
+    if attended and kind not in alerts.SERVICE_KINDS:
+        return None  # an open one stays as it was told, so that what is news later is told then
+    record = alerts.firing(session, camera_id, kind)
+    if record is not None:
+        if source == AlertSource.REFERENCE:
+            return record
+        change: MessageType | None = None
+        if record.severity != severity or record.source != source:
+            change = MessageType.ALERT_UPDATED
+        if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
+            _keep_activity(session, record, AlertActivity.ESCALATED, None)
+        record.drift, record.severity, record.updated_at = drift, severity, now
+        record.reasons, record.source = reasons, source
+        record.changed_at = changed_at or record.changed_at
+    else:
+        change = MessageType.ALERT_OPENED
+        record = AlertRecord(
+            id=secrets.token_hex(16),
+            camera_id=camera_id,
+            track_source=tracks.newest_source(session, camera_id),
+            kind=kind,
+            state=AlertState.FIRING,
+            source=source,
+            severity=severity,
+            reasons=reasons,
+            drift=drift,
+            notified=False,
+            opened_at=now,
+            changed_at=changed_at,
+            updated_at=now,
+        )
+        session.add(record)
+        session.flush()
+        _keep_activity(session, record, AlertActivity.OPENED, None)
+    group = group_with(session, settings, record)
+    if group is not None:
+        _keep_activity(session, group, AlertActivity.OPENED, None)
+        _tell(session, group, MessageType.ALERT_OPENED)
+    if change is not None:
+        _tell(session, record, change)
+    return record
+
+
+def fired_by_estimate(session: Session, camera_id: str) -> set[AlertKind]:
+    """The kinds of a camera's open alerts that its estimates stand behind."""
+    found = (alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
+    return {record.kind for record in found if record and record.source == AlertSource.ESTIMATE}
+
+
+def end_alert(
+    session: Session, camera_id: str, kind: AlertKind, outcome: Outcome, note: str | None = None
+) -> None:
+    """End the open alert of a camera and kind, if there is one."""
+    record = alerts.firing(session, camera_id, kind)
+    if record is not None:
+        _end(session, record, outcome, note, None)
+
+
+def close_pose_alerts(
+    session: Session, camera_id: str, outcome: Outcome, by: str | None, note: str | None = None
+) -> None:
+    """End the open alerts that measure a camera against its prior pose, if there are any."""
+    for kind in alerts.POSE_KINDS:
+        record = alerts.firing(session, camera_id, kind)
+        if record is not None:
+            _end(session, record, outcome, note, by)
+
+
+def close_alert(
+    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
+) -> None:
+    """End an open alert with what a person says came of it."""
+    _end(session, record, outcome, note, by)
+
+
+def end_empty_groups(session: Session) -> None:
+    """End groups whose members are gone with their cameras."""
+    for group in alerts.groups_without_members(session):
+        _end(session, group, Outcome.CLEARED, None, None)
+
+
+def list_alerts(session: Session, wanted: AlertFilter, limit: int) -> Sequence[AlertRecord]:
+    """Alerts, newest first."""
+    return alerts.listed(session, wanted, datetime.now(UTC), limit)
+
+
+def show_alert(session: Session, alert_id: str) -> AlertRecord:
+    """An alert.
+
+    Raises:
+        NotFoundError: there is none of that id.
+    """
+    record = alerts.find(session, alert_id)
+    if record is None:
+        raise NotFoundError(f"alert_id: there is no alert {alert_id!r}")
+    return record
+
+
+def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
+    """What was done with an alert since it opened, oldest first."""
+    entries = activity.of_subject(session, alert_id)
+    return [entry for entry in entries if entry.what != Activity.ALERT_OPENED]
+
+
+def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
+    """Note who has seen an alert; the first one stays.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved.
+    """
+    record = require_firing(session, alert_id)
+    if record.acknowledged_at is None:
+        record.acknowledged_by = by or "someone"
+        record.acknowledged_at = datetime.now(UTC)
+        note_on_alert(session, record, AlertActivity.ACKNOWLEDGED, record.acknowledged_by)
+    return record
+
+
+def require_firing(session: Session, alert_id: str) -> AlertRecord:
+    """An open alert.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved.
+    """
+    record = show_alert(session, alert_id)
+    if record.state != AlertState.FIRING:
+        raise ConflictError(f"state: only a firing alert takes this, it is {record.state}")
+    return record
+
+
+def note_on_alert(
+    session: Session,
+    record: AlertRecord,
+    what: AlertActivity,
+    by: str | None,
+    *,
+    until: datetime | None = None,
+    note: str | None = None,
+) -> None:
+    """Keep what was done with an open alert, and tell of it."""
+    record.updated_at = datetime.now(UTC)
+    _keep_activity(session, record, what, by, until=until, note=note)
+    _tell(session, record, _NOTIFIED_AS[what])
+
+
+def _end(
+    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
+) -> None:
+    now = datetime.now(UTC)
+    record.state, record.outcome = AlertState.RESOLVED, outcome
+    record.note, record.resolved_by = note, by
+    record.resolved_at = record.updated_at = now
+    _keep_activity(session, record, AlertActivity.RESOLVED, by, outcome=outcome, note=note)
+    session.flush()
+    _tell(session, record, MessageType.ALERT_RESOLVED)
+    group = None if record.group_id is None else alerts.find(session, record.group_id)
+    over = group is not None and not alerts.firing_members(session, group.id)
+    if group is not None and group.state == AlertState.FIRING and over:
+        _end(session, group, outcome, note, by)
+
+
+def _keep_activity(
+    session: Session,
+    record: AlertRecord,
+    what: AlertActivity,
+    by: str | None,
+    *,
+    until: datetime | None = None,
+    outcome: Outcome | None = None,
+    note: str | None = None,
+) -> None:
+    note_activity(
+        session,
+        _KEPT_AS[what],
+        by=by,
+        camera_id=record.camera_id,
+        subject_id=record.id,
+        kind=record.kind,
+        until=until,
+        outcome=outcome,
+        text=note,
+        details={
+            "severity": record.severity,
+            "reason": record.reason,
+            "reason_code": record.reason_code,
+        },
+    )
+
+
+def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
+    """Tell of a change to an alert."""
+    # A group speaks for its members; the end of one that was told by itself is told so, too.
+    if record.group_id is not None and not (
+        record.notified and record.state == AlertState.RESOLVED
+    ):
+        return
+    record.notified = True
+    payload = {
+        "id": record.id,
+        "camera_id": record.camera_id,
+        "kind": record.kind,
+        "state": record.state,
+        "severity": record.severity,
+        "reason": record.reason,
+        "reason_code": record.reason_code,
+        "reason_values": record.reason_values,
+        "drift": in_degrees(record.drift),
+        "outcome": record.outcome,
+        "acknowledged_by": record.acknowledged_by,
+        "silenced_until": record.silenced_until and json_time(record.silenced_until),
+        "silence_reason": record.silence_reason,
+        "silenced_by": record.silenced_by,
+        "track_source": record.track_source,
+        "camera_ids": record.camera_ids,
+        "group_id": record.group_id,
+    }
+    events.add(session, EventType.ALERT, payload, datetime.now(UTC))
+    queue_alert(session, record, message)

@@ -1,0 +1,112 @@
+"""Many cameras of one tracker that move together: one alert that blames the tracker."""
+
+import math
+import secrets
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from models.reasons import Reason
+from service.enums import AlertKind, AlertSource, AlertState, Severity
+from service.reasons import ServiceCode
+from service.settings import Settings
+from service.store import alerts
+from service.store.database.store import also_about
+from service.store.tables.alerts import AlertRecord
+from service.store.tracks import tracks
+
+# What a group is called, and which alerts of cameras can have its cause.
+_CAUSES = {
+    AlertKind.CLOCK: (AlertKind.DRIFT, AlertKind.CLOCK),
+    AlertKind.NO_DATA: (AlertKind.NO_DATA,),
+}
+_FED_WITHIN = timedelta(days=1)  # a camera without tracks for longer is no longer fed by its source
+
+
+def group_with(session: Session, settings: Settings, record: AlertRecord) -> AlertRecord | None:
+    """Put a camera's open alert into the group that it belongs to; returns one that has to be told.
+
+    Cameras of one source whose alerts begin within `group_within_s` of each other are taken
+    together once they are `group_cameras` or more, and at least `group_share` of all that get
+    tracks of that source. Whoever comes later joins without a word.
+    """
+    kind = next((kind for kind, kinds in _CAUSES.items() if record.kind in kinds), None)
+    if kind is None or record.track_source is None or record.group_id is not None:
+        return None
+    source = record.track_source
+    also_about(session, f"source/{source}")  # cameras that move at the same moment see each other
+    together = _together(
+        alerts.firing_of_source(session, source, _CAUSES[kind]), record, settings.group_within_s
+    )
+    group = alerts.firing_group(session, source, kind)
+    known = group is not None and any(member.group_id == group.id for member in together)
+    if not known and not _enough(session, settings, source, together):
+        return None
+    opened = group is None
+    now = datetime.now(UTC)
+    if group is None:
+        group = AlertRecord(
+            id=secrets.token_hex(16),
+            camera_id=None,
+            camera_ids=[],
+            track_source=source,
+            kind=kind,
+            state=AlertState.FIRING,
+            source=AlertSource.GROUP,
+            severity=Severity.CRITICAL,
+            reasons=(),
+            drift={},
+            notified=False,
+            opened_at=now,
+            changed_at=None,
+            updated_at=now,
+        )
+        session.add(group)
+        session.flush()
+    for member in together:
+        member.group_id = group.id
+    members = {str(member.camera_id) for member in together}
+    group.camera_ids = sorted({*(group.camera_ids or []), *members})
+    began = [_began_at(member) for member in together]
+    group.changed_at = min([*began, *([group.changed_at] if group.changed_at else [])])
+    group.updated_at = now
+    group.reasons = (_reason(group),)
+    session.flush()
+    return group if opened else None
+
+
+def _together(
+    found: Sequence[AlertRecord], record: AlertRecord, within_s: float
+) -> list[AlertRecord]:
+    """The most alerts, this one among them, that begin within so long of each other."""
+    at = _began_at(record)
+    span = timedelta(seconds=within_s)
+    best: list[AlertRecord] = []
+    for first in found:
+        begins = _began_at(first)
+        if begins <= at <= begins + span:
+            some = [alert for alert in found if begins <= _began_at(alert) <= begins + span]
+            best = max(best, some, key=len)
+    return best
+
+
+def _enough(
+    session: Session, settings: Settings, source: str, together: Sequence[AlertRecord]
+) -> bool:
+    cameras = {alert.camera_id for alert in together}
+    if len(cameras) < settings.group_cameras:
+        return False
+    fed = tracks.cameras_fed_by(session, source, datetime.now(UTC) - _FED_WITHIN)
+    return len(cameras) >= math.ceil(settings.group_share * len(fed | cameras))
+
+
+def _began_at(record: AlertRecord) -> datetime:
+    return record.changed_at or record.opened_at
+
+
+def _reason(group: AlertRecord) -> Reason:
+    silent = group.kind == AlertKind.NO_DATA
+    code = ServiceCode.FELL_SILENT_TOGETHER if silent else ServiceCode.MOVED_TOGETHER
+    count, source = len(group.camera_ids or []), group.track_source or ""
+    return Reason(code=code, values={"cameras": count, "track_source": source})

@@ -1,0 +1,110 @@
+"""Whether each camera's estimate is being made; where it is not, its alert `stale`."""
+
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from models.reasons import Reason, Value
+from service.alerts.alerts import end_alert, open_alert
+from service.enums import AlertActivity, AlertKind, AlertSource, Outcome, Severity
+from service.reasons import ServiceCode
+from service.settings import Settings
+from service.store import alerts, cameras
+from service.store.tables.cameras import CameraRecord
+from service.store.tracks import unseen
+
+# Who closed the alert knows; if nothing is better by then, it is told again.
+_ANSWERED = timedelta(hours=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Waiting:
+    """The oldest track of a camera that nothing has looked at, and since when it is watched."""
+
+    track_pk: int
+    since_s: float
+
+
+class StaleWatch:
+    """Opens and ends the alerts `stale`; how long a track waits is measured here.
+
+    By the monotonic clock, so that neither a clock that was set nor a service that was off for a
+    day makes every camera stale.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, _Waiting] = {}
+
+    def watch(self, session: Session, settings: Settings) -> dict[str, str]:
+        """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
+        now_s = time.monotonic()
+        oldest = unseen.since(session)
+        self._waiting = {
+            camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
+        }
+        firing = alerts.firing_cameras(session, AlertKind.STALE)
+        found: dict[str, str] = {}
+        waits = {camera_id: now_s - each.since_s for camera_id, each in self._waiting.items()}
+        long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}
+        # Of hundreds, twelve times a minute: nothing can be wrong with any other.
+        for camera in cameras.failing(session, besides=firing | long):
+            waits_s = waits.get(camera.id, 0.0)
+            reason = _why_stale(camera, settings, waits_s)
+            if reason is None and camera.id in firing:
+                if camera.estimate_failing_since is None:
+                    end_alert(
+                        session,
+                        camera.id,
+                        AlertKind.STALE,
+                        Outcome.CLEARED,
+                        note="it is looked at again",
+                    )
+                    found[camera.id] = "ended"
+            elif reason is not None and camera.id not in firing and not _answered(session, camera):
+                since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(
+                    seconds=waits_s
+                )
+                open_alert(
+                    session,
+                    settings,
+                    camera.id,
+                    AlertKind.STALE,
+                    Severity.CRITICAL,
+                    {},
+                    since,
+                    reasons=(reason,),
+                    source=AlertSource.UPKEEP,
+                )
+                found[camera.id] = AlertActivity.OPENED
+        return found
+
+    def _watched(self, camera_id: str, track_pk: int, now_s: float) -> _Waiting:
+        known = self._waiting.get(camera_id)
+        if known is not None and known.track_pk == track_pk:
+            return known
+        return _Waiting(track_pk=track_pk, since_s=now_s)
+
+
+def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:
+    """Why a camera's estimate is not what it should be; None where it is."""
+    failed = camera.estimate_tries >= settings.stale_failures
+    # While it is being looked at, it is not due: the last try may be the one that succeeds.
+    if failed and camera.estimate_error is not None and camera.estimate_due_at is not None:
+        values: dict[str, Value] = {
+            "tries": camera.estimate_tries,
+            "error": camera.estimate_error,
+        }
+        return Reason(code=ServiceCode.LOOKS_FAIL, values=values)
+    if waits_s > settings.stale_after_s:
+        waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
+        return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
+    return None
+
+
+def _answered(session: Session, camera: CameraRecord) -> bool:
+    last = alerts.newest(session, camera.id, AlertKind.STALE)
+    if last is None or last.resolved_at is None or last.outcome == Outcome.CLEARED:
+        return False
+    return abs(datetime.now(UTC) - last.resolved_at) < _ANSWERED

@@ -1,0 +1,107 @@
+"""What `/openapi.json` says of errors, for all routes in one place.
+
+FastAPI describes its own 422, which is not what is answered here, and no other error. Which errors
+a route may answer follows from what it takes: a name in the path, a body, a header, a change.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic.json_schema import models_json_schema
+
+from service.api.middleware.scopes import need_of
+from service.api.schemas.problem import Problem
+
+_SCHEME = "token"
+_REF = "#/components/schemas/{model}"
+_MEDIA_TYPE = "application/problem+json"
+_SAFE = frozenset(("get", "head", "options"))
+_OURS_NOT = ("HTTPValidationError", "ValidationError")  # FastAPI's 422
+_WORDS = {
+    304: "What was read before is still so",
+    400: "The body is no text in UTF-8",
+    401: "A token is needed",
+    403: "The token does not allow this, or it is switched off",
+    404: "There is no such thing",
+    409: "It does not fit the state that things are in",
+    412: "If-Match names another version than the stored one",
+    413: "Larger than a stated limit",
+    415: "A content type that is not taken",
+    421: "This service does not go by the name in Host",
+    422: "Malformed; `errors` names each field",
+    428: "If-Match is needed",
+    429: "Too much at once; Retry-After says when to come back",
+    503: "Not now; Retry-After says when to come back",
+    507: "No room left to store it",
+}
+_WITH_RETRY_AFTER = (429, 503)
+
+
+def document_errors(app: FastAPI) -> None:
+    """Have an application describe its errors; after all its routes are included."""
+    described = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            _correct(described())
+        assert app.openapi_schema is not None
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _correct(document: dict[str, Any]) -> None:
+    schemas = document.setdefault("components", {}).setdefault("schemas", {})
+    for name in _OURS_NOT:
+        schemas.pop(name, None)
+    _, made = models_json_schema([(Problem, "serialization")], ref_template=_REF)
+    schemas |= made["$defs"]
+    document["components"]["securitySchemes"] = {
+        _SCHEME: {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "A token of `surefoot token add`; none is asked for where access is off",
+        }
+    }
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            answers = operation["responses"]
+            answers.pop("422", None)
+            for status in _statuses(path, method, operation):
+                answers.setdefault(str(status), _answer(status))
+            need = need_of(method.upper(), path)[0]
+            operation["security"] = [] if need is None else [{_SCHEME: [need]}]
+
+
+def _statuses(path: str, method: str, operation: dict[str, Any]) -> Iterator[int]:
+    """The errors that an operation may answer."""
+    if path == "/healthz":  # asks for nothing and needs nothing
+        return
+    taken = {(parameter["in"], parameter["name"]) for parameter in operation.get("parameters", ())}
+    places = {place for place, _ in taken}
+    yield from (401, 403, 421, 429, 503)
+    if "path" in places:
+        yield 404
+    if places or "requestBody" in operation:
+        yield 422
+    if ("header", "if-none-match") in taken:
+        yield 304
+    if ("header", "if-match") in taken:
+        yield from (412, 428)
+    if method not in _SAFE:
+        yield from (409, 507)
+    if "requestBody" in operation:
+        yield from (400, 413)
+        if set(operation["requestBody"]["content"]) != {"application/json"}:
+            yield 415
+
+
+def _answer(status: int) -> dict[str, Any]:
+    answer: dict[str, Any] = {"description": _WORDS[status]}
+    if status >= 400:
+        answer["content"] = {_MEDIA_TYPE: {"schema": {"$ref": _REF.format(model="Problem")}}}
+    if status in _WITH_RETRY_AFTER:
+        seconds = {"schema": {"type": "string"}, "description": "Seconds, or a date"}
+        answer["headers"] = {"Retry-After": seconds}
+    return answer

@@ -1,0 +1,220 @@
+"""Connections: so many, so many from an address, and none that only keeps its place.
+
+uvicorn waits for ever for headers, for bodies and for clients that take their answers.
+"""
+
+import asyncio
+import math
+import resource
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.api.middleware.instruments import Instruments
+from service.settings import Settings
+
+_OTHER_FILES = 256  # the database, logs, pipes, and what is accepted in one go before it is counted
+_LEAST_BODY_BYTES = 1024  # a second
+_MOST_UNREAD_BYTES = 8 * 1024 * 1024  # of a body that was refused, until the connection is cut
+_BUSY = (
+    b'{"type":"about:blank","title":"Service Unavailable","status":503,"code":"overloaded",'
+    b'"detail":"connections: as many are open as may be"}'
+)
+_LATE = (
+    b'{"type":"about:blank","title":"Request Timeout","status":408,"code":"request_timeout",'
+    b'"detail":"the request did not come in time"}'
+)
+
+
+class ConnectionGuard:
+    """What the connections of a server share: their number, and whose they are."""
+
+    def __init__(self, settings: Settings, instruments: Instruments) -> None:
+        soft = allow_descriptors()
+        self.most = max(1, min(settings.max_connections, soft - _OTHER_FILES))
+        self.most_of_address = settings.connections_per_address or math.inf
+        self.head_timeout_s = settings.head_timeout_s
+        self.stall_timeout_s = settings.stall_timeout_s
+        self.refused = instruments.connections_refused
+        self.of_address: Counter[str] = Counter()
+        self.open = 0
+        self.silent: dict[GuardedProtocol, None] = {}  # no request has come yet; oldest first
+
+
+def protocol_factory(guard: ConnectionGuard) -> Callable[..., asyncio.Protocol]:
+    """What uvicorn makes its connections with."""
+    return partial(GuardedProtocol, guard=guard)
+
+
+def allow_descriptors() -> int:
+    """As many file descriptors as this process may have, once it may have all it can get."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return hard if hard != resource.RLIM_INFINITY else 1_000_000
+
+
+class GuardedProtocol(H11Protocol):
+    """A connection whose headers, body and reader must keep moving."""
+
+    def __init__(self, *args: Any, guard: ConnectionGuard, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._guard = guard
+        self._counted = False
+        self._address = ""
+        self._received = 0  # since the timer was set
+        self._unread = 0  # of the body of a request that is answered already
+        self._awaiting: Any = None  # h11's state of the client that the timer is for
+        self._timer: asyncio.TimerHandle | None = None
+        self._reader_timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a connection, or refuse it at once."""
+        super().connection_made(transport)
+        guard = self._guard
+        self._address = self.client[0] if self.client else "local"
+        if guard.of_address[self._address] >= guard.most_of_address:
+            same = (other for other in guard.silent if other._address == self._address)
+            if not self._made_room(same, "address"):
+                return
+        if guard.open >= guard.most and not self._made_room(iter(guard.silent), "full"):
+            return
+        self._counted = True
+        guard.open += 1
+        guard.of_address[self._address] += 1
+        guard.silent[self] = None
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._leave()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came, and see what must come next."""
+        if self.transport.is_closing():
+            return
+        self._received += len(data)
+        super().data_received(data)
+        if self.conn.their_state is not h11.IDLE:
+            self._guard.silent.pop(self, None)
+        if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
+            self._unread += len(data)
+            if self._unread > _MOST_UNREAD_BYTES:
+                self._count("unread")
+                self.transport.abort()
+                return
+        self._watch()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        super().on_response_complete()
+        self._unread = 0
+        self._watch()
+
+    def pause_writing(self) -> None:
+        """Give a client that does not take its answer some time."""
+        super().pause_writing()
+        if self._reader_timer is None:
+            self._watch_reader()
+
+    def resume_writing(self) -> None:
+        """It takes its answer."""
+        super().resume_writing()
+        if self._reader_timer is not None:
+            self._reader_timer.cancel()
+            self._reader_timer = None
+
+    def _made_room(self, silent: Iterator["GuardedProtocol"], reason: str) -> bool:
+        """End the oldest of those that keep silent, since this one may not; else end this one."""
+        oldest = next(silent, None)
+        if oldest is None:
+            self._end(reason, 503, _BUSY)
+            return False
+        oldest._end("silent", 408, _LATE, abort=True)
+        return True
+
+    def _watch(self) -> None:
+        """Set the timer for what the client must send next; a drip does not set it anew."""
+        awaited = self.conn.their_state
+        if awaited is self._awaiting and self._timer is not None:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._awaiting = awaited
+        if self.transport.is_closing():
+            return
+        if awaited is h11.IDLE:
+            # Between requests uvicorn's own timer runs until something comes.
+            if self.timeout_keep_alive_task is None:
+                self._timer = self.loop.call_later(self._guard.head_timeout_s, self._head_late)
+        elif awaited is h11.SEND_BODY:
+            self._received = 0
+            self._timer = self.loop.call_later(self._guard.stall_timeout_s, self._body_late)
+
+    def _head_late(self) -> None:
+        self._timer = None
+        self._end("head", 408, _LATE)
+
+    def _body_late(self) -> None:
+        self._timer = None
+        least = _LEAST_BODY_BYTES * self._guard.stall_timeout_s
+        if self.flow.read_paused or self._received >= least:
+            self._watch()
+            return
+        self._end("body", 408, _LATE)
+
+    def _watch_reader(self) -> None:
+        left = self.transport.get_write_buffer_size()
+        self._reader_timer = self.loop.call_later(
+            self._guard.stall_timeout_s, self._reader_late, left
+        )
+
+    def _reader_late(self, left: int) -> None:
+        if self.transport.get_write_buffer_size() < left:  # slow, but it takes something
+            self._watch_reader()
+            return
+        self._reader_timer = None
+        self._count("reader")
+        self.transport.abort()
+
+    def _end(self, reason: str, status: int, body: bytes, abort: bool = False) -> None:
+        """Answer as well as it goes, and close."""
+        self._count(reason)
+        self._leave()
+        if self.transport.is_closing():
+            return
+        cycle = self.cycle
+        if cycle is None or not cycle.response_started or self.conn.our_state is h11.IDLE:
+            title = b"Service Unavailable" if status == 503 else b"Request Timeout"
+            self.transport.write(
+                b"HTTP/1.1 %d %s\r\ncontent-type: application/problem+json\r\n"
+                b"content-length: %d\r\nretry-after: 2\r\nconnection: close\r\n\r\n%s"
+                % (status, title, len(body), body)
+            )
+        if abort:
+            self.transport.abort()
+        else:
+            self.transport.close()
+
+    def _leave(self) -> None:
+        guard = self._guard
+        guard.silent.pop(self, None)
+        for timer in (self._timer, self._reader_timer):
+            if timer is not None:
+                timer.cancel()
+        self._timer = self._reader_timer = None
+        if self._counted:
+            self._counted = False
+            guard.open -= 1
+            guard.of_address[self._address] -= 1
+            if not guard.of_address[self._address]:
+                del guard.of_address[self._address]
+
+    def _count(self, reason: str) -> None:
+        self._guard.refused.labels(reason).inc()

@@ -1,0 +1,125 @@
+"""What routes are given: the application's state, sessions and bodies.
+
+Coroutines, where nothing waits: anything else is given a thread, which costs more than most of them
+do.
+"""
+
+import threading
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import anyio
+from fastapi import Depends, Header, Request
+from sqlalchemy.orm import Session
+
+from service.access.callers import Caller
+from service.api.middleware.direct.feed import Feed
+from service.api.middleware.direct.kept import Kept, KeptAnswer
+from service.api.middleware.instruments import Instruments
+from service.cameras.pictures import Pictures
+from service.cameras.quota import Quota
+from service.cameras.watched import Watched
+from service.errors import PreconditionRequiredError
+from service.job_queue import JobQueue
+from service.settings import Settings
+from service.store.database.store import Store
+from service.store.operation.actor import Actor, set_actor
+from service.store.sqlite.turns import Turns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppState:
+    """What one application holds from start to stop.
+
+    `poses` are the answers to who asks for the pose of a camera, by its id.
+
+    Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
+    are read in `large_bodies`' turns.
+    """
+
+    settings: Settings
+    store: Store
+    queue: JobQueue
+    quota: Quota
+    stream_polls: anyio.CapacityLimiter
+    feed: Feed
+    poses: Kept[KeptAnswer]
+    pictures: Pictures = field(default_factory=Pictures)
+    watched: Watched = field(default_factory=Watched)
+    instruments: Instruments = field(default_factory=Instruments)
+    large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
+    stopping: threading.Event = field(default_factory=threading.Event)
+
+
+async def get_state(request: Request) -> AppState:
+    """The application's state."""
+    state: AppState = request.state.app
+    return state
+
+
+StateDep = Annotated[AppState, Depends(get_state)]
+
+
+async def read_session(state: StateDep) -> AsyncIterator[Session]:
+    """A session that only reads; it connects with its first statement, in the route's thread."""
+    with state.store.read() as session:
+        yield session
+
+
+async def get_caller(request: Request) -> Caller | None:
+    """Who asks; None where access is off."""
+    caller: Caller | None = getattr(request.state, "caller", None)
+    return caller
+
+
+CallerDep = Annotated[Caller | None, Depends(get_caller)]
+
+
+async def get_actor(caller: CallerDep) -> Actor | None:
+    """In whose name an activity is kept, whatever name its body says."""
+    return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
+
+
+ActorDep = Annotated[Actor | None, Depends(get_actor)]
+
+
+def name_of(actor: Actor | None, said: str | None = None) -> str | None:
+    """Who acts: the person who is known; where access is off, whoever the body says."""
+    return said if actor is None else actor.name
+
+
+def write_session(request: Request, state: StateDep, actor: ActorDep) -> Iterator[Session]:
+    """A session that commits before the answer is sent, or not at all.
+
+    It writes about the camera that the path names, or about everything.
+    """
+    with state.store.write(request.path_params.get("camera_id")) as session:
+        set_actor(session, actor)
+        yield session
+
+
+ReadDep = Annotated[Session, Depends(read_session, scope="function")]
+WriteDep = Annotated[Session, Depends(write_session, scope="function")]
+
+
+async def whole_body(request: Request) -> bytes:
+    """The request's body; how large it may be was seen to before (`bodies.py`)."""
+    return await request.body()
+
+
+BodyDep = Annotated[bytes, Depends(whole_body)]
+
+
+async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
+    """The version that a change is meant for.
+
+    Raises:
+        PreconditionRequiredError: the header is missing.
+    """
+    if if_match is None:
+        raise PreconditionRequiredError("If-Match: the ETag of the camera as read is needed")
+    return if_match
+
+
+EtagDep = Annotated[str, Depends(required_etag)]

@@ -1,0 +1,120 @@
+"""Who in a browser may ask: requests for our own names, and acts of our own pages alone.
+
+Every page of the web can send requests from the browser of an operator, and any name can be made
+to lead to this service. Programs send neither `Origin` nor `Sec-Fetch-Site` and pass.
+"""
+
+import socket
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.api.middleware.reach import host_names, is_address, is_loopback
+from service.errors import ServiceError
+from service.settings import Settings
+
+_SAFE = frozenset(("GET", "HEAD", "OPTIONS"))
+_OURS = frozenset(("same-origin", "none"))
+_PORTS = {"http": 80, "https": 443}
+
+
+class MisdirectedError(ServiceError):
+    """The request is for a host that this service is not."""
+
+    status, code = 421, "misdirected"
+
+
+class ForeignOriginError(ServiceError):
+    """A page of another origin asks."""
+
+    status, code = 403, "foreign_origin"
+
+
+class OriginMiddleware:
+    """Refuses requests for foreign hosts and from foreign pages before anything reads them."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app = app
+        self._names = host_names(settings)
+        # A page can be given any name, but no address that it was not fetched from; beyond
+        # loopback nobody knows all names and addresses that lead here.
+        self._any_address = not is_loopback(settings.host)
+        if self._any_address:
+            self._names |= {socket.gethostname().lower()}
+        self._public = _origin(settings.public_url or "")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on.
+
+        Raises:
+            MisdirectedError: it is for another host.
+            ForeignOriginError: a page of another origin asks.
+        """
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+
+        async def isolated(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                # Neither pictures nor scripts of ours show in a page of another origin.
+                MutableHeaders(scope=message)["Cross-Origin-Resource-Policy"] = "same-origin"
+            await send(message)
+
+        self._check(scope)
+        await self._app(scope, receive, isolated)
+
+    def _check(self, scope: Scope) -> None:
+        headers = Headers(scope=scope)
+        # A load balancer asks by any address, or by none; the answer tells nothing.
+        if scope["path"] != "/healthz":
+            for host in headers.getlist("host"):
+                self._check_host(host)
+        site = headers.get("sec-fetch-site")
+        safe = scope.get("method") in _SAFE
+        if site is not None:
+            opened = headers.get("sec-fetch-mode") == "navigate"
+            opened = opened and headers.get("sec-fetch-dest") == "document"
+            if site not in _OURS and not (safe and opened):
+                raise ForeignOriginError(
+                    f"Sec-Fetch-Site: pages of this service alone may do this, got {site!r:.40}"
+                )
+        elif not safe:
+            self._check_origin(headers)
+
+    def _check_host(self, host: str) -> None:
+        name = (_split(f"//{host}")[0] or "").rstrip(".")
+        if name in self._names:
+            return
+        if is_address(name) and (self._any_address or is_loopback(name)):
+            return
+        raise MisdirectedError(
+            f"Host: this service does not go by {host!r:.80}; SUREFOOT_ALLOWED_HOSTS takes the "
+            "names that it goes by"
+        )
+
+    def _check_origin(self, headers: Headers) -> None:
+        for origin in headers.getlist("origin"):
+            asked = _origin(origin)
+            here = _origin(f"{origin.partition(':')[0]}://{headers.get('host', '')}")
+            if asked is None or asked not in (here, self._public):
+                raise ForeignOriginError(
+                    f"Origin: pages of this service alone may do this, got {origin!r:.80}"
+                )
+
+
+def _split(url: str) -> tuple[str | None, int | None]:
+    try:
+        parts = urlsplit(url)
+        return parts.hostname, parts.port
+    except ValueError:
+        return None, None
+
+
+def _origin(url: str) -> tuple[str, str, int] | None:
+    """Scheme, host and port of a URL; None where it has none, as `null` has not."""
+    host, port = _split(url)
+    scheme = url.partition(":")[0].lower()
+    if host is None or scheme not in _PORTS:
+        return None
+    return scheme, host, port or _PORTS[scheme]

@@ -1,0 +1,73 @@
+"""What every page shares: templates, static files, and the headers that keep strangers out."""
+
+import gzip
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.responses import HTMLResponse, Response
+from fastapi.staticfiles import StaticFiles
+from fastapi.templating import Jinja2Templates
+from starlette.types import Scope
+
+_WEB = Path(__file__).parents[2] / "pages"
+_STATIC = _WEB / "static"
+_LARGE = 16_384  # bytes; a phone far away gets larger pages packed
+# No other host, no inline script, no inline style, no frame: a name that was typed is never run.
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; object-src 'none'; "
+    "base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
+    "Referrer-Policy": "same-origin",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+
+def _fingerprint() -> str:
+    """A name for the static files as they are, so that browsers may keep them for ever."""
+    digest = hashlib.sha256()
+    for path in sorted(_STATIC.rglob("*")):
+        if path.is_file():
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+STATIC_URL = f"/ui/static/{_fingerprint()}"
+templates = Jinja2Templates(directory=_WEB / "templates")
+templates.env.globals["static"] = STATIC_URL
+templates.env.trim_blocks = templates.env.lstrip_blocks = True
+
+
+class _KeptFiles(StaticFiles):
+    """Static files under a path that changes with them; modules import each other beside it."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
+        response.headers["X-Content-Type-Options"] = "nosniff"
+        return response
+
+
+def mount_static(app: FastAPI) -> None:
+    """Serve what pages need besides themselves."""
+    app.mount(STATIC_URL, _KeptFiles(directory=_STATIC), name="static")
+
+
+def wants_page(request: Request) -> bool:
+    """Whether somebody looks for a page in a browser, rather than a program for an answer."""
+    looks = request.method == "GET" and request.url.path.startswith("/ui/")
+    return looks and "text/html" in request.headers.get("accept", "")
+
+
+def render(request: Request, template: str, status: int = 200, **context: Any) -> HTMLResponse:
+    """A page, or a part of one, out of a template; everything in it is escaped."""
+    page = templates.TemplateResponse(
+        request, template, context, status_code=status, headers=HEADERS
+    )
+    if len(page.body) > _LARGE and "gzip" in request.headers.get("accept-encoding", ""):
+        page.body = gzip.compress(page.body, compresslevel=4)
+        page.headers["Content-Encoding"] = "gzip"
+        page.headers["Content-Length"] = str(len(page.body))
+        page.headers["Vary"] = "Accept-Encoding"
+    return page

@@ -1,0 +1,146 @@
+"""Every error as a problem document (RFC 9457); for who looks for a page, a page."""
+
+import json
+import logging
+import reprlib
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from models.errors import CalibrationError
+from service.api.middleware import pages
+from service.errors import FieldError, ServiceError
+from service.store.database.failures import failure_of
+
+log = logging.getLogger("surefoot.http")
+
+_MOST_ERRORS = 20  # of one body
+_BRIEF = reprlib.Repr()
+_BRIEF.maxstring = 80
+
+
+def add_problem_handlers(app: FastAPI) -> None:
+    """Answer what routes raise with problem documents.
+
+    The handlers are coroutines: plain ones would need a thread, of which there may be none.
+    """
+    app.add_exception_handler(ServiceError, _service_error)
+    app.add_exception_handler(SQLAlchemyError, _any_error)
+    app.add_exception_handler(CalibrationError, _calibration_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_error)
+
+
+class ProblemMiddleware:
+    """Answers what nobody foresaw, or what other middlewares raise, with a problem document."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, and answer for it where it fails."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun = False
+
+        async def noting(message: Message) -> None:
+            nonlocal begun
+            begun = begun or message["type"] == "http.response.start"
+            await send(message)
+
+        try:
+            await self._app(scope, receive, noting)
+        except ClientDisconnect:
+            return
+        except Exception as error:
+            if begun:
+                raise
+            answer = await _any_error(Request(scope, receive), error)
+            await answer(scope, receive, send)
+
+
+def problem(request: Request, error: ServiceError) -> Response:
+    """The answer that tells of an error; nothing in it can keep it from being sent."""
+    status, title = error.status, HTTPStatus(error.status).phrase
+    request.scope["surefoot_problem"] = error.code  # for the count of refusals
+    headers = error.headers
+    if error.retry_after_s is not None:
+        headers["Retry-After"] = str(max(1, round(error.retry_after_s)))
+    if pages.wants_page(request):
+        page = pages.render(request, "problem.html", status, title=title, detail=error.detail)
+        page.headers.update(headers)
+        return page
+    content: dict[str, Any] = {
+        "type": "about:blank",
+        "title": title,
+        "status": status,
+        "code": error.code,
+        "detail": error.detail,
+    }
+    if error.errors:
+        content["errors"] = [
+            {"pointer": item.pointer, "reason": item.reason} for item in error.errors
+        ]
+    # Text may hold half a surrogate pair, which came as one of JSON's escapes.
+    text = json.dumps(content, ensure_ascii=False).encode("utf-8", errors="replace")
+    return Response(text, status, headers, media_type="application/problem+json")
+
+
+async def _service_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, ServiceError)
+    return problem(request, error)
+
+
+async def _any_error(request: Request, error: Exception) -> Response:
+    found = error if isinstance(error, ServiceError) else None
+    if isinstance(error, SQLAlchemyError):
+        found = failure_of(error)
+    if found is None:
+        log.error(
+            "request_failed",
+            exc_info=error,
+            extra={"method": request.method, "path": request.url.path},
+        )
+        found = ServiceError("the service failed; its log says where")
+    return problem(request, found)
+
+
+async def _calibration_error(request: Request, error: Exception) -> Response:
+    return problem(request, _other(409, "calibration", str(error)))
+
+
+async def _validation_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    errors = tuple(
+        FieldError(
+            pointer="".join(f"/{part}" for part in item["loc"] if part != "body")[:200],
+            reason=f"{item['msg']}, got {_BRIEF.repr(item.get('input')):.80}",
+        )
+        for item in error.errors()[:_MOST_ERRORS]
+    )
+    detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
+    return problem(request, _other(422, "malformed", detail, errors))
+
+
+async def _http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
+    answer = problem(request, _other(error.status_code, code, str(error.detail)))
+    answer.headers.update(error.headers or {})
+    return answer
+
+
+def _other(
+    status: int, code: str, detail: str, errors: tuple[FieldError, ...] = ()
+) -> ServiceError:
+    error = ServiceError(detail, errors)
+    error.status, error.code = status, code
+    return error

@@ -1,0 +1,128 @@
+"""What each route needs, in one place; a test fails for a route that is not here."""
+
+import re
+from collections import defaultdict
+
+from starlette.routing import compile_path
+
+from service.api.middleware.packaged import CHARTS_URL, VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
+from service.enums import TokenScope
+
+# None: whoever asks.
+Need = TokenScope | None
+
+_GET: dict[Need, tuple[str, ...]] = {
+    # `/readyz` tells an orchestrator whether to send work here; what is wrong, only who may read.
+    None: ("/healthz", "/readyz", "/ui/login"),
+    TokenScope.READ: (
+        "/",
+        "/activity",
+        "/alerts",
+        "/alerts/{alert_id}",
+        "/cameras",
+        "/cameras/{camera_id}",
+        "/cameras/{camera_id}/maintenance",
+        "/cameras/{camera_id}/pose",
+        "/cameras/{camera_id}/pose.yaml",
+        "/cameras/{camera_id}/pose/history",
+        "/cameras/{camera_id}/snapshot",
+        "/cameras/{camera_id}/sources",
+        "/cameras/{camera_id}/trainings",
+        "/docs",
+        "/events",
+        "/metrics",
+        "/openapi.json",
+        "/trainings/{training_id}",
+        "/ui/cameras/{camera_id}",
+        "/ui/fleet/banners",
+        "/ui/fleet/rows",
+        CHARTS_URL,
+        VIEWER_SCRIPT_URL,
+        VIEWER_STYLE_URL,
+    ),
+    # Addresses of webhooks often hold a secret; the form and the list of tokens are for who may
+    # use them.
+    TokenScope.ADMIN: (
+        "/deliveries/{delivery_id}",
+        "/tokens",
+        "/ui/register",
+        "/ui/tokens",
+        "/webhooks",
+        "/webhooks/{webhook_id}",
+        "/webhooks/{webhook_id}/deliveries",
+    ),
+}
+_ENDPOINTS: dict[Need, tuple[str, ...]] = {
+    None: ("POST /ui/login",),
+    TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),
+    TokenScope.READ: ("POST /ui/logout",),
+    TokenScope.OPERATE: (
+        "POST /alerts/{alert_id}/acknowledge",
+        "POST /alerts/{alert_id}/resolve",
+        "POST /alerts/{alert_id}/silence",
+        "POST /cameras/{camera_id}/maintenance",
+        "PATCH /cameras/{camera_id}/maintenance/{window_id}",
+        "DELETE /cameras/{camera_id}/maintenance/{window_id}",
+        "POST /cameras/{camera_id}/pose/accept",
+        "POST /cameras/{camera_id}/pose/put-back",
+        "POST /cameras/{camera_id}/reference/reset",
+        "POST /cameras/{camera_id}/sources/{source:path}/use",
+        "DELETE /cameras/{camera_id}/sources/{source:path}",
+        "PUT /cameras/{camera_id}/snapshot",
+        "DELETE /cameras/{camera_id}/snapshot",
+        "POST /cameras/{camera_id}/trainings",
+        "DELETE /trainings/{training_id}",
+    ),
+    TokenScope.ADMIN: (
+        "POST /cameras",
+        "PATCH /cameras/{camera_id}",
+        "DELETE /cameras/{camera_id}",
+        "POST /deliveries/{delivery_id}/replay",
+        "POST /tokens",
+        "DELETE /tokens/{token_id}",
+        "POST /ui/calibration",
+        "POST /ui/preview",
+        "POST /ui/register",
+        "POST /ui/tokens",
+        "POST /ui/tokens/{token_id}/revoke",
+        "POST /ui/tracks",
+        "POST /webhooks",
+        "PATCH /webhooks/{webhook_id}",
+        "DELETE /webhooks/{webhook_id}",
+        "POST /webhooks/{webhook_id}/secret",
+        "POST /webhooks/{webhook_id}/test",
+    ),
+}
+NEEDS: dict[tuple[str, str], Need] = {
+    **{("GET", path): need for need, paths in _GET.items() for path in paths},
+    **{
+        (each.split()[0], each.split()[1]): need
+        for need, some in _ENDPOINTS.items()
+        for each in some
+    },
+}
+# A path without parameters is only what it says, before those that fit it, too.
+_PLAIN: dict[tuple[str, str], Need] = {
+    each: need for each, need in NEEDS.items() if "{" not in each[1]
+}
+# By method and by what the path begins with: each request is looked for.
+_PATTERNS: defaultdict[tuple[str, str], list[tuple[re.Pattern[str], Need]]] = defaultdict(list)
+for (_method, _path), _need in sorted(NEEDS.items(), key=lambda item: item[0][1].count("{")):
+    if "{" in _path:
+        _PATTERNS[_method, _path.split("/")[1]].append((compile_path(_path)[0], _need))
+
+
+def need_of(method: str, path: str) -> tuple[Need, dict[str, str]]:
+    """What a request needs, and the parameters of its path.
+
+    What is not declared needs most: `read` to be told that there is nothing, else `admin`.
+    """
+    method = "GET" if method == "HEAD" else method
+    if (method, path) in _PLAIN:
+        return _PLAIN[method, path], {}
+    first = path[1:].partition("/")[0]
+    for pattern, need in _PATTERNS.get((method, first), ()):
+        match = pattern.match(path)
+        if match is not None:
+            return need, match.groupdict()
+    return (TokenScope.READ if method == "GET" else TokenScope.ADMIN), {}

@@ -1,0 +1,67 @@
+"""`/cameras/{id}/snapshot`: a still image, off unless switched on, and the only picture kept."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Request, Response
+
+from service.api.middleware.dependencies import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
+from service.api.schemas.cameras.snapshots import SnapshotOut
+from service.cameras import cameras, snapshots
+from service.formats.still import Still, read_still
+from service.store.operation.actor import set_actor
+
+router = APIRouter(prefix="/cameras/{camera_id}/snapshot", tags=["cameras"])
+
+_IMAGE = {"schema": {"type": "string", "format": "binary"}}
+_DESCRIBED_BODY = {
+    "requestBody": {"required": True, "content": {"image/jpeg": _IMAGE, "image/png": _IMAGE}}
+}
+
+
+def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> Still:
+    """The still image of a request, decoded while no session is open."""
+    with state.store.read() as session:
+        cameras.require_camera(session, camera_id)
+    snapshots.require_snapshots(state.settings)
+    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    with state.large_bodies.turn(state.settings.http_wait_s):
+        return read_still(body, media_type)
+
+
+@router.put("", openapi_extra=_DESCRIBED_BODY)
+def put(
+    camera_id: str,
+    still: Annotated[Still, Depends(read_body)],
+    state: StateDep,
+    actor: ActorDep,
+) -> SnapshotOut:
+    """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
+    with state.store.write(camera_id) as session:
+        set_actor(session, actor)
+        facts = snapshots.put_snapshot(session, camera_id, still)
+    return SnapshotOut.model_validate(facts, from_attributes=True)
+
+
+@router.get("", response_class=Response, responses={200: {"content": {"image/jpeg": _IMAGE}}})
+def show(
+    camera_id: str,
+    state: StateDep,
+    session: ReadDep,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The still image of a camera."""
+    record = snapshots.show_snapshot(session, state.settings, camera_id)
+    headers = {
+        "ETag": f'"{record.sha256}"',
+        "Cache-Control": "private, no-cache",
+        "X-Content-Type-Options": "nosniff",
+    }
+    if if_none_match == headers["ETag"]:
+        return Response(status_code=304, headers=headers)
+    return Response(record.jpeg, media_type="image/jpeg", headers=headers)
+
+
+@router.delete("", status_code=204)
+def remove(camera_id: str, session: WriteDep) -> None:
+    """Delete the still image of a camera; it goes with its camera, too."""
+    snapshots.remove_snapshot(session, camera_id)

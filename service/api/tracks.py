@@ -1,0 +1,182 @@
+"""`POST /cameras/{id}/tracks` in all its forms."""
+
+import time
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from service.api.middleware.dependencies import AppState, BodyDep, StateDep
+from service.api.middleware.direct.straight import StraightRoute, straight
+from service.api.middleware.direct.written import written
+from service.api.schemas.cameras.tracks import DESCRIBED_TRACK, ReceiptOut
+from service.cameras import tracks
+from service.cameras.pictures import StalePictureError
+from service.errors import MalformedError, UnsupportedMediaTypeError
+from service.formats import batch as formats
+from service.formats.batch import DEFAULT_SOURCE
+from service.formats.mot import read_classes, read_mot
+from service.formats.track import Batch, Clock, Limits
+from service.store.cameras import Picture
+
+router = APIRouter(tags=["tracks"], route_class=StraightRoute)
+
+_LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
+
+_DESCRIBED_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "required": ["tracks"],
+                    "properties": {
+                        "source": {"type": "string"},
+                        "frame_rate_hz": {"type": "number"},
+                        "started_at": {"type": "string", "format": "date-time"},
+                        "tracks": {"type": "array", "items": DESCRIBED_TRACK},
+                    },
+                }
+            },
+            "application/x-ndjson": {"schema": {"type": "string"}},
+            "text/csv": {"schema": {"type": "string"}},
+        },
+    }
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posted:
+    """A request as it came, unread."""
+
+    body: bytes
+    media_type: str
+    source: str = DEFAULT_SOURCE
+    frame_rate_hz: float | None = None
+    started_at: str | None = None
+    classes: str | None = None
+
+
+async def posted(
+    request: Request,
+    body: BodyDep,
+    source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
+    frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
+    started_at: str | None = None,
+    classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
+) -> Posted:
+    """What is to be read, in the route's own thread."""
+    return Posted(
+        body=body,
+        media_type=_media_type(request),
+        source=source,
+        frame_rate_hz=frame_rate_hz,
+        started_at=started_at,
+        classes=classes,
+    )
+
+
+def _media_type(request: Request) -> str:
+    return request.headers.get("content-type", "").split(";")[0].strip().lower()
+
+
+def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
+    """The tracks of a request of a camera with such pictures, read while no session is open.
+
+    Raises:
+        UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
+        OverloadedError: other large bodies are being read all the time.
+    """
+    source = formats.read_source(came.source, "/source")
+    people = None if came.classes is None else read_classes(came.classes)
+    limits = Limits(
+        width=camera.width,
+        height=camera.height,
+        now_s=time.time(),
+        max_ahead_s=state.settings.max_ahead_s,
+    )
+    started_at_s = None
+    if came.started_at is not None:
+        started_at_s = formats.read_time(came.started_at, "/started_at")
+    clock = Clock(
+        frame_rate_hz=came.frame_rate_hz or camera.frame_rate_hz, started_at_s=started_at_s
+    )
+    if len(came.body) > _LARGE:
+        with state.large_bodies.turn(state.settings.http_wait_s):
+            return _read(came.media_type, came.body, source, clock, limits, people)
+    return _read(came.media_type, came.body, source, clock, limits, people)
+
+
+def _read(
+    media_type: str,
+    body: bytes,
+    source: str,
+    clock: Clock,
+    limits: Limits,
+    people: frozenset[int] | None,
+) -> Batch:
+    if media_type == "application/json":
+        return formats.read_json(body, clock, limits)
+    if media_type == "application/x-ndjson":
+        return formats.read_ndjson(body, source, clock, limits)
+    if media_type == "text/csv":
+        return read_mot(body, source, clock, limits, people)
+    raise UnsupportedMediaTypeError(
+        "Content-Type: application/json, application/x-ndjson or text/csv is needed, "
+        f"got {media_type or 'none'}"
+    )
+
+
+def _take(state: AppState, camera_id: str, came: Posted) -> Response:
+    camera = state.pictures.of(state.store, camera_id)
+    while True:
+        try:
+            receipt = _store(state, camera_id, camera, came)
+            break
+        except (MalformedError, StalePictureError) as error:
+            # It may be that the picture is another than when it was last asked for.
+            now = state.pictures.again(state.store, camera_id)
+            if now == camera and isinstance(error, MalformedError):
+                raise
+            camera = now
+    body = written(ReceiptOut.from_value(receipt), exclude_defaults=True)
+    return Response(body, 202, media_type="application/json")
+
+
+def _store(state: AppState, camera_id: str, camera: Picture, came: Posted) -> tracks.Receipt:
+    batch = read_batch(state, camera, came)
+    state.quota.check(state.store, camera_id, batch)
+    with state.store.change(camera_id) as connection:
+        return tracks.receive_tracks(
+            connection,
+            state.queue,
+            camera_id,
+            batch,
+            read_by=camera,
+            max_sources=state.settings.max_sources,
+            watched=camera_id in state.watched,
+        )
+
+
+async def _take_plain(request: Request) -> Response:
+    came = Posted(body=await request.body(), media_type=_media_type(request))
+    return await run_in_threadpool(_take, request.state.app, request.path_params["camera_id"], came)
+
+
+@router.post(
+    "/cameras/{camera_id}/tracks",
+    status_code=202,
+    openapi_extra=_DESCRIBED_BODY,
+    response_model=ReceiptOut,
+)
+@straight(_take_plain)
+def post_tracks(
+    camera_id: str, came: Annotated[Posted, Depends(posted)], state: StateDep
+) -> Response:
+    """Store tracks. One bad track never loses the others; 202 means that they are on disk.
+
+    422 where there were tracks and none of them could be taken.
+    """
+    return _take(state, camera_id, came)

@@ -1,0 +1,160 @@
+"""The key of a data directory and the secrets that it seals."""
+
+from collections.abc import Sequence
+
+from sqlalchemy.orm import Session
+
+from models.reasons import Reason
+from service.data_dir import KEY_FILE, StartError
+from service.notifications.sealing import (
+    Sealer,
+    is_sealed,
+    key_id_of,
+    read_key_file,
+    sealer_of,
+    write_key_file,
+)
+from service.notifications.signing import new_secret
+from service.reasons import ServiceCode
+from service.settings import Settings
+from service.store import webhooks
+from service.store.tables.deliveries import WebhookRecord
+
+NEW_KEY_FILE = f"{KEY_FILE}.new"
+
+
+def secret_of(settings: Settings, record: WebhookRecord) -> str | None:
+    """The secret of a webhook in plain text; None where it has none."""
+    return None if record.secret is None else _opened(sealer_of(settings), record, record.secret)
+
+
+def old_secret_of(settings: Settings, record: WebhookRecord) -> str | None:
+    """The secret that it had before the last rotation."""
+    stored = record.old_secret
+    return None if stored is None else _opened(sealer_of(settings), record, stored)
+
+
+def sealed_secret(settings: Settings, webhook_id: str, secret: str) -> str:
+    """The secret of a webhook as it is stored."""
+    return sealer_of(settings).seal(secret, _purpose(webhook_id))
+
+
+def settle_key(session: Session, settings: Settings) -> int:
+    """See that there is a key, that it opens what is sealed, and that all is; how many were not.
+
+    A key file is made where there is no key and nothing was ever sealed with one. A rotation that
+    was cut off is ended, or taken back.
+
+    Raises:
+        StartError: the key is missing or does not open what is stored.
+    """
+    records = webhooks.every(session)
+    stored = [text for record in records for text in _stored(record)]
+    sealed = [text for text in stored if is_sealed(text)]
+    path, new_path = settings.data_dir / KEY_FILE, settings.data_dir / NEW_KEY_FILE
+    if settings.secret_key is None:
+        if new_path.exists():
+            _end_rotation(settings, sealed)
+        if not path.exists():
+            if sealed:
+                raise StartError(
+                    f"key: {path} is missing, and {len(sealed)} stored secrets are sealed by "
+                    f"{key_id_of(sealed[0])}; put it back from a backup, or set SUREFOOT_SECRET_KEY"
+                )
+            write_key_file(path)
+    _check_file_or_environment(settings, sealed)
+    sealer = sealer_of(settings)
+    plain = 0
+    for record in records:
+        for text in _stored(record):
+            if is_sealed(text):
+                _opened(sealer, record, text)
+        plain += sum(not is_sealed(text) for text in _stored(record))
+        _seal_plain(record, sealer)
+    return plain
+
+
+def reseal(session: Session, old: Sealer, new: Sealer) -> int:
+    """Seal all secrets with another key; returns how many.
+
+    Raises:
+        StartError: the old key does not open one of them.
+    """
+    count = 0
+    for record in webhooks.every(session):
+        for name in ("secret", "old_secret"):
+            text = getattr(record, name)
+            if text is not None:
+                plain = _opened(old, record, text)
+                setattr(record, name, new.seal(plain, _purpose(record.id)))
+                count += 1
+    return count
+
+
+def give_up_secrets(session: Session, new: Sealer) -> int:
+    """Give all webhooks that have a secret another one, and disable them; returns how many."""
+    count = 0
+    for record in webhooks.every(session):
+        if record.secret is not None:
+            record.secret = new.seal(new_secret(), _purpose(record.id))
+            record.old_secret = None
+            record.disable(Reason(code=ServiceCode.SECRET_LOST))
+            count += 1
+    return count
+
+
+def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> int:
+    """Check that a key opens all secrets; returns how many are sealed.
+
+    Args:
+        sealer: with the key.
+        stored: ids of webhooks and their secrets as they are stored.
+
+    Raises:
+        StartError: it does not open one.
+    """
+    sealed = [(webhook_id, text) for webhook_id, text in stored if is_sealed(text)]
+    for webhook_id, text in sealed:
+        sealer.open(text, _purpose(webhook_id))
+    return len(sealed)
+
+
+def _end_rotation(settings: Settings, sealed: list[str]) -> None:
+    """The new key counts once the secrets are sealed by it; before, it never was."""
+    path, new_path = settings.data_dir / KEY_FILE, settings.data_dir / NEW_KEY_FILE
+    if sealed and read_key_file(new_path).key_id == key_id_of(sealed[0]):
+        new_path.replace(path)
+    else:
+        new_path.unlink()
+
+
+def _check_file_or_environment(settings: Settings, sealed: list[str]) -> None:
+    """Tell who has set a key beside the file what to do."""
+    path = settings.data_dir / KEY_FILE
+    if settings.secret_key is None or not sealed or not path.exists():
+        return
+    wanted = key_id_of(sealed[0])
+    if sealer_of(settings).key_id != wanted and read_key_file(path).key_id == wanted:
+        raise StartError(
+            f"key: the stored secrets are sealed by {path}, not by SUREFOOT_SECRET_KEY; run "
+            "`surefoot rotate-key` to seal them by that, or unset it"
+        )
+
+
+def _stored(record: WebhookRecord) -> list[str]:
+    return [text for text in (record.secret, record.old_secret) if text is not None]
+
+
+def _seal_plain(record: WebhookRecord, sealer: Sealer) -> None:
+    for name in ("secret", "old_secret"):
+        text = getattr(record, name)
+        if text is not None and not is_sealed(text):
+            setattr(record, name, sealer.seal(text, _purpose(record.id)))
+
+
+def _opened(sealer: Sealer, record: WebhookRecord, text: str) -> str:
+    return sealer.open(text, _purpose(record.id)) if is_sealed(text) else text
+
+
+def _purpose(webhook_id: str) -> str:
+    return f"webhook {webhook_id}"

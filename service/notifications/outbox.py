@@ -1,0 +1,127 @@
+"""The outbox: what webhooks are to be told, written with the change that it tells of.
+
+A delivery is a row of the transaction that changed the alert, and so is the job that sends it: a
+change that is rolled back tells nobody, one that is committed is told however often the process
+dies.
+"""
+
+import secrets
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.enums import DeliveryState, MessageType
+from service.formats.degrees import in_degrees
+from service.job_queue import JobQueue, queue_of
+from service.store import webhooks
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
+
+# What of an alert a message has: the body of `GET /alerts/{id}`, frozen at the time of the change.
+ALERT_FIELDS = (
+    "id",
+    "camera_id",
+    "kind",
+    "state",
+    "severity",
+    "reason",
+    "reason_code",
+    "reason_values",
+    "drift",
+    "opened_at",
+    "changed_at",
+    "updated_at",
+    "acknowledged_by",
+    "acknowledged_at",
+    "silenced_until",
+    "silence_reason",
+    "silenced_by",
+    "resolved_at",
+    "resolved_by",
+    "outcome",
+    "note",
+    "track_source",
+    "camera_ids",
+    "group_id",
+)
+ALERT_FLAGS = ("acknowledged", "silenced")
+# A silenced alert is quiet but for these.
+_TOLD_IN_SILENCE = (MessageType.ALERT_SILENCED, MessageType.ALERT_RESOLVED)
+_JOB_LOST = timedelta(seconds=30)
+
+
+def queue_alert(session: Session, record: AlertRecord, message: MessageType) -> None:
+    """Tell the webhooks that want it of a change to an alert.
+
+    Args:
+        session: of the change itself.
+        record: the alert, changed.
+        message: what is told of it.
+    """
+    now = datetime.now(UTC)
+    if is_silenced(record, now) and message not in _TOLD_IN_SILENCE:
+        return
+    for webhook in webhooks.enabled(session):
+        if webhook.kinds is None or record.kind in webhook.kinds:
+            body = alert_body(record)
+            add_delivery(session, webhook, message, body, now, alert_id=record.id)
+
+
+def add_delivery(
+    session: Session,
+    webhook: WebhookRecord,
+    type_: MessageType,
+    data: dict[str, Any],
+    now: datetime,
+    *,
+    alert_id: str | None = None,
+) -> DeliveryRecord:
+    """Write a message for a webhook, and have it sent."""
+    record = DeliveryRecord(
+        id=secrets.token_hex(16),
+        webhook_id=webhook.id,
+        alert_id=alert_id,
+        type=type_,
+        payload={"type": type_, "timestamp": json_time(now), "data": data},
+        state=DeliveryState.PENDING,
+        attempts=0,
+        tries=0,
+        next_attempt_at=now,
+        queued_at=now,
+        created_at=now,
+    )
+    session.add(record)
+    wake(session, queue_of(session), webhook, now)
+    return record
+
+
+def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetime) -> None:
+    """Queue a delivery job of a webhook, unless one waits to start that covers this."""
+    queued_at = webhook.job_queued_at
+    # Either way: a clock that was set back must not keep messages waiting for it.
+    if webhook.enabled and (queued_at is None or abs(now - queued_at) > _JOB_LOST):
+        webhook.job_queued_at = now
+        queue.enqueue_deliver(session, webhook.id)
+
+
+def alert_body(record: AlertRecord) -> dict[str, Any]:
+    """An alert as clients see it."""
+    values = {name: getattr(record, name) for name in ALERT_FIELDS}
+    values["drift"] = in_degrees(record.drift)
+    body = {
+        name: json_time(value) if isinstance(value, datetime) else value
+        for name, value in values.items()
+    }
+    flags = (record.acknowledged_at is not None, is_silenced(record, datetime.now(UTC)))
+    return {**body, **dict(zip(ALERT_FLAGS, flags, strict=True))}
+
+
+def is_silenced(record: AlertRecord, now: datetime) -> bool:
+    """Whether an alert is to be quiet."""
+    return record.silenced_until is not None and record.silenced_until > now
+
+
+def json_time(at: datetime) -> str:
+    """A time as JSON has it."""
+    return at.astimezone(UTC).isoformat().replace("+00:00", "Z")

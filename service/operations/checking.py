@@ -1,0 +1,211 @@
+"""Look a data directory over: what is wrong in it, and what is merely left over."""
+
+import shutil
+import stat
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from models.regression.weights_files import weights_path
+from service.data_dir import (
+    StartError,
+    held_alone,
+    megabytes,
+    require_stopped,
+    running_in,
+    strangers_in,
+)
+from service.job_queue import ENGINE_TABLES
+from service.notifications.keys import require_openable
+from service.notifications.sealing import is_sealed, sealer_of
+from service.operations.manifest import hash_file
+from service.operations.placing import READY
+from service.settings import Settings
+from service.store.database.revisions import known_revisions, require_known
+from service.store.sqlite import files
+from service.store.sqlite.faults import telling_of_database
+
+_LEAST_FREE = 200e6
+_HOUR_S = 3600.0
+
+
+class Verdict(StrEnum):
+    """What was found of one thing."""
+
+    OK = "ok"
+    NOTE = "note"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing that was looked at."""
+
+    what: str
+    verdict: Verdict
+    detail: str
+
+
+def check_data_dir(settings: Settings) -> list[Finding]:
+    """Everything that was looked at; nothing is changed, and a service may run meanwhile.
+
+    Raises:
+        StartError: there is no data directory.
+    """
+    folder, path = settings.data_dir, settings.database_path
+    if not path.is_file() or not path.stat().st_size:
+        raise StartError(f"check: {folder} holds no database; name another by --data-dir")
+    findings = [_in_use(folder)]
+    try:
+        with telling_of_database(path):
+            findings += _database(path)
+            findings += _weights(settings)
+            findings += [_key(settings, path)]
+    except StartError as error:
+        findings.append(Finding(what="database", verdict=Verdict.FAULT, detail=str(error)))
+    return [*findings, _modes(folder), _space(settings), _left_over(folder)]
+
+
+def repair_weights(settings: Settings) -> int:
+    """Delete models whose weights are missing or broken, with those files; returns how many.
+
+    Their cameras are trained anew.
+
+    Raises:
+        StartError: something uses the data directory.
+    """
+    with held_alone(settings.data_dir), telling_of_database(settings.database_path):
+        require_stopped(settings.data_dir)
+        broken = _broken_models(settings)
+        files.drop_models(settings.database_path, list(broken))
+        for digest in set(broken.values()):
+            weights_path(settings.weights_dir, digest).unlink(missing_ok=True)
+    return len(broken)
+
+
+def _in_use(folder: Path) -> Finding:
+    users = running_in(folder)
+    detail = f"in use by {', '.join(users)}" if users else "nothing uses it"
+    return Finding(what="use", verdict=Verdict.OK, detail=detail)
+
+
+def _database(path: Path) -> Iterator[Finding]:
+    found = files.faults(path)
+    yield _finding("integrity", found[:1], f"{path.name}, {megabytes(files.size(path))}")
+    broken = [f"{rows} rows of {table}" for table, rows in files.broken_references(path).items()]
+    yield _finding("references", broken, "every row that another names is there")
+    revision, newest = files.revision(path), known_revisions()[0]
+    try:
+        require_known(revision, path.name)
+        current = revision == newest
+        yield Finding(
+            what="schema",
+            verdict=Verdict.OK if current else Verdict.NOTE,
+            detail=revision or "none" if current else f"{revision}: the next start migrates it",
+        )
+    except StartError as error:
+        yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
+    missing = sorted(set(ENGINE_TABLES) - files.tables(path))
+    yield _finding("job engine", missing, "its tables are there", "missing: ")
+    shrinks = files.shrinks(path)
+    detail = "unused space is given back" if shrinks else "the file cannot shrink until a start"
+    yield Finding(what="shrinking", verdict=Verdict.OK if shrinks else Verdict.NOTE, detail=detail)
+
+
+def _weights(settings: Settings) -> Iterator[Finding]:
+    named = files.weights_of_models(settings.database_path)
+    broken = _broken_models(settings)
+    yield _finding(
+        "weights",
+        [f"model {model_id} has none or broken ones" for model_id in broken],
+        f"{len(named)} models, each has its weights",
+    )
+    hour_ago = time.time() - _HOUR_S
+    unused = [
+        path.name
+        for path in (settings.weights_dir.glob("*") if settings.weights_dir.exists() else ())
+        if path.name.split(".")[0] not in named.values() and path.stat().st_mtime < hour_ago
+    ]
+    detail = f"{len(unused)} files that no model names; retention deletes them"
+    yield Finding(
+        what="unused weights",
+        verdict=Verdict.NOTE if unused else Verdict.OK,
+        detail=detail if unused else "none",
+    )
+
+
+def _broken_models(settings: Settings) -> dict[str, str]:
+    """Models whose weights are missing or not what their name says, with their hashes."""
+    named = files.weights_of_models(settings.database_path)
+    sound = {
+        digest
+        for digest in set(named.values())
+        if (path := weights_path(settings.weights_dir, digest)).is_file()
+        and hash_file(path).sha256 == digest
+    }
+    return {model_id: digest for model_id, digest in named.items() if digest not in sound}
+
+
+def _key(settings: Settings, path: Path) -> Finding:
+    secrets = files.webhook_secrets(path)
+    sealed = [text for _, text in secrets if is_sealed(text)]
+    try:
+        if sealed:
+            require_openable(sealer_of(settings), secrets)
+    except StartError as error:
+        return Finding(what="key", verdict=Verdict.FAULT, detail=str(error))
+    plain = len(secrets) - len(sealed)
+    if plain:
+        detail = f"{plain} secrets in plain text: the next start seals them"
+        return Finding(what="key", verdict=Verdict.NOTE, detail=detail)
+    return Finding(what="key", verdict=Verdict.OK, detail=f"opens {len(sealed)} secrets")
+
+
+def _modes(folder: Path) -> Finding:
+    wide = [
+        path.name
+        for path in (folder, *folder.rglob("*"))
+        if not path.is_symlink() and stat.S_IMODE(path.stat().st_mode) & 0o077
+    ]
+    detail = f"others may read {', '.join(wide[:5])}; the next start changes what is ours"
+    return Finding(
+        what="modes",
+        verdict=Verdict.NOTE if wide else Verdict.OK,
+        detail=detail if wide else "all is its user's alone",
+    )
+
+
+def _space(settings: Settings) -> Finding:
+    free = shutil.disk_usage(settings.data_dir).free
+    wanted = max(_LEAST_FREE, float(files.size(settings.database_path)))
+    few = free < wanted
+    detail = f"{megabytes(free)} free"
+    if few:
+        detail += f"; a migration or backup needs about {megabytes(int(wanted))}"
+    return Finding(what="space", verdict=Verdict.NOTE if few else Verdict.OK, detail=detail)
+
+
+def _left_over(folder: Path) -> Finding:
+    found = sorted(
+        path.name
+        for pattern in ("restoring-*", "replaced-*", "copies/*.partial*")
+        for path in folder.glob(pattern)
+    )
+    if (folder / READY).exists():
+        detail = "a restore was cut off; the next start ends it"
+        return Finding(what="left over", verdict=Verdict.NOTE, detail=detail)
+    found += strangers_in(folder)
+    return Finding(
+        what="left over",
+        verdict=Verdict.NOTE if found else Verdict.OK,
+        detail=f"not in use: {', '.join(found[:5])}" if found else "nothing",
+    )
+
+
+def _finding(what: str, wrong: list[str], well: str, before: str = "") -> Finding:
+    if not wrong:
+        return Finding(what=what, verdict=Verdict.OK, detail=well)
+    more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    return Finding(what=what, verdict=Verdict.FAULT, detail=f"{before}{'; '.join(wrong[:3])}{more}")

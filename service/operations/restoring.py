@@ -1,0 +1,162 @@
+"""Put a backup into a data directory: verified first, then in place whole or not at all."""
+
+import os
+import shutil
+import tarfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.regression.weights_files import weights_path
+from service.data_dir import (
+    DATABASE,
+    KEY_FILE,
+    WEIGHTS,
+    StartError,
+    held_alone,
+    make_private,
+    require_space,
+    require_stopped,
+    sync_folder,
+    telling_of,
+)
+from service.notifications.keys import require_openable
+from service.notifications.sealing import is_sealed, read_key_file, sealer_of
+from service.operations.manifest import (
+    MANIFEST,
+    Manifest,
+    Member,
+    hash_file,
+    hash_stream,
+    read_manifest,
+)
+from service.operations.placing import commit_restore, finish_restore, has_data
+from service.operations.writing import Progress
+from service.settings import Settings
+from service.store.database.revisions import require_known
+from service.store.sqlite import files
+from service.store.sqlite.faults import telling_of_database
+
+_LARGEST_MANIFEST = 64 * 2**20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Restored:
+    """What was put in place, and where what was there before is now."""
+
+    manifest: Manifest
+    replaced: Path | None
+
+
+def restore_backup(
+    settings: Settings, archive: Path, on_progress: Progress, *, force: bool
+) -> Restored:
+    """Verify an archive, then put it into the data directory.
+
+    Args:
+        settings: of the data directory; nothing may use it.
+        archive: made by `write_backup`.
+        on_progress: called with what is done, how far it is, and how much there is.
+        force: move aside what is there; else only an empty folder is taken.
+
+    Raises:
+        StartError: the archive is damaged or of a later release, the folder is in use or not
+            empty, or there is no space. Nothing was changed then.
+    """
+    folder = settings.data_dir
+    make_private(folder)
+    with held_alone(folder):
+        require_stopped(folder)
+        with telling_of(folder):
+            finish_restore(folder)
+            for left in folder.glob("restoring-*"):
+                shutil.rmtree(left)
+            if has_data(folder) and not force:
+                raise StartError(
+                    f"restore: {folder} holds data; name an empty folder by --data-dir, or say "
+                    "--force to move it aside"
+                )
+            unpacked = folder / f"restoring-{os.getpid()}"
+            unpacked.mkdir(mode=0o700)
+            try:
+                manifest = _unpack(archive, unpacked, on_progress)
+                with telling_of_database(archive):
+                    _check(settings, manifest, unpacked, on_progress)
+            except BaseException:
+                shutil.rmtree(unpacked)
+                raise
+            return Restored(manifest=manifest, replaced=commit_restore(unpacked, folder))
+
+
+def _unpack(archive: Path, folder: Path, on_progress: Progress) -> Manifest:
+    """Write the members to a folder; each is as the manifest says, and none is missing."""
+    try:
+        with archive.open("rb") as file, tarfile.open(fileobj=file, mode="r:") as tar:
+            first = tar.next()
+            if first is None or first.name != MANIFEST or first.size > _LARGEST_MANIFEST:
+                raise StartError(f"restore: {archive} is no backup of surefoot")
+            content = tar.extractfile(first)
+            assert content is not None
+            manifest = read_manifest(content.read())
+            wanted = {member.name: member for member in manifest.members}
+            needed = sum(member.size for member in manifest.members)
+            require_space(folder, needed + 2**20, "what is in the backup")
+            require_known(manifest.revision, str(archive))
+            for number, header in enumerate(tar):
+                if not number:
+                    continue  # the manifest
+                on_progress("unpacking", number - 1, len(manifest.members))
+                member = wanted.pop(header.name, None)
+                content = tar.extractfile(header) if header.isreg() else None
+                if member is None or content is None or header.size != member.size:
+                    raise StartError(f"restore: {archive}: {header.name!r} is not as its manifest")
+                _write(folder, member, content, archive)
+    except FileNotFoundError as error:
+        raise StartError(f"restore: {archive} is not there") from error
+    except IsADirectoryError as error:
+        raise StartError(f"restore: {archive} is a folder; name a file") from error
+    except tarfile.TarError as error:
+        raise StartError(f"restore: {archive} is no backup, or was cut off ({error})") from error
+    if wanted:
+        raise StartError(f"restore: {archive} was cut off: {', '.join(sorted(wanted))} missing")
+    on_progress("unpacking", len(manifest.members), len(manifest.members))
+    return manifest
+
+
+def _write(folder: Path, member: Member, content: object, archive: Path) -> None:
+    kind, _, name = member.name.rpartition("/")
+    safe = member.name in (DATABASE, KEY_FILE) or (kind == WEIGHTS and name.strip("."))
+    if not safe:
+        raise StartError(f"restore: {archive}: a member {member.name!r} has no place")
+    path = folder / member.name
+    path.parent.mkdir(mode=0o700, exist_ok=True)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "wb") as file:
+        found = hash_stream(member.name, content, file)  # type: ignore[arg-type]
+        file.flush()
+        os.fsync(file.fileno())
+    sync_folder(path.parent)
+    if found != member:
+        raise StartError(f"restore: {archive}: {member.name} is damaged; take another backup")
+
+
+def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Progress) -> None:
+    """The database is sound, its weights are there, and a key opens its secrets."""
+    database = folder / DATABASE
+    on_progress("checking", 0, 1)
+    if not database.exists() or files.faults(database):
+        raise StartError("restore: the database of the backup is damaged; take another backup")
+    require_known(files.revision(database), "the backup")
+    for digest in set(files.weights_of_models(database).values()) - set(manifest.missing_weights):
+        path = weights_path(folder / WEIGHTS, digest)
+        if not path.exists() or hash_file(path).sha256 != digest:
+            raise StartError(f"restore: weights {digest} of the backup are missing or damaged")
+    secrets = files.webhook_secrets(database)
+    if any(is_sealed(text) for _, text in secrets):
+        in_archive = (folder / KEY_FILE).exists()
+        if not in_archive and settings.secret_key is None:
+            raise StartError(
+                f"key: the backup was made with SUREFOOT_SECRET_KEY, id {manifest.key_id}; set it"
+            )
+        sealer = read_key_file(folder / KEY_FILE) if in_archive else sealer_of(settings)
+        require_openable(sealer, secrets)
+    on_progress("checking", 1, 1)

@@ -1,0 +1,188 @@
+"""Write a data directory that may be in use to one checked archive."""
+
+import fcntl
+import io
+import os
+import shutil
+import tarfile
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from models.regression.weights_files import weights_path
+from service.data_dir import (
+    DATABASE,
+    KEY_FILE,
+    MIGRATE_LOCK,
+    WEIGHTS,
+    StartError,
+    require_space,
+    sync_folder,
+    telling_of,
+)
+from service.notifications.keys import require_openable
+from service.notifications.sealing import is_sealed, sealer_of
+from service.operations.manifest import (
+    FORMAT,
+    MANIFEST,
+    Manifest,
+    Member,
+    hash_file,
+    hash_stream,
+    read_manifest,
+    release,
+    sqlite_version,
+)
+from service.settings import Settings
+from service.store.sqlite import files
+from service.store.sqlite.faults import telling_of_database
+
+Progress = Callable[[str, int, int], None]  # what, done, total
+_TRIES = 3
+
+
+def write_backup(settings: Settings, target: Path, on_progress: Progress) -> Manifest:
+    """Write a backup, check it and give it its name; nothing is there before it is whole.
+
+    Raises:
+        StartError: there is nothing to back up, something is wrong in it, the target exists
+            already, or there is no space for it.
+    """
+    folder = settings.data_dir
+    if not settings.database_path.is_file() or not settings.database_path.stat().st_size:
+        raise StartError(f"backup: {folder} holds no database; name another by --data-dir")
+    if target.exists():
+        raise StartError(f"backup: {target} exists already; name another file")
+    if not target.parent.is_dir():
+        raise StartError(f"backup: {target.parent} is no folder; make it, or name another")
+    with telling_of(target.parent), telling_of_database(settings.database_path):
+        weights = folder / WEIGHTS
+        stored = sum(path.stat().st_size for path in weights.glob("*")) if weights.exists() else 0
+        needed = 2 * files.size(settings.database_path) + stored + 2**20
+        require_space(target.parent, needed, "the backup with its working copy")
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".surefoot-backup-") as name:
+            scratch = Path(name)
+            missing = _gather(settings, scratch, on_progress)
+            manifest = _describe(settings, scratch, missing)
+            partial = scratch / "archive"
+            _pack(manifest, scratch, partial, on_progress)
+            _verify(manifest, partial, on_progress)
+            partial.rename(target)
+            sync_folder(target.parent)
+    return manifest
+
+
+def _gather(settings: Settings, scratch: Path, on_progress: Progress) -> list[str]:
+    """Copy the database and the weights that it names; returns names of weights that are gone."""
+    database = scratch / DATABASE
+    (scratch / WEIGHTS).mkdir()
+    missing: list[str] = []
+    for _ in range(_TRIES):
+        database.unlink(missing_ok=True)
+        with (settings.data_dir / MIGRATE_LOCK).open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH)  # no schema half way to another
+            files.copy(
+                settings.database_path,
+                database,
+                lambda done, total: on_progress("copying the database", done, total),
+            )
+        missing = _copy_weights(settings, scratch)
+        # A model that retention deleted meanwhile is gone from the database too: once more.
+        if not set(missing) & set(files.weights_of_models(settings.database_path).values()):
+            break
+    if missing and not set(missing) & set(files.weights_of_models(settings.database_path).values()):
+        missing = []
+    on_progress("checking the database", 0, 1)
+    if found := files.faults(database):
+        raise StartError(
+            f"backup: {settings.database_path} is damaged ({found[0]}); put an earlier backup in "
+            "its place by `surefoot restore`"
+        )
+    files.drop_log(database)
+    on_progress("checking the database", 1, 1)
+    return missing
+
+
+def _copy_weights(settings: Settings, scratch: Path) -> list[str]:
+    missing = []
+    for digest in sorted(set(files.weights_of_models(scratch / DATABASE).values())):
+        target = weights_path(scratch / WEIGHTS, digest)
+        try:
+            shutil.copyfile(weights_path(settings.weights_dir, digest), target)
+        except FileNotFoundError:
+            missing.append(digest)
+            continue
+        if hash_file(target).sha256 != digest:
+            target.unlink()
+            missing.append(digest)
+    return missing
+
+
+def _describe(settings: Settings, scratch: Path, missing: list[str]) -> Manifest:
+    database = scratch / DATABASE
+    secrets = files.webhook_secrets(database)
+    key, key_id = "none", ""
+    sealed = any(is_sealed(text) for _, text in secrets)
+    if settings.secret_key is not None or (settings.data_dir / KEY_FILE).exists() or sealed:
+        sealer = sealer_of(settings)
+        require_openable(sealer, secrets)
+        key, key_id = "environment", sealer.key_id
+        if settings.secret_key is None:
+            shutil.copyfile(settings.data_dir / KEY_FILE, scratch / KEY_FILE)
+            key = "archive"
+    members = [hash_file(database)]
+    if key == "archive":
+        members.append(hash_file(scratch / KEY_FILE))
+    for path in sorted((scratch / WEIGHTS).iterdir()):
+        members.append(replace(hash_file(path), name=f"{WEIGHTS}/{path.name}"))
+    return Manifest(
+        format=FORMAT,
+        release=release(),
+        revision=files.revision(database) or "",
+        sqlite=sqlite_version(),
+        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        key=key,
+        key_id=key_id,
+        missing_weights=missing,
+        members=members,
+    )
+
+
+def _pack(manifest: Manifest, scratch: Path, partial: Path, on_progress: Progress) -> None:
+    handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "wb") as file:
+        with tarfile.open(fileobj=file, mode="w", format=tarfile.PAX_FORMAT) as tar:
+            description = manifest.to_json()
+            tar.addfile(_header(MANIFEST, len(description)), io.BytesIO(description))
+            for number, member in enumerate(manifest.members):
+                on_progress("writing", number, len(manifest.members))
+                with (scratch / member.name).open("rb") as content:
+                    tar.addfile(_header(member.name, member.size), content)
+        file.flush()
+        os.fsync(file.fileno())
+    on_progress("writing", len(manifest.members), len(manifest.members))
+
+
+def _header(name: str, size: int) -> tarfile.TarInfo:
+    header = tarfile.TarInfo(name)
+    header.size, header.mode = size, 0o600
+    header.mtime = int(datetime.now(UTC).timestamp())
+    return header
+
+
+def _verify(manifest: Manifest, partial: Path, on_progress: Progress) -> None:
+    """Read the archive back as it lies on the disk."""
+    found: list[Member] = []
+    with tarfile.open(partial) as tar:
+        for header in tar:
+            content = tar.extractfile(header)
+            assert content is not None
+            if header.name == MANIFEST:
+                assert read_manifest(content.read()) == manifest
+                continue
+            found.append(hash_stream(header.name, content))
+            on_progress("checking", len(found), len(manifest.members))
+    if found != manifest.members:
+        raise StartError(f"backup: {partial} reads back differently; is the disk sound?")

@@ -1,0 +1,73 @@
+"""The drawings of a camera's page: the picture plane and the ground, by both poses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from models.geometry.rotation import Array
+from service.pages.drawings.ground_plan import ground_plan_svg
+from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
+from service.pages.views.camera_page import CameraPage
+
+_POINTS = 24
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraDrawings:
+    """Two SVGs, and what has to be said of them."""
+
+    picture: Markup
+    plan: Markup
+    spacing_m: float | None
+    people: int
+    two_poses: bool
+    horizon: bool
+
+
+def draw_camera(page: CameraPage) -> CameraDrawings:
+    """The picture plane and the ground from above, with the newest tracks.
+
+    The served pose is drawn where the tracks tell one; until then there is the prior pose alone.
+    """
+    lens, prior = page.camera.intrinsics, page.camera.prior_pose
+    overlays = [Overlay(pose=prior, kind="prior")]
+    if page.pose.identifiable:
+        overlays.append(Overlay(pose=page.pose.pose, kind="served"))
+    # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
+    ground = ground_of(lens, overlays[-1].pose)
+    feet = [_fewer(track.uv) for track in page.tracks]
+    people = f"the feet of {len(feet)} people" if feet else "nobody yet"
+    both = (
+        "the prior pose, dashed, and the served pose, solid" if len(overlays) > 1 else "the prior"
+    )
+    snapshot = None
+    if page.snapshot is not None:
+        snapshot = f"/cameras/{page.camera.record.id}/snapshot?v={page.snapshot.sha256[:12]}"
+    return CameraDrawings(
+        picture=picture_svg(
+            lens,
+            overlays,
+            feet,
+            label=f"The picture with {people}; horizon and ground grid of {both}.",
+            ground=ground,
+            snapshot_url=snapshot,
+        ),
+        plan=ground_plan_svg(
+            lens,
+            overlays,
+            feet,
+            page.misplaced,
+            label=f"The ground from above with {people} and what the camera sees of it by {both}.",
+        ),
+        spacing_m=None if ground is None else ground.spacing_m,
+        people=len(feet),
+        two_poses=len(overlays) > 1,
+        horizon=any(horizon_path(lens, each.pose) for each in overlays),
+    )
+
+
+def _fewer(uv: Array) -> Array:
+    """A track with so few points that a hundred of them are drawn in no time."""
+    kept = np.unique(np.linspace(0, len(uv) - 1, min(len(uv), _POINTS)).astype(int))
+    return np.asarray(uv[kept])

@@ -1,0 +1,145 @@
+"""All that the page of a camera shows, read in one go."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from models.geometry.misplacement import Misplacement, misplacements
+from models.tracks.trajectory import Trajectory
+from service.alerts.alerts import list_alerts
+from service.alerts.presence import Silence, silence_of
+from service.cameras.cameras import CameraView, view_camera
+from service.cameras.poses import PoseView, view_pose
+from service.cameras.snapshots import snapshot_facts
+from service.cameras.sources import SourceView, rival_sources
+from service.enums import AlertState
+from service.pages.views.camera_activity import ActivityEntry, activity_of
+from service.settings import Settings
+from service.store import alerts, cameras, maintenance, trainings
+from service.store.alerts import AlertFilter
+from service.store.operation import events
+from service.store.packing import trajectory_of
+from service.store.snapshots import SnapshotFacts
+from service.store.tables.alerts import AlertRecord
+from service.store.tables.attendance import MaintenanceRecord
+from service.store.tables.cameras import PriorPoseRecord
+from service.store.tables.trainings import TrainingRecord
+from service.store.tracks import tracks
+
+_TRACKS = 120  # more are a carpet
+_ALERTS, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 5, 20, 5
+DISTANCES_M = (5.0, 10.0, 20.0, 40.0, 80.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertStory:
+    """An alert, and the group that it belongs to, if it does."""
+
+    record: AlertRecord
+    group: AlertRecord | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraPage:
+    """What the page of a camera shows. Lists are newest first, windows in their order.
+
+    `alerts` are all that fire, and then those that ended last.
+
+    `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
+    means on the ground; empty where there is none. `sources` are those of its tracks, where there
+    are several.
+    """
+
+    now: datetime
+    camera: CameraView
+    pose: PoseView
+    silence: Silence | None
+    newest_track_s: float | None
+    tracks: tuple[Trajectory, ...]
+    misplaced: tuple[Misplacement, ...]
+    alerts: tuple[AlertStory, ...]
+    priors: tuple[PriorPoseRecord, ...]
+    windows: tuple[MaintenanceRecord, ...]
+    trainings: tuple[TrainingRecord, ...]
+    activity: tuple[ActivityEntry, ...]
+    sources: tuple[SourceView, ...]
+    snapshot: SnapshotFacts | None
+    snapshots_allowed: bool
+    newest_event_id: int
+
+    @property
+    def firing(self) -> tuple[AlertStory, ...]:
+        """The open alerts, what needs a person most first."""
+        stories = {story.record.id: story for story in self.alerts}
+        return tuple(stories[record.id] for record in self.pose.standing.alerts)
+
+    @property
+    def past(self) -> tuple[AlertStory, ...]:
+        """The alerts that have ended."""
+        return tuple(story for story in self.alerts if story.record.state != AlertState.FIRING)
+
+    @property
+    def attended(self) -> MaintenanceRecord | None:
+        """The maintenance window that is under way, the one that ends last."""
+        here = [each for each in self.windows if each.holds(self.now)]
+        return max(here, key=lambda each: each.until, default=None)
+
+
+def view_camera_page(session: Session, settings: Settings, camera_id: str) -> CameraPage:
+    """All that the page of a camera shows.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    now = datetime.now(UTC)
+    # Taken first: what happens while the rest is read is told again, and not missed.
+    newest_event_id = events.newest_id(session)
+    camera = view_camera(session, camera_id)
+    pose = view_pose(session, settings, camera_id)
+    estimate = pose.estimate
+    ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
+    found = [*pose.standing.alerts, *list_alerts(session, ended, _ALERTS)]
+    windows = maintenance.of_camera(session, camera_id)
+    over = sum(window.until <= now for window in windows)
+    priors = cameras.prior_poses(session, camera_id, _PRIORS)
+    shown = tracks.newest(
+        session, camera_id, _TRACKS, None if estimate is None else estimate.from_s
+    )
+    misplaced: tuple[Misplacement, ...] = ()
+    # Of a camera that stands still it would tell of the estimate's noise.
+    if (
+        estimate is not None
+        and estimate.identifiable
+        and (estimate.drifted or estimate.drift_streak > 0)
+    ):
+        misplaced = misplacements(camera.intrinsics, pose.pose, camera.prior_pose, DISTANCES_M)
+    return CameraPage(
+        now=now,
+        camera=camera,
+        pose=pose,
+        silence=silence_of(session, settings, camera_id, now),
+        newest_track_s=tracks.newest_end_s(session, camera_id),
+        tracks=tuple(trajectory_of(record) for record in shown),
+        misplaced=misplaced,
+        alerts=_stories(session, found),
+        priors=tuple(priors),
+        windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
+        trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
+        activity=activity_of(session, camera_id),
+        sources=rival_sources(session, settings, camera_id),
+        snapshot=snapshot_facts(session, settings, camera_id),
+        snapshots_allowed=settings.snapshots,
+        newest_event_id=newest_event_id,
+    )
+
+
+def _stories(session: Session, found: Sequence[AlertRecord]) -> tuple[AlertStory, ...]:
+    return tuple(
+        AlertStory(
+            record=record,
+            group=None if record.group_id is None else alerts.find(session, record.group_id),
+        )
+        for record in found
+    )

@@ -1,1 +1,0 @@
-"""`surefoot protocol`: what is served, on recordings in the order of time."""

@@ -1,0 +1,138 @@
+"""The estimate job: new tracks to predictions, a reference, a stored estimate."""
+
+import logging
+import time
+from dataclasses import replace
+from functools import partial
+
+from service.estimation.anchoring import (
+    compute_anchor_days,
+    load_anchor_days,
+    save_anchor_days,
+)
+from service.estimation.estimates import save_estimate
+from service.estimation.evidence import load_evidence
+from service.estimation.finding import compute_finding
+from service.estimation.growth import compute_growth, load_growth, save_growth
+from service.estimation.lacks import Lacks
+from service.estimation.learning import compute_reference, load_reference_period, save_reference
+from service.windows.looking import begin_look, end_look, fail_look, leave_poisoned, note_lacks
+from service.windows.unpacked import Unpacked
+from service.workers.context import JobContext
+from service.workers.predictions import predict_pending
+
+log = logging.getLogger("surefoot.jobs")
+
+
+def run_estimate(context: JobContext, camera_id: str) -> None:
+    """Bring a camera's reference and estimate up to date with its tracks.
+
+    What fails beside the served estimate is said and stops nothing. Where that itself fails, the
+    camera rests, longer each time, and the failure is told; others are not held up.
+    """
+    with context.store.write(camera_id) as session:
+        if leave_poisoned(session, camera_id):
+            log.warning("estimate_postponed", extra={"camera_id": camera_id})
+            return
+        # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
+        newest_pk = begin_look(session, camera_id)
+    try:
+        _look(context, camera_id, newest_pk)
+    except Exception as error:
+        with context.store.write(camera_id) as session:
+            fail_look(session, camera_id, repr(error))
+        raise
+
+
+def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
+    """Look at all tracks up to one. No transaction is open while anything is computed."""
+    store, settings = context.store, context.settings
+    begun_s, lacks, unpacked = time.monotonic(), Lacks(camera_id), Unpacked()
+    missing = predict_pending(context, camera_id, unpacked)
+    if missing:
+        lacks.add("averaged estimate", missing)
+    learn_if_due(context, camera_id, unpacked)
+    lacks.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
+    with store.read() as session:
+        evidence = load_evidence(session, settings, camera_id, unpacked)
+    finding = None if evidence is None else compute_finding(evidence, settings.seed)
+    if finding is not None:
+        finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
+    with store.write(camera_id) as session:
+        if evidence is not None and finding is not None:
+            record = save_estimate(session, context.queue, settings, evidence, finding)
+            if record is not None:
+                fields = {"tracks": record.tracks, "state": record.state}
+                log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
+        said = lacks.said if finding is None else finding.lacks
+        resting = context.growth_rests.lacks_of(camera_id)
+        rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
+        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks=(*said, *resting))
+    _grow_unless_failed(context, camera_id, unpacked)
+
+
+def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    """Learn a camera's reference, once its tracks are there."""
+    with context.store.read() as session:
+        period = load_reference_period(session, context.settings, camera_id, unpacked)
+    if period is None:
+        return
+    learned = compute_reference(period, context.settings.seed)
+    with context.store.write(camera_id) as session:
+        save_reference(session, context.settings, camera_id, period, learned)
+    log.info(
+        "reference_learned" if learned else "reference_without_walkers",
+        extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
+    )
+
+
+def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    """Hold the whole days that have come since the last time against a camera's anchor."""
+    with context.store.read() as session:
+        days = load_anchor_days(session, context.settings, camera_id, unpacked)
+    if days is None:
+        return
+    logged = compute_anchor_days(days)
+    with context.store.write(camera_id) as session:
+        save_anchor_days(session, days, logged)
+    fields = {"camera_id": camera_id, "tracks": len(days.trajectories)}
+    log.info("creep_logged", extra=fields)
+
+
+def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    """Learn a camera's flow map anew, once enough tracks have come that are known to be still.
+
+    A worker that dies here leaves the map as it was; the next job finds it due again.
+    """
+    with context.store.read() as session:
+        period = load_growth(session, context.settings, camera_id, unpacked)
+    if period is None:
+        return
+    begun_s = time.monotonic()
+    learned = compute_growth(period, context.settings.seed)
+    with context.store.write(camera_id) as session:
+        grown = save_growth(session, camera_id, period, learned)
+    context.growth_turns.spend(time.monotonic() - begun_s)
+    if grown:
+        fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
+        log.info("flow_map_grown", extra=fields)
+
+
+def _others_wait(context: JobContext, camera_id: str) -> bool:
+    with context.store.read() as session:
+        return context.queue.estimates_wait(session, besides=camera_id)
+
+
+def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
+    if context.growth_rests.lacks_of(camera_id):
+        return
+    if context.growth_turns.spent and _others_wait(context, camera_id):
+        return  # the next job finds it due again
+    lacks = Lacks(camera_id)
+    lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id, unpacked))
+    if lacks.said:
+        said = tuple(lacks.said)
+        context.growth_rests.begin(camera_id, said)
+        with context.store.write(camera_id) as session:
+            note_lacks(session, camera_id, said)

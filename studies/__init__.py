@@ -1,0 +1,1 @@
+"""Measurements of the product: protocol, faults, alarms, paper, baselines. Nothing imports it."""

@@ -1,0 +1,1 @@
+"""Windows and days without a move: what the change search and the alarm chart make of them."""

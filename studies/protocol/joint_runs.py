@@ -1,0 +1,86 @@
+"""The joint estimator as the protocol runs it, with and without what it may use."""
+
+import numpy as np
+
+from models.errors import TooFewTrajectoriesError
+from models.geometry.plane_parameters import plane_parameters_of
+from models.pose import observe
+from models.simulation.walkers import WalkConfig
+from models.tracks.observations import Observations, of_tracks
+from models.tracks.scenes import Scene
+from models.walking.estimate import JointEstimate, joint_estimate
+from models.walking.reference.assumed import assumed_speed_reference
+from models.walking.reference.learning import learn_speed_reference
+from studies.protocol.cases import (
+    KNOCKED,
+    Answer,
+    KnockRange,
+    draw_case,
+    nothing_identifiable,
+)
+from studies.protocol.learned import Learned
+
+_SEED = 0
+
+
+def joint(learned: Learned) -> Answer:
+    """By speeds alone: the site learned from the reference, boxes where they tell something."""
+    return joint_answer(
+        joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speed_reference)
+    )
+
+
+def joint_feet(learned: Learned) -> Answer:
+    """Without boxes."""
+    return joint_answer(
+        joint_estimate(learned.feet, learned.case.prior_pose, learned.feet_speed_reference)
+    )
+
+
+def joint_assumed(learned: Learned) -> Answer:
+    """Without a reference: people are assumed to walk at 1.4 m/s, everywhere alike."""
+    prior = learned.case.prior_pose
+    try:
+        reference = assumed_speed_reference(learned.seen, prior, WalkConfig())
+    except TooFewTrajectoriesError:
+        return nothing_identifiable(learned.case)
+    return joint_answer(joint_estimate(learned.seen, prior, reference))
+
+
+def joint_answer(estimate: JointEstimate) -> Answer:
+    """A joint estimate as an answer of the protocol."""
+    return Answer(
+        values=estimate.values,
+        covariance=estimate.covariance,
+        tracks=estimate.walkers,
+        identifiable=estimate.identifiable,
+    )
+
+
+def track_errors(
+    scene: Scene, seed: int, counts: list[int], knock_range: KnockRange = KNOCKED
+) -> list[tuple[int, float, float]]:
+    """For some numbers of tracks after a knock: tracks, angle error, its bound; both in degrees.
+
+    The bound is Cramer and Rao's for the estimator's own likelihood: the root of the summed
+    variances of tilt and roll.
+    """
+    case = draw_case(scene, seed, knock_range)
+    reference = learn_speed_reference(
+        observe(case.reference, case.intrinsics, case.prior_pose),
+        case.prior_pose,
+        WalkConfig(),
+        _SEED,
+    )
+    seen = observe(case.seen, case.intrinsics, case.prior_pose)
+    order = np.random.default_rng(seed).permutation(seen.tracks)
+    found = []
+    for count in counts:
+        if count > seen.tracks:
+            break
+        some: Observations = of_tracks(seen, np.sort(order[:count]))
+        estimate = joint_estimate(some, case.prior_pose, reference)
+        error = np.degrees(estimate.values - plane_parameters_of(case.true_pose))[:2]
+        bound = np.degrees(np.sqrt(np.trace(estimate.bound[:2, :2])))
+        found.append((count, float(np.hypot(*error)), float(bound)))
+    return found

@@ -1,0 +1,1 @@
+"""Regressors trained for many cases, and their calibration."""

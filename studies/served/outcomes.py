@@ -1,0 +1,138 @@
+"""What was served of a case beside the truth: each parameter, and how surely."""
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.errors import CalibrationError
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PARAMETERS, array_of
+from models.pose import CameraSite, PoseFinding
+from models.quantiles import Z90
+from studies.protocol.cases import ProtocolCase, angle_deg
+from studies.served.windows import Window, looks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterOutcome:
+    """One parameter of a pose: degrees, or the log of the height.
+
+    `moved` is how far it truly is from the prior pose, `error` how far off the truth the estimate
+    was, `sd` what it gave as its standard deviation. Only `identifiable` ones are served.
+    """
+
+    moved: float
+    error: float
+    sd: float
+    identifiable: bool
+
+    @property
+    def covered(self) -> bool:
+        """Whether the 90 % interval holds the truth."""
+        return abs(self.error) <= Z90 * self.sd
+
+    @property
+    def off_sd(self) -> float:
+        """The error in standard deviations."""
+        return abs(self.error) / max(self.sd, 1e-12)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServedOutcome:
+    """A case as it was served at its end: what is not identifiable as the prior has it.
+
+    `parameters` are tilt, roll, height, heading; none where nothing could be learned or estimated,
+    and `failure` says why. `rotation_deg` is the whole rotation between the served and the true
+    pose, `height_error` a share of the height. `cuts` windows were cut at a change, where there
+    was none. `mapped` says whether the flow map had a part, `reason` what was said of it.
+    """
+
+    reference_tracks: int
+    seen_tracks: int
+    used_tracks: int
+    parameters: tuple[ParameterOutcome, ...]
+    rotation_deg: float
+    height_error: float
+    cuts: int
+    mapped: bool
+    reason: str
+    seconds: float
+    failure: str = ""
+
+
+def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> ServedOutcome:
+    """What the service would serve of a case after its last batch; None: its site is not known."""
+    started = time.monotonic()
+    failure = "" if site is not None else "the reference tells nothing"
+    last, cuts = None, 0
+    try:
+        if site is not None:
+            for look in looks(case.seen, site, window):
+                last, cuts = look, cuts + (look.cut is not None)
+            failure = "" if last is not None else "too few people walk"
+    except CalibrationError as error:
+        failure = f"{type(error).__name__}: {error}"
+    if last is None or failure:
+        return _unserved(case, failure, time.monotonic() - started)
+    served = last.finding.pose
+    return ServedOutcome(
+        reference_tracks=len(case.reference),
+        seen_tracks=len(case.seen),
+        used_tracks=last.finding.joint.walkers,
+        parameters=parameters_beside(last.finding, case.prior_pose, case.true_pose),
+        rotation_deg=angle_deg(served, case.true_pose),
+        height_error=abs(served.height_m / case.true_pose.height_m - 1),
+        cuts=cuts,
+        mapped=last.finding.fused.registered,
+        reason=reason_of(last.finding),
+        seconds=time.monotonic() - started,
+    )
+
+
+def parameters_beside(
+    found: PoseFinding, prior: CameraPose, truth: CameraPose
+) -> tuple[ParameterOutcome, ...]:
+    """Each parameter of a finding beside the truth."""
+    estimate = found.fused
+    sds = np.sqrt(np.diag(estimate.covariance))
+    columns = zip(PARAMETERS, array_of(prior), array_of(truth), estimate.values, sds, strict=True)
+    return tuple(
+        ParameterOutcome(
+            moved=_apart(name, before, true),
+            error=_apart(name, true, value),
+            sd=_apart(name, 0.0, sd),
+            identifiable=name in estimate.identifiable,
+        )
+        for name, before, true, value, sd in columns
+    )
+
+
+def _apart(name: str, one: float, other: float) -> float:
+    """From one value of a parameter to another: degrees within half a turn, or the log's."""
+    if name == "height":
+        return float(other - one)
+    return math.degrees(math.remainder(float(other - one), 2 * math.pi))
+
+
+def reason_of(found: PoseFinding) -> str:
+    """The code of what is said of the flow map; empty where nothing is."""
+    return "" if found.fused.reason is None else str(found.fused.reason.code)
+
+
+def _unserved(case: ProtocolCase, failure: str, seconds: float) -> ServedOutcome:
+    """The prior pose is served where nothing is identifiable."""
+    return ServedOutcome(
+        reference_tracks=len(case.reference),
+        seen_tracks=len(case.seen),
+        used_tracks=0,
+        parameters=(),
+        rotation_deg=angle_deg(case.prior_pose, case.true_pose),
+        height_error=abs(case.prior_pose.height_m / case.true_pose.height_m - 1),
+        cuts=0,
+        mapped=False,
+        reason="",
+        seconds=seconds,
+        failure=failure,
+    )

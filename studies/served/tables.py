@@ -1,0 +1,214 @@
+"""The tables of `python -m studies protocol`, in Markdown."""
+
+from collections.abc import Iterable, Sequence
+
+from studies.faults.catalogue import FAULTS
+from studies.lines_file import Heading
+from studies.pages import markers
+from studies.served.figures import Figures, ParameterFigures, figures_of
+from studies.served.outcomes import ServedOutcome
+from studies.served.replays import ReplayOutcome
+from studies.served.tasks import ALONE, MOVES, Asked, Found, Table
+
+BETWEEN = markers("protocol", "python -m studies protocol --write")
+_KNOCKS = {
+    "still": "still",
+    "knock": "tilt, roll, height",
+    "pan": "all four",
+    "tilt-alone": "tilt alone",
+    "roll-alone": "roll alone",
+    "height-alone": "height alone",
+    "pan-alone": "pan alone",
+}
+_MOVES = {"still": "still", "pan-2": "pan by 2 deg", "pan": "all four"}
+_SHOWN = (
+    "whole rotation, deg",
+    "height",
+    "tilt, roll, pan, deg",
+    "covers: tilt, roll, height, pan",
+    "identifiable",
+    "beyond 5 sd",
+    "cut",
+)
+
+
+def all_tables(heading: Heading, found: Iterable[Found]) -> str:
+    """Every table that there is something for, under a line that says whence."""
+    rows = list(found)
+    seeds = sorted({each.asked.seed for each in rows})
+    batches = sorted({each.asked.batch for each in rows})
+    said = [
+        f"{len(rows)} cases and replays, seeds {_listed(seeds)}, in batches of {_listed(batches)}; "
+        f"begun {heading.begun}, code {heading.code}, {heading.cores} cores of "
+        f"{heading.processor}. Medians (90th percentiles); pan is the heading."
+    ]
+    cases = [(e.asked, e.outcome) for e in rows if isinstance(e.outcome, ServedOutcome)]
+    replays = [(e.asked, e.outcome) for e in rows if isinstance(e.outcome, ReplayOutcome)]
+    if any(asked.table in (Table.TIME, Table.PEOPLE) for asked, _ in cases):
+        said += [_knock_table(cases), _scene_table(cases)]
+    if any(asked.table == Table.FAULTS for asked, _ in cases):
+        said.append(_fault_table(cases))
+    if replays:
+        said.append(_replay_table(replays))
+    return "\n".join(f"{each.rstrip()}\n" for each in said)
+
+
+_Cases = Sequence[tuple[Asked, ServedOutcome]]
+
+
+def _knock_table(cases: _Cases) -> str:
+    """Over all scenes, by what was moved; the slopes, too."""
+    lines = _head("moved", "n", *_SHOWN, "slope: tilt, roll, height, pan")
+    for table, words in ((Table.TIME, "later people"), (Table.PEOPLE, "random people")):
+        for size in _sizes(cases, table):
+            for knock, name in _KNOCKS.items():
+                own = [
+                    o
+                    for a, o in cases
+                    if a.table == table and a.knock == knock and _size(a) == size
+                ]
+                if own:
+                    said = figures_of(own)
+                    title = f"{name}; {words}{_of_size(size)}"
+                    lines.append(_row(title, said.cases, *_cells(said), _slopes(said)))
+    return "**By what was moved**, over all scenes:\n\n" + "\n".join(lines)
+
+
+def _scene_table(cases: _Cases) -> str:
+    lines = _head("scene (tracks: reference, after)", "moved", "n", *_SHOWN)
+    scenes = dict.fromkeys((a.scene, _size(a)) for a, _ in cases if a.table == Table.TIME)
+    kinds = {"still": ("still",), "moved, no pan": _WITHOUT_PAN, "moved, pan": _WITH_PAN}
+    for scene, size in scenes:
+        for kind, knocks in kinds.items():
+            for table, words in ((Table.TIME, "later"), (Table.PEOPLE, "random")):
+                own = [
+                    o
+                    for a, o in cases
+                    if (a.scene, _size(a)) == (scene, size)
+                    and a.table == table
+                    and a.knock in knocks
+                ]
+                if own:
+                    said = figures_of(own)
+                    title = f"{scene} ({said.reference_tracks:.0f}, {said.seen_tracks:.0f})"
+                    lines.append(_row(title, f"{kind}; {words}", said.cases, *_cells(said)))
+    return "**By scene**:\n\n" + "\n".join(lines)
+
+
+_WITHOUT_PAN = ("knock", "tilt-alone", "roll-alone", "height-alone")
+_WITH_PAN = ("pan", "pan-alone")
+assert set(ALONE) <= {*_WITHOUT_PAN, *_WITH_PAN}
+
+
+def _fault_table(cases: _Cases) -> str:
+    own = [(a, o) for a, o in cases if a.table == Table.FAULTS]
+    scenes = dict.fromkeys(a.scene for a, _ in own)
+    lines = _head("fault", "moved", "n", *_SHOWN, "covered or declared")
+    for fault in ("", *FAULTS):
+        for knock in ("still", "pan"):
+            some = [o for a, o in own if a.fault == fault and a.knock == knock]
+            if some:
+                said = figures_of(some)
+                name = f"{fault} ({FAULTS[fault].words})" if fault else "none"
+                lines.append(
+                    _row(name, _KNOCKS[knock], said.cases, *_cells(said), f"{said.sound:.0%}")
+                )
+    return f"**Faults**, later people of {', '.join(scenes)}:\n\n" + "\n".join(lines)
+
+
+def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
+    lines = _head(
+        "camera", "moved", "seed", "reference tracks", "still: tracks", "map in use",
+        "“paths have changed”", "cuts", "alarm after", "covers: tilt, roll, height, pan",
+        "worst, sd", "moved: tracks", "alarm after", "map in use",
+        "250 tracks on: error (sd) of tilt, roll, pan, deg",
+    )  # fmt: skip
+    order = {move: place for place, move in enumerate(MOVES)}
+    for asked, told in sorted(
+        replays, key=lambda each: (each[0].scene, order[each[0].knock], each[0].seed)
+    ):
+        before, after = told.before, told.after
+        cells = [
+            asked.scene, _MOVES[asked.knock], asked.seed, told.reference_tracks, before.tracks,
+            f"{before.mapped:.0%}", f"{before.paths_changed:.0%}", before.cuts,
+            _after(before.alarm_after),
+            ", ".join(
+                "-" if not n else f"{100 * c / n:.0f}"
+                for c, n in zip(before.covered, before.identifiable, strict=True)
+            ),
+            f"{before.worst_sd:.1f}",
+        ]  # fmt: skip
+        if after is None:
+            cells += ["", "", "", ""]
+        else:
+            cells += [after.tracks, _after(after.alarm_after), f"{after.mapped:.0%}"]
+            cells.append(
+                "too few came"
+                if told.measured is None
+                else ", ".join(
+                    f"{n.error:+.2f} ({n.sd:.2f})" if n.identifiable else "not identifiable"
+                    for n in (told.measured[0], told.measured[1], told.measured[3])
+                )
+            )
+        lines.append(_row(*cells))
+    return "**Long recordings in their order**, a map that never grows:\n\n" + "\n".join(lines)
+
+
+def _cells(said: Figures) -> list[str]:
+    tilt, roll, height, pan = said.parameters
+    errors = ", ".join(_or_dash(each.error, "{:.2f}") for each in (tilt, roll, pan))
+    every = (tilt, roll, height, pan)
+    told = min(each.identifiable for each in every)
+    return [
+        f"{said.rotation_deg:.2f} ({said.rotation_p90_deg:.1f})",
+        f"{100 * said.height_error:.1f} % ({100 * said.height_error_p90:.0f})",
+        errors,
+        ", ".join(_or_dash(_percent(each), "{:.0f}") for each in every) + " %",
+        "all" if told == 1 else ", ".join(f"{each.identifiable:.0%}" for each in every),
+        str(said.beyond),
+        f"{said.cut:.0%}",
+    ]
+
+
+def _percent(parameter: ParameterFigures) -> float | None:
+    return None if parameter.covered is None else 100 * parameter.covered
+
+
+def _slopes(said: Figures) -> str:
+    return ", ".join(_or_dash(each.slope, "{:.2f}") for each in said.parameters)
+
+
+def _or_dash(value: float | None, form: str) -> str:
+    return "-" if value is None else form.format(value)
+
+
+def _after(tracks: int | None) -> str:
+    return "none" if tracks is None else str(tracks)
+
+
+_Size = tuple[int | None, int | None]
+
+
+def _size(asked: Asked) -> _Size:
+    return asked.reference, asked.seen if asked.reference is not None else None
+
+
+def _sizes(cases: _Cases, table: Table) -> list[_Size]:
+    found = {_size(asked) for asked, _ in cases if asked.table == table}
+    return sorted(found, key=lambda size: size[0] or 0)
+
+
+def _of_size(size: _Size) -> str:
+    return "" if size[0] is None else f", {size[1]} after {size[0]}"
+
+
+def _listed(values: Sequence[int]) -> str:
+    return ", ".join(map(str, values))
+
+
+def _head(*names: str) -> list[str]:
+    return [_row(*names), _row(*("---" for _ in names))]
+
+
+def _row(*cells: object) -> str:
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"

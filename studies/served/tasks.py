@@ -1,0 +1,201 @@
+"""What `protocol` asks: cases and replays of recordings, each with a name of its own."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import ShapeError, TooFewTrajectoriesError
+from models.pose import CameraSite, learn_site, observe
+from models.simulation.pose_offset import Knock
+from models.tracks.scenes import Scene
+from studies.faults.catalogue import FAULTS
+from studies.protocol.cases import PANNED, RANGES, draw_case
+from studies.protocol.partings import Parting, Split
+from studies.recordings import load_recording
+from studies.served.outcomes import ServedOutcome, serve_case
+from studies.served.replays import ReplayOutcome, ReplayPlan, replay
+
+
+class Table(StrEnum):
+    """The tables, each of cases of its own."""
+
+    TIME = "time"
+    PEOPLE = "people"
+    FAULTS = "faults"
+    REPLAYS = "replays"
+
+
+ALONE = ("tilt-alone", "roll-alone", "height-alone", "pan-alone")
+_KNOCKS = {
+    Table.TIME: ("still", "pan", "knock", *ALONE),
+    Table.PEOPLE: ("still", "pan", "knock", "pan-alone"),
+    Table.FAULTS: ("still", "pan"),
+}
+MOVES = ("still", "pan-2", "pan")
+_LONG = 1500  # tracks; of longer recordings parts are taken
+_SIZES = ((200, 100), (1000, 400))
+_WINDOW = 400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """One case or replay: what its outcome is stored under."""
+
+    table: Table
+    scene: str
+    seed: int
+    knock: str
+    batch: int
+    fault: str = ""
+    reference: int | None = None
+    seen: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """Some that share a recording and a reference, in the order that they are worked out."""
+
+    folder: Path
+    camera: int
+    asked: tuple[Asked, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What came of one that was asked; `failure` is an error that nobody foresaw."""
+
+    asked: Asked
+    outcome: ServedOutcome | ReplayOutcome | None
+    failure: str = ""
+
+
+def tasks_of(
+    folders: Sequence[Path],
+    *,
+    tables: Sequence[Table],
+    seeds: Sequence[int],
+    batch: int,
+    faults: Sequence[str],
+) -> list[Task]:
+    """All tasks on recordings, table by table.
+
+    Raises:
+        ShapeError: a recording cannot be read, or a fault has no such name.
+    """
+    for fault in faults:
+        if fault not in FAULTS:
+            raise ShapeError(f"faults: {', '.join(FAULTS)} are known, got {fault!r}")
+    cameras = [
+        (folder, camera, scene.scene_id, len(scene.tracks))
+        for folder in folders
+        for camera, scene in enumerate(load_recording(folder))
+    ]
+    return [
+        Task(folder=folder, camera=camera, asked=asked)
+        for table in tables
+        for folder, camera, name, tracks in cameras
+        for asked in _asked(table, name, tracks > _LONG, seeds, batch, faults)
+    ]
+
+
+def work(task: Task, plan: ReplayPlan) -> list[Found]:
+    """What comes of a task, each part by itself: what fails is told and stops no other."""
+    scene = _cameras(task.folder)[task.camera]
+    found = []
+    sites: dict[int, CameraSite | None] = {}
+    for asked in task.asked:
+        try:
+            outcome = (
+                _replayed(scene, asked, plan)
+                if asked.table == Table.REPLAYS
+                else _served(scene, asked, plan, sites)
+            )
+            found.append(Found(asked=asked, outcome=outcome))
+        except Exception as error:
+            found.append(Found(asked=asked, outcome=None, failure=repr(error)))
+    return found
+
+
+def _asked(
+    table: Table,
+    scene: str,
+    long: bool,
+    seeds: Sequence[int],
+    batch: int,
+    faults: Sequence[str],
+) -> Iterator[tuple[Asked, ...]]:
+    """What is asked of a camera in a table, in parts that share a reference."""
+    if table == Table.REPLAYS:
+        if not long:
+            return
+        for seed in seeds:
+            for move in MOVES if seed == seeds[0] else MOVES[1:]:  # nothing is drawn while still
+                asked = Asked(
+                    table=table,
+                    scene=scene,
+                    seed=seed,
+                    knock=move,
+                    batch=batch,
+                    reference=_SIZES[-1][0],
+                )
+                yield (asked,)
+        return
+    sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
+    names = [""] if table != Table.FAULTS else ["", *faults]
+    for seed in seeds:
+        for reference, seen in sizes if table != Table.FAULTS else sizes[-1:]:
+            for fault in names:
+                # Of halves in time nothing is drawn but the knock and the fault.
+                drawn = table == Table.PEOPLE or long or bool(fault) or seed == seeds[0]
+                yield tuple(
+                    Asked(
+                        table=table, scene=scene, seed=seed, knock=knock, batch=batch,
+                        fault=fault, reference=reference, seen=seen,
+                    )
+                    for knock in _KNOCKS[table]
+                    if drawn or knock != "still"
+                )  # fmt: skip
+
+
+def _served(
+    scene: Scene, asked: Asked, plan: ReplayPlan, sites: dict[int, CameraSite | None]
+) -> ServedOutcome:
+    parting = Parting(
+        split=Split.PEOPLE if asked.table == Table.PEOPLE else Split.TIME,
+        reference_tracks=asked.reference,
+        seen_tracks=asked.seen,
+    )
+    fault = FAULTS[asked.fault] if asked.fault else None
+    case = draw_case(scene, asked.seed, RANGES[asked.knock], parting, fault)
+    if 0 not in sites:  # the tracks before the knock are the same whatever the knock
+        known = observe(case.reference, case.intrinsics, case.prior_pose)
+        try:
+            sites[0] = learn_site(known, case.intrinsics, case.prior_pose, chart=False)
+        except TooFewTrajectoriesError:
+            sites[0] = None
+    return serve_case(case, sites[0], plan.window)
+
+
+def _replayed(scene: Scene, asked: Asked, plan: ReplayPlan) -> ReplayOutcome:
+    rng = np.random.default_rng([asked.seed, 1])
+    knock: Knock | None = None
+    if asked.knock == "pan-2":
+        knock = Knock(heading_rad=float(rng.choice([-1, 1]) * np.radians(2)))
+    elif asked.knock == "pan":
+        tilt, roll, log_height, heading = rng.uniform(-1, 1, 4)
+        knock = Knock(
+            tilt_rad=tilt * PANNED.tilt_rad,
+            roll_rad=roll * PANNED.roll_rad,
+            log_height=log_height * PANNED.log_height,
+            heading_rad=heading * PANNED.heading_rad,
+        )
+    return replay(scene, knock, asked.seed, asked.reference or _SIZES[-1][0], plan)
+
+
+@lru_cache(maxsize=1)
+def _cameras(folder: Path) -> list[Scene]:
+    return load_recording(folder)

@@ -1,0 +1,1 @@
+"""Cameras, crowds and habits that studies alone draw."""

@@ -1,0 +1,1 @@
+"""Making of the weights that every training begins with."""

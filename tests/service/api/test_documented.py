@@ -1,0 +1,53 @@
+"""What `/openapi.json` says of errors."""
+
+from service.enums import AlertKind, PoseState
+from service.reasons import CODES
+
+
+def answers(http, path, method):
+    operation = http.get("/openapi.json").json()["paths"][path][method]
+    return {
+        int(status): list(answer.get("content", {}))
+        for status, answer in operation["responses"].items()
+    }
+
+
+def test_errors_are_described_as_problem_documents(http):
+    described = answers(http, "/cameras/{camera_id}", "patch")
+    problem = ["application/problem+json"]
+    assert described[200] == ["application/json"]
+    for status in (404, 409, 412, 413, 422, 428, 429, 503):
+        assert described[status] == problem
+    schemas = http.get("/openapi.json").json()["components"]["schemas"]
+    assert "HTTPValidationError" not in schemas
+    body = http.patch("/cameras/nowhere", json={}).json()
+    assert set(schemas["Problem"]["required"]) <= set(body) <= set(schemas["Problem"]["properties"])
+
+
+def test_it_says_which_scope_a_route_needs(http):
+    document = http.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
+    paths = document["paths"]
+    assert paths["/cameras/{camera_id}/tracks"]["post"]["security"] == [{"token": ["ingest"]}]
+    assert paths["/cameras/{camera_id}"]["patch"]["security"] == [{"token": ["admin"]}]
+    assert paths["/healthz"]["get"]["security"] == []
+
+
+def test_only_what_a_route_takes_can_be_wrong_about_it(http):
+    assert set(answers(http, "/healthz", "get")) == {200}
+    assert 404 not in answers(http, "/alerts", "get")
+    assert 415 in answers(http, "/cameras/{camera_id}/tracks", "post")
+    assert answers(http, "/readyz", "get")[503] == ["application/json"]
+    assert answers(http, "/cameras/{camera_id}/pose.yaml", "get")[200] == ["application/yaml"]
+    assert answers(http, "/cameras/{camera_id}/pose", "get")[304] == []
+
+
+def test_a_code_stands_beside_every_reason(http):
+    schemas = http.get("/openapi.json").json()["components"]["schemas"]
+    for name in ("ServedPoseOut", "AlertOut", "AlertDetail"):
+        fields = schemas[name]["properties"]
+        assert {"reason", "reason_code", "reason_values"} <= set(schemas[name]["required"])
+        code, nothing = fields["reason_code"]["anyOf"]
+        assert (code["enum"], nothing) == (list(CODES), {"type": "null"})
+    for name, words in (("PoseState", PoseState), ("AlertKind", AlertKind)):
+        assert schemas[name]["enum"] == list(words)

@@ -1,0 +1,132 @@
+"""Limits that say when to come back: rates, cameras, bytes of a camera."""
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from models.tracks.scenes import SceneTrack
+from models.tracks.trajectory import Trajectory
+from service.api.middleware.rates import Buckets
+from service.app import create_app
+from service.commands.replay import post_tracks
+from service.errors import TooManyRequestsError
+from service.store.database.store import Store
+from tests.conftest import CAMERA, track
+from tests.service.conftest import problem
+
+URL = "/cameras/corner/tracks"
+
+
+@contextmanager
+def client_of(settings, **changes):
+    with TestClient(create_app(settings.model_copy(update=changes))) as client:
+        assert client.post("/cameras", json=CAMERA).status_code == 201
+        yield client
+
+
+class Clock:
+    """A clock that stands but when somebody sleeps by it."""
+
+    def __init__(self):
+        self.now_s = 1000.0
+
+    def monotonic(self):
+        return self.now_s
+
+    def sleep(self, seconds):
+        self.now_s += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The clock of the rates, and of a replay that waits for them."""
+    clock = Clock()
+    monkeypatch.setattr("service.api.middleware.rates.time", clock)
+    monkeypatch.setattr("service.commands.replay.time", clock)
+    return clock
+
+
+@pytest.mark.usefixtures("clock")
+def test_a_camera_is_told_of_so_often(settings):
+    with client_of(settings, camera_rate=0.1) as client:
+        assert client.post(URL, json={"tracks": [track("1")]}).status_code == 202
+        answer = client.post(URL, json={"tracks": [track("2")]})
+        problem(answer, 429, "too_many_requests")
+        assert answer.headers["retry-after"] == "10"
+        # Others, and reads of the same one, are free.
+        problem(client.post("/cameras/other/tracks", json={"tracks": []}), 404, "not_found")
+        assert client.get("/cameras/corner").json()["tracks"] == 1
+        counted = client.get("/metrics").text
+        assert 'surefoot_http_refusals_total{code="too_many_requests"} 1.0' in counted
+
+
+def test_a_replay_comes_back_when_it_is_told_to(settings, clock):
+    points = np.array(track("1")["points"])
+    walk = Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+    with client_of(settings, camera_rate=1.0) as client:
+        for n in range(6):  # five at once, and the sixth after a second
+            seen = [SceneTrack(track_id=str(n), trajectory=walk)]
+            assert post_tracks(client, "corner", seen, 0.0)["accepted"] == 1
+        assert clock.now_s == 1001.0
+        counted = client.get("/metrics").text
+        assert 'surefoot_http_refusals_total{code="too_many_requests"} 1.0' in counted
+
+
+@pytest.mark.usefixtures("clock")
+def test_a_caller_asks_so_often_but_health_is_free(settings):
+    with client_of(settings, caller_rate=0.4) as client:
+        assert client.get("/cameras").status_code == 200
+        problem(client.get("/cameras"), 429, "too_many_requests")
+        assert client.get("/healthz").status_code == 200
+        assert client.get("/readyz").json()["store_writable"]
+
+
+def test_a_bucket_fills_again_and_the_quiet_are_forgotten(clock, monkeypatch):
+    monkeypatch.setattr("service.api.middleware.rates._MOST_KEYS", 3)
+    buckets = Buckets("rate", 2.0)
+    for _ in range(10):
+        buckets.take("a")
+    with pytest.raises(TooManyRequestsError) as refused:
+        buckets.take("a")
+    assert refused.value.retry_after_s == pytest.approx(0.5)
+    clock.sleep(0.5)
+    buckets.take("a")
+    with pytest.raises(TooManyRequestsError):
+        buckets.take("a")
+    for key in "bcde":
+        buckets.take(key)
+    assert list(buckets._levels) == ["c", "d", "e"]
+
+
+def test_so_many_cameras(settings):
+    with client_of(settings, max_cameras=2) as client:
+        assert client.post("/cameras", json={**CAMERA, "id": "b"}).status_code == 201
+        answer = client.post("/cameras", json={**CAMERA, "id": "c"})
+        assert "SUREFOOT_MAX_CAMERAS" in problem(answer, 409, "too_many_cameras")["detail"]
+        client.delete("/cameras/b", headers={"If-Match": "*"})
+        assert client.post("/cameras", json={**CAMERA, "id": "c"}).status_code == 201
+
+
+def test_a_camera_has_its_bytes(settings, monkeypatch):
+    """A track of 20 points has 480 bytes: 0.02 MB are kept, and half more until some go."""
+    with client_of(settings, keep_mb=0.02) as client:
+        taken = 0
+        for n in range(10):
+            batch = [track(f"{n}-{k}") for k in range(10)]
+            answer = client.post(URL, json={"tracks": batch})
+            if answer.status_code != 202:
+                break
+            taken += 10
+        document = problem(answer, 429, "quota_exceeded")
+        assert "SUREFOOT_KEEP_MB" in document["detail"]
+        assert int(answer.headers["retry-after"]) >= 60
+        assert 0.02 * 1e6 <= taken * 480 <= 0.03 * 1e6
+        assert client.get("/cameras/corner").json()["tracks"] == taken
+        # Retention makes room; the count is taken anew.
+        with Store(settings).write() as session:
+            session.execute(text("DELETE FROM tracks"))
+        monkeypatch.setattr("service.cameras.quota._RECOUNT_S", 0.0)
+        assert client.post(URL, json={"tracks": batch}).status_code == 202

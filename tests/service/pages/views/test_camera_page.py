@@ -1,0 +1,172 @@
+"""A camera's page out of the store: the sentence, drawings, flags, activity, the script."""
+
+import gzip
+import html
+import re
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from service.api.middleware.packaged import CHARTS_URL
+from service.app import create_app
+from tests.conftest import CAMERA, track
+from tests.service.bench import PRIOR, moved
+from tests.service.conftest import problem
+
+URL = "/ui/cameras/corner"
+
+
+def page(http):
+    answer = http.get(URL)
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"].startswith("text/html")
+    return answer.text
+
+
+def headline(http):
+    return html.unescape(re.search(r'<p class="headline">(.*?)</p>', page(http), re.S)[1])
+
+
+def test_a_new_camera_says_how_much_is_missing(corner):
+    assert headline(corner) == "Learning: 0 of 200 people."
+    text = page(corner)
+    assert "Nobody was seen yet" in text
+    assert 'class="grid prior"' in text
+    assert 'class="grid served"' not in text
+    corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]}).raise_for_status()
+    assert headline(corner) == "Learning: 1 of 200 people."
+
+
+def test_a_still_camera_says_so_and_by_whom(bench):
+    bench.see(PRIOR, paths=True)
+    assert headline(bench.http) == (
+        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.3°."
+    )
+
+
+def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
+    bench.see(PRIOR, paths=True)
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0, heading_deg=-3.0), paths=True)
+    said = headline(bench.http)
+    assert re.fullmatch(
+        r"The camera turned 5\.8° \(pan −3\.0°, tilt \+5\.0°\) about \d\d:\d\d.*; sure to ±0\.3°\.",
+        said,
+    ), said
+    text = page(bench.http)
+    assert "A person at 10 m is now placed 2.4 m too far" in text
+    assert 'class="grid served"' in text
+    assert text.count('data-act="acknowledge"') == 1
+    assert "beyond 5 sd" in text  # the reason, as the API says it
+
+
+def test_it_may_have_moved_before_an_alert_says_so(bench):
+    bench.see(moved(tilt_deg=5.0), earlier=PRIOR)
+    assert headline(bench.http) == (
+        "It may have moved: it turned 5.0° (tilt +5.0°). The next people will tell."
+    )
+
+
+def test_what_the_newest_people_cannot_tell_is_not_told(bench):
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    bench.see(moved(tilt_deg=5.0), unidentifiable=("tilt", "roll", "height"))
+    assert headline(bench.http).endswith("the newest people cannot tell how far.")
+    assert "not told by the tracks" in page(bench.http)
+
+
+def test_a_silent_camera_that_had_moved_still_says_so(bench):
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    strict = bench.settings.model_copy(update={"no_data_after_h": 0.5})
+    with TestClient(create_app(strict)) as http:
+        said = headline(http)
+    assert said.startswith("The camera turned 5.0°")
+    assert re.search(r"No people since \d\d:\d\d.*: the newest track ended 0\.9 h ago", said)
+
+
+def test_flags_and_deeds_say_who_did_what(bench):
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    (alert,) = bench.alerts()
+    until = datetime.now(UTC) + timedelta(hours=8)
+    http = bench.http
+    http.post(f"/alerts/{alert['id']}/acknowledge", json={"by": "Ada"}).raise_for_status()
+    body = {"until": until.isoformat(), "by": "Bo", "reason": "the <fair>"}
+    http.post(f"/alerts/{alert['id']}/silence", json=body).raise_for_status()
+    http.post(
+        "/cameras/corner/maintenance", json={"to": until.isoformat(), "by": "Cy"}
+    ).raise_for_status()
+    text = page(http)
+    flags = re.findall(r'<span class="flag">(.*?)</span>', text)
+    assert flags[0].startswith("Maintenance until")
+    assert flags[1] == "Acknowledged by Ada"
+    assert flags[2].startswith("Silenced until")
+    assert "Ada acknowledged the alert “the camera moved”." in text
+    assert "Bo silenced the alert “the camera moved” until" in text
+    assert "the &lt;fair&gt;" in text
+    assert "Cy planned maintenance until" in text
+    assert 'data-act="unsilence"' in text
+    http.post("/cameras/corner/pose/accept", json={"by": "Ada"}).raise_for_status()
+    text = page(http)
+    assert "Ada accepted the new pose as the prior pose." in text
+    assert "Past alerts (1)" in text
+    assert 'data-act="acknowledge"' not in text
+
+
+def test_names_are_never_markup(http):
+    name = '<script>alert("x")</script>'
+    http.post("/cameras", json={**CAMERA, "name": name}).raise_for_status()
+    text = page(http)
+    assert name not in text
+    assert html.escape(name, quote=False).replace('"', "&#34;") in text
+
+
+def test_the_page_lets_no_stranger_in(corner):
+    answer = corner.get(URL)
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'self'" in policy
+    assert "unsafe" not in policy
+    assert not re.search(r'(src|href)="(https?:)?//', answer.text)
+    assert " style=" not in answer.text
+    assert " onclick=" not in answer.text
+
+
+def test_there_is_no_page_of_no_camera(http):
+    problem(http.get("/ui/cameras/nowhere"), 404, "not_found")
+    looked_for = http.get("/ui/cameras/nowhere", headers={"Accept": "text/html"})
+    assert looked_for.status_code == 404
+    assert looked_for.headers["content-type"].startswith("text/html")
+
+
+def test_the_chart_script_comes_out_of_its_package(corner):
+    assert CHARTS_URL in page(corner)
+    answer = corner.get(CHARTS_URL)
+    assert answer.headers["content-type"].startswith("text/javascript")
+    assert answer.headers["content-encoding"] == "gzip"
+    assert "immutable" in answer.headers["cache-control"]
+    assert b"plotly" in answer.content[:200]
+    plain = corner.get(CHARTS_URL, headers={"Accept-Encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+    assert plain.content == answer.content
+    assert len(gzip.compress(answer.content, 6)) < 2_000_000
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_a_still_image_lies_behind_the_drawing_where_it_may(settings, allowed):
+    with TestClient(create_app(settings.model_copy(update={"snapshots": True}))) as http:
+        http.post("/cameras", json=CAMERA).raise_for_status()
+        made = BytesIO()
+        Image.new("RGB", (1280, 720)).save(made, "JPEG")
+        http.put(
+            "/cameras/corner/snapshot", content=made.getvalue(),
+            headers={"Content-Type": "image/jpeg"},
+        ).raise_for_status()  # fmt: skip
+    with TestClient(create_app(settings.model_copy(update={"snapshots": allowed}))) as http:
+        text = page(http)
+    assert ('<image href="/cameras/corner/snapshot?v=' in text) is allowed
+    assert ("It is the only picture kept" in text) is allowed
+    assert ("no picture is kept" in text) is not allowed

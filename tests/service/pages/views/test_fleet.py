@@ -1,0 +1,221 @@
+"""The fleet page and its parts, over a real store."""
+
+import re
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import event
+
+from models.monitoring.verdict import DriftLimits
+from service.cameras.poses import view_pose
+from service.estimation.limits import drift_limits
+from service.pages.rows import rows_of
+from service.pages.views import fleet as use_cases
+from service.pages.wording.words import ago, duration, height_change
+from service.store import fleet as statements
+from service.store.tables.estimates import EstimateRecord
+from tests.service.bench import moved
+from tests.service.fleet_bench import Fleet, afternoon
+from tests.stores.databases import only_sqlite
+
+
+@pytest.fixture
+def fleet(http, settings):
+    made = Fleet(settings)
+    yield made
+    made.close()
+
+
+def rows(html):
+    return re.findall(r'<li class="row (\w+)" id="row-([\w-]+)"', html)
+
+
+def words(html, camera_id):
+    row = html.split(f'id="row-{camera_id}"')[1].split("</li>")[0]
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", row))
+
+
+def test_what_needs_a_person_comes_first(http, fleet):
+    fleet.add("steady")
+    fleet.add("learns", state="learning", tracks=120)
+    fleet.add("silent", state="no_data")
+    fleet.add("seen", state="drifting", tilt_deg=2.0)
+    fleet.knock("seen", by="Ines")
+    fleet.add("knocked", state="drifting", tilt_deg=3.0)
+    fleet.knock("knocked", severity="critical")
+    fleet.add("nudged", state="drifting", tilt_deg=1.5)
+    fleet.knock("nudged", severity="warning")
+    html = http.get("/").text
+    assert rows(html) == [
+        ("drifting", "knocked"),
+        ("drifting", "nudged"),
+        ("drifting", "seen"),
+        ("no_data", "silent"),
+        ("learning", "learns"),
+        ("ok", "steady"),
+    ]
+    keys = re.findall(r'data-key="([^"]+)"', html)
+    assert keys == sorted(keys)  # the page sorts by them as strings
+    assert "turned 3.1° (tilt +3.0°, pan −0.8°), " in words(html, "knocked")
+    assert "cm lower" in words(html, "knocked")
+    assert "seen by Ines" in words(html, "seen")
+    assert "learning what is usual: 120 of 200 people" in words(html, "learns")
+    assert "no people seen for 26 h" in words(html, "silent")
+    assert "standing still" in words(html, "steady")
+    assert "<title>(3) Cameras" in html
+    assert re.search(r"<b>3</b> Moved", html)
+
+
+def test_flags_say_what_is_under_way(http, fleet):
+    for name in ("trained", "attended", "hushed"):
+        fleet.add(name, state="drifting" if name == "hushed" else "ok", tilt_deg=3.0)
+    fleet.train("trained", share=0.37)
+    fleet.attend("attended", hours=2)
+    alert = fleet.knock("hushed")
+    until = (datetime.now(UTC) + timedelta(hours=3)).isoformat()
+    http.post(f"/alerts/{alert}/silence", json={"until": until}).raise_for_status()
+    html = http.get("/").text
+    assert "training 37 %" in words(html, "trained")
+    assert "maintenance for 2 hours more" in words(html, "attended")
+    assert "silenced for 3 hours more" in words(html, "hushed")
+
+
+def test_a_tracker_that_is_to_blame_has_one_banner(http, fleet, settings):
+    for n in range(4):
+        fleet.add(f"cam-{n}", state="drifting", tilt_deg=3.0)
+    with fleet.store.write() as session:
+        for record in session.query(statements.TrackRecord):
+            record.source = "bytetrack"
+    for n in range(4):
+        fleet.knock(f"cam-{n}")
+    html = http.get("/").text
+    assert html.count('class="banner ') == 1
+    assert "Tracker bytetrack:" in html
+    assert "4 cameras" in http.get("/ui/fleet/banners").text
+    assert all("with its tracker" in words(html, f"cam-{n}") for n in range(3))
+
+
+def test_only_the_rows_that_are_asked_for(http, fleet):
+    for name in ("a", "b", "c"):
+        fleet.add(name)
+    assert [name for _, name in rows(http.get("/ui/fleet/rows?ids=c,a,gone").text)] == ["a", "c"]
+    assert len(rows(http.get("/ui/fleet/rows").text)) == 3
+
+
+def test_who_walked_while_somebody_was_there_is_not_learned_of(http, fleet, settings):
+    fleet.add("never", state="learning", tracks=60)
+    fleet.add("once", state="learning", tracks=60)
+    fleet.attend("once", hours=-0.2, began_h=0.4)
+    fleet.add("twice", state="learning", tracks=60)
+    fleet.attend("twice", hours=-0.3, began_h=0.4)
+    fleet.attend("twice", hours=-0.1, began_h=0.2)
+    with fleet.store.read() as session:
+        found = {each.camera_id: each.learned for each in use_cases.list_fleet(session, settings)}
+        for camera_id, learned in found.items():
+            assert learned == view_pose(session, settings, camera_id).reference.tracks
+    assert found["never"] == 60
+    assert 30 < found["once"] < 50  # 20 tracks walk in 12 minutes and 8 s
+    assert 30 < found["twice"] < 50
+
+
+def test_names_are_text_and_never_run(http, fleet):
+    fleet.add("bad", name="<script>alert(1)</script>\"'")
+    answer = http.get("/")
+    assert "<script>alert" not in answer.text
+    assert "&lt;script&gt;alert(1)" in answer.text
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'self'" in policy
+    assert "unsafe" not in policy
+
+
+@only_sqlite("explains its plans")
+def test_no_statement_reads_through_what_grows(http, fleet, settings):
+    """Tracks and estimates are millions: of each camera, a few are looked up."""
+    afternoon(fleet, 12)
+    plans = []
+
+    def note(_conn, cursor, statement, parameters, *_):
+        if statement.startswith("SELECT"):
+            explain = cursor.connection.execute(f"EXPLAIN QUERY PLAN {statement}", parameters)
+            plans.extend(row[3] for row in explain)
+
+    event.listen(fleet.store.engine, "before_cursor_execute", note)
+    with fleet.store.read() as session:
+        use_cases.list_fleet(session, settings)
+        use_cases.list_groups(session)
+    assert plans
+    assert not [plan for plan in plans if re.match(r"SCAN (tracks|estimates|events)", plan)]
+
+
+def test_the_page_and_the_api_say_the_same_state(bench):
+    def both():
+        with bench.store.read() as session:
+            (camera,) = use_cases.list_fleet(session, bench.settings)
+        return camera.state, bench.pose()["state"]
+
+    assert both() == ("learning", "learning")
+    bench.see(moved())
+    assert both() == ("ok", "ok")
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5))
+    assert both() == ("drifting", "drifting")
+    bench.http.post("/cameras/corner/reference/reset").raise_for_status()
+    assert both() == ("learning", "learning")
+
+
+def test_the_history_is_in_units_of_the_limits(bench):
+    bench.see(moved(), unidentifiable=("roll",))
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5, height_m=0.1))
+    limits: DriftLimits = drift_limits(bench.settings)
+    with bench.store.read() as session:
+        history = statements.drift_history(session, None, 3, limits)["corner"]
+        records = session.query(EstimateRecord).order_by(EstimateRecord.id).all()[-3:]
+        expected = []
+        for e in records:
+            drift = {"tilt": e.drift_tilt_rad, "roll": e.drift_roll_rad, "height": e.drift_height_m}
+            sd = {"tilt": e.tilt_sd_rad, "roll": e.roll_sd_rad, "height": e.height_sd_m}
+            expected.append(max(abs(drift[n]) / limits.of(n, sd[n]) for n in e.identifiable))
+    assert history == pytest.approx(expected)
+    assert history[-1] > 3
+
+
+def test_a_large_page_is_packed_for_who_takes_it(http, fleet):
+    afternoon(fleet, 20)
+    packed = http.get("/")
+    plain = http.get("/", headers={"Accept-Encoding": "identity"})
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert rows(packed.text) == rows(plain.text)
+
+
+def test_who_looks_for_a_page_that_is_not_there_gets_one(http):
+    page = http.get("/ui/nothing", headers={"Accept": "text/html,*/*"})
+    assert page.status_code == 404
+    assert page.headers["content-type"].startswith("text/html")
+    assert "All cameras" in page.text
+    assert http.get("/ui/nothing").headers["content-type"] == "application/problem+json"
+
+
+def test_lines_are_made_without_a_store():
+    assert rows_of([], datetime.now(UTC), UTC) == []
+    assert [duration(s) for s in (-1, 89, 100, 5390, 5400, 2e5)] == [
+        "0 seconds", "89 seconds", "2 minutes", "90 minutes", "2 hours", "2 days"
+    ]  # fmt: skip
+    now = datetime.now(UTC)
+    said = {-61: "in 61 seconds", -60: "just now", 9.9: "just now", 10: "10 seconds ago",
+            3000: "50 minutes ago", -7200: "in 2 hours", 11 * 86_400: "2 weeks ago"}  # fmt: skip
+    for seconds, words in said.items():
+        assert ago(now - timedelta(seconds=seconds), now) == words
+    assert [height_change(m) for m in (-0.12, 1.34)] == ["12 cm lower", "1.3 m higher"]
+
+
+def test_static_files_are_kept_and_pages_are_not(http):
+    html = http.get("/").text
+    (style,) = re.findall(r'href="(/ui/static/\w+/style.css)"', html)
+    answer = http.get(style)
+    assert answer.status_code == 200
+    assert "immutable" in answer.headers["cache-control"]
+    assert http.get("/").headers["cache-control"] == "no-store"
+    assert "style=" not in html
+    assert not re.search(r"\son\w+=", html)

@@ -1,0 +1,232 @@
+"""Reasons: every code has its words, which are those that have always been said."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from models.geometry.pose_parameters import PoseParameters
+from models.monitoring.chart import CLOCK, Reading
+from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
+from models.monitoring.verdict_reasons import reason_of_drift, reason_of_reading
+from models.reasons import Reason, TracksCode
+from service.reason_words import group_in_words, in_words
+from service.reasons import (
+    CODES,
+    ServiceCode,
+    as_said,
+    code_of,
+    from_json,
+    some,
+    to_json,
+    values_of,
+)
+
+LIMITS = {
+    "sigmas": 5.0, "floor_rad": math.radians(0.5), "floor_m": 0.2, "people": 12, "clear_ratio": 0.7,
+}  # fmt: skip
+TILT = {"tilt_rad": math.radians(3.1), "tilt_sd_rad": math.radians(0.3)}
+HEIGHT = {"height_m": -0.234, "height_sd_m": 0.1}
+T, S = TracksCode, ServiceCode
+SAID = [
+    (T.BEYOND_LIMITS, {**LIMITS, **TILT, **HEIGHT},
+     "tilt +3.10 deg (sd 0.30), height -0.23 m (sd 0.10) against the prior pose: "
+     "beyond 5 sd and 0.5 deg or 0.2 m"),
+    (T.BEYOND_LIMITS_UNCONFIRMED, {**LIMITS, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose: beyond 5 sd and 0.5 deg or 0.2 m, "
+     "but not so without the newest 12 people"),
+    (T.BEYOND_LIMITS_BEFORE, {**LIMITS, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose: was beyond 5 sd and 0.5 deg or 0.2 m; it "
+     "ends once all is below 70 % of that, and so without the newest 12 people"),
+    (T.BEYOND_LIMITS_LAST_IDENTIFIABLE, LIMITS,
+     "beyond 5 sd and 0.5 deg or 0.2 m when it was last told"),
+    (T.WITHIN_LIMITS, {**LIMITS, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose: not beyond 5 sd and 0.5 deg or 0.2 m"),
+    (T.CHART, {"number": "heading", "sign": -1, "parties": 20, "statistic": 30.4, "level": 8.6},
+     "the last 20 walking groups walk as they would if the heading had gone down "
+     "(drift chart: 30, alarm at 9)"),
+    (T.CHART, {"number": "times", "sign": 1, "parties": 20, "statistic": 30.4, "level": 8.6},
+     "the last 20 walking groups walk as they would if all times were too long "
+     "(drift chart: 30, alarm at 9)"),
+    (T.CREPT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
+               "since": "2026-08-20T07:12:00+00:00", "statistic": 17.2, "level": 14.4},
+     "has crept by +1.2 deg (sd 0.3) in heading since 2026-08-20, by the first map and speeds of "
+     "its reference (creep: 17, alarm at 14)"),
+    (T.SCALE_CHANGED, {"factor": 1.2, "rate_hz": 25.0},
+     "the scale has changed by +20 % and the angles have not: as if 30 frames a second were taken "
+     "for 25, or the camera was raised"),
+    (T.SCALE_CHANGED, {"factor": 0.8, "rate_hz": 25.0},
+     "the scale has changed by -20 % and the angles have not: as if 20 frames a second were taken "
+     "for 25, or the camera was lowered"),
+    (T.PATHS_CHANGED, {}, "the paths have changed: the flow map is left out"),
+    (T.HEADING_AMBIGUOUS, {"turns_rad": [math.radians(-12), math.radians(0.04)]},
+     "turns of -12.0 deg and +0.0 deg explain where people walk about as well"),
+    (T.HEADING_UNIDENTIFIABLE, {"heading_sd_rad": math.radians(4.26)},
+     "where people walk does not tell the heading (sd 4.3 deg)"),
+    (T.UNIDENTIFIABLE, {"roll_sd_rad": math.radians(3.0), "log_height_sd": 0.154},
+     "the tracks cannot tell roll (sd 3.0 deg) and height (sd 15 %)"),
+    (T.UNIDENTIFIABLE, {"tilt_sd_rad": math.radians(3.0), "alike": ["tilt", "height"]},
+     "the tracks cannot tell tilt (sd 3.0 deg): people walk too much alike, one way or along one "
+     "path, and tilt makes up for height"),
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 1, "least_parties": 5},
+     "the 12 tracks are of 1 walking group, at least 5 are needed to tell the camera's "
+     "drift from theirs"),
+    (T.TOO_FEW_GROUPS, {"tracks": 12, "parties": 3, "least_parties": 5},
+     "the 12 tracks are of 3 walking groups, at least 5 are needed to tell the camera's "
+     "drift from theirs"),
+    (T.SPEED_UNUSUAL, {"speed_mps": 2.994, "slow_mps": 0.7, "fast_mps": 2.0},
+     "people walk at 2.99 m/s at the prior pose, 0.7 to 2 m/s is usual: the prior height or the "
+     "frame rate is wrong"),
+    (T.STATURE_UNUSUAL, {"stature_m": 2.5, "short_m": 1.4, "tall_m": 2.2},
+     "boxes say that people are 2.50 m tall at the prior pose, 1.4 to 2.2 m is usual: the prior "
+     "height is wrong"),
+    (T.PIECES, {"tracks": 400.0, "pieces": 250.0},
+     "250 of 400 tracks are pieces of others' walks: the tracker loses people, each of whom "
+     "counts once"),
+    (T.PRIOR_POSE_DOUBTED, {"tilt_rad": math.radians(5), "roll_rad": math.radians(-0.3)},
+     "the reference tracks put the camera +5.0 deg in tilt and -0.3 deg in roll from its prior "
+     "pose: the prior pose is wrong, or the camera had moved before"),
+    (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
+    (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
+    (S.REFERENCE_TRACKS, {"tracks": 40, "wanted": 60}, "40 of 60 reference tracks"),
+    (S.REFERENCE_TRACKS, {"tracks": 60, "wanted": 60},
+     "60 of 60 reference tracks; pieces of one walk count once"),
+    (S.TRACKS_SINCE, {"tracks": 3, "cause": "put_back", "least_walkers": 5},
+     "3 tracks since the camera was put back; at least 5 of people who walk for a few seconds "
+     "inside the image are needed"),
+    (S.LAST_IDENTIFIABLE, {}, "when it was last told:"),
+    (S.MAINTENANCE, {"until": "2026-11-22T09:30:00Z"},
+     "maintenance is under way until 2026-11-22 09:30Z"),
+    (S.MAINTENANCE, {"until": "2026-11-22T09:30:00Z", "note": "new lens"},
+     "maintenance is under way until 2026-11-22 09:30Z (new lens)"),
+    (S.RANGE_EDGE, {"number": "tilt"},
+     "tilt is at the edge of the range that the model in use was trained for"),
+    (S.TRAINING_AROUND, {"state": "queued"}, "a training around the new estimate is queued"),
+    (S.TRAINING_AROUND, {"state": "succeeded"}, "a training around the new estimate has ended"),
+    (S.TRAINING_AROUND, {"state": "cancelled"}, "a training around the new estimate was cancelled"),
+    (S.WITHOUT_PART, {"part": "flow_map", "why": "cannot be read"},
+     "without the flow map: cannot be read"),
+    (S.SILENT_USUAL, {"silent_s": 28800.0}, "no track for 8.0 h, as is usual at this hour"),
+    (S.SILENT_UNUSUAL, {"silent_s": 12960.0, "missed_tracks": 41.7, "late_s": 72000.0},
+     "no track for 3.6 h, where about 42 are usual by now; its tracks come up to 20.0 h late"),
+    (S.SILENT_UNKNOWN, {"silent_s": 90000.0, "limit_s": 86400.0},
+     "the newest track ended 25.0 h ago; up to 24 h are waited for"),
+    (S.MOVED_TOGETHER, {"cameras": 4, "track_source": "byte's"},
+     "4 cameras of the tracker \"byte's\" moved together: the tracker or its clock is the likely "
+     "cause, rather than each camera by itself; cameras that hang on one mast or building would "
+     "look the same"),
+    (S.FELL_SILENT_TOGETHER, {"cameras": 4, "track_source": "bytetrack"},
+     "4 cameras of the tracker 'bytetrack' fell silent together: the tracker, its network or its "
+     "clock is the likely cause, rather than each camera by itself"),
+    (S.OTHER_SOURCES, {"sources": ["a", "b"], "counting": "c", "silent_s": 21600.0, "wanted": 60},
+     "tracks of 'a' and 'b' come beside those of 'c', which count: they are kept and move nothing. "
+     "Should 'c' fall silent for 6 h, they take over once 60 of them were seen while the camera "
+     "was where it should be; a person can say so at once"),
+    (S.LOOKS_FAIL, {"tries": 3, "error": "KeyError('x')"},
+     "its tracks cannot be looked at: 3 tries failed in a row, the last with KeyError('x')"),
+    (S.TRACKS_WAIT, {"waits_s": 1230.0, "limit_s": 900.0},
+     "its tracks have waited for 20 min; up to 15 min are waited for"),
+    (S.DISABLED_BY_PERSON, {}, "disabled by a person"),
+    (S.ENDPOINT_GONE, {}, "it answered 410: it is gone for good"),
+    (S.ENDPOINT_FAILS, {"patience_s": 259200.0, "error": "answered 500"},
+     "it failed for more than 72 h: answered 500"),
+    (S.SECRET_LOST, {},
+     "its secret was lost with the key: fetch a new one, tell the receiver, enable it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "values", "words"), SAID)
+def test_the_words_of_a_reason_outlive_a_store(code, values, words):
+    reasons = (Reason(code=code, values=values),)
+    kept = from_json(json.loads(json.dumps(to_json(reasons), allow_nan=False)))
+    assert in_words(kept) == in_words(reasons) == words
+    assert kept == reasons
+    assert kept[0].code is code
+
+
+def test_every_code_has_words():
+    assert {str(code) for code, _, _ in SAID} == set(CODES)
+
+
+def test_reasons_are_said_one_after_the_other():
+    assert in_words(()) == ""
+    changed = Reason(code=T.PATHS_CHANGED)
+    missing = Reason(code=S.REFERENCE_TRACKS, values={"tracks": 1, "wanted": 2})
+    assert in_words((Reason(code=S.LAST_IDENTIFIABLE), changed, missing)) == (
+        "when it was last told: the paths have changed: the flow map is left out; "
+        "1 of 2 reference tracks"
+    )
+    assert in_words(some(None, *as_said("far"), None)) == "far"
+
+
+def test_a_group_is_said_beside_its_trackers_name_without_it():
+    values = {"cameras": 4, "track_source": "bytetrack"}
+    words = group_in_words((Reason(code=S.FELL_SILENT_TOGETHER, values=values),))
+    assert words.startswith("4 cameras fell silent together: the tracker, its network or its clock")
+
+
+def test_clients_get_the_first_code_and_its_angles_in_degrees():
+    reasons = (
+        Reason(code=T.WITHIN_LIMITS, values={**LIMITS, **TILT}),
+        Reason(code=T.HEADING_AMBIGUOUS, values={"turns_rad": [0.1]}),
+    )
+    assert code_of(reasons) == "within_limits"
+    assert values_of(reasons) == {
+        "sigmas": 5.0, "floor_deg": pytest.approx(0.5), "floor_m": 0.2, "people": 12,
+        "clear_ratio": 0.7, "tilt_deg": pytest.approx(3.1), "tilt_sd_deg": pytest.approx(0.3),
+    }  # fmt: skip
+    assert values_of(reasons[1:]) == {"turns_deg": [pytest.approx(math.degrees(0.1))]}
+    assert (code_of(()), values_of(())) == (None, {})
+
+
+DRIFT = Drift(
+    by=PoseParameters(height_m=0.3, tilt_rad=0.1, roll_rad=0.0, heading_rad=0.2),
+    sd=PoseParameters(height_m=0.1, tilt_rad=0.01, roll_rad=0.01, heading_rad=0.01),
+    angle_rad=0.1, identifiable=("tilt", "heading"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("excess", "drifted", "identifiable", "code"),
+    [
+        (1.5, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS),
+        (0.8, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS_BEFORE),
+        (1.5, (), DRIFT.identifiable, T.BEYOND_LIMITS_UNCONFIRMED),
+        (0.8, (), DRIFT.identifiable, T.WITHIN_LIMITS),
+        (0.0, ("tilt",), (), T.BEYOND_LIMITS_LAST_IDENTIFIABLE),
+    ],
+)
+def test_a_verdict_gives_what_is_identifiable_as_its_reason(excess, drifted, identifiable, code):
+    verdict = DriftVerdict(streak=0, excess=excess, drifted=drifted)
+    reason = reason_of_drift(
+        replace(DRIFT, identifiable=identifiable), verdict, DriftLimits(**LIMITS)
+    )
+    assert reason is not None
+    assert reason.code is code
+    numbers = {} if not identifiable else {
+        "tilt_rad": 0.1, "tilt_sd_rad": 0.01, "heading_rad": 0.2, "heading_sd_rad": 0.01,
+    }  # fmt: skip
+    assert reason.values == {**LIMITS, **numbers}
+
+
+def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():
+    verdict = DriftVerdict(streak=0, excess=0.0, drifted=())
+    assert reason_of_drift(replace(DRIFT, identifiable=()), verdict, DriftLimits(**LIMITS)) is None
+
+
+@pytest.mark.parametrize(("number", "name"), [(0, "tilt"), (2, "height"), (CLOCK, "times")])
+def test_a_suspicious_reading_is_a_reason(number, name):
+    reading = Reading(
+        statistic=9.0,
+        level=8.0,
+        parameter=number,
+        sign=1,
+        walking_groups=20,
+        track_idx=3,
+        suspicious=True,
+    )
+    reason = reason_of_reading(reading)
+    assert reason is not None
+    assert (reason.code, reason.values["number"]) == (T.CHART, name)
+    assert reason_of_reading(replace(reading, suspicious=False)) is None

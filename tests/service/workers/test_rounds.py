@@ -1,0 +1,67 @@
+"""The rounds of the upkeep: the quick ones do not wait for those of an hour."""
+
+import threading
+
+import pytest
+
+from service.workers.context import JobContext
+from service.workers.in_hand import UPKEEP, InHand
+from service.workers.upkeep import rounds
+from service.workers.upkeep.limits import BITE, Limit
+from service.workers.upkeep.retention import run_retention
+from tests.service.bench import Bench
+
+
+@pytest.fixture
+def context(bench: Bench) -> JobContext:
+    return JobContext(
+        settings=bench.settings,
+        store=bench.store,
+        queue=bench.queue,
+        in_hand=InHand(limits_s={UPKEEP: 60.0}),
+    )
+
+
+def test_sweeps_go_on_while_the_hourly_work_takes_long(
+    context: JobContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, swept = threading.Event(), threading.Semaphore(0)
+
+    def retain(_: JobContext) -> None:
+        begun.set()
+        context.stopping.wait(30)
+
+    monkeypatch.setattr(rounds, "_FIRST_HOURLY_S", 0.0)
+    monkeypatch.setattr(rounds, "run_retention", retain)
+    monkeypatch.setattr(rounds, "run_sweep", lambda _: swept.release())
+    rounds.start_rounds(context)
+    try:
+        assert begun.wait(20)
+        while swept.acquire(blocking=False):
+            pass  # those before it began
+        assert swept.acquire(timeout=20), "no sweep while the retention goes on"
+        assert swept.acquire(timeout=20)
+        assert not context.in_hand.overdue()
+    finally:
+        context.stopping.set()
+
+
+def test_each_bite_of_the_retention_has_the_limit_to_itself(
+    context: JobContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A retention of hours is work; one bite that never ends hangs."""
+    seen: list[int] = []
+
+    def bite(_: object) -> int:
+        task = next(iter(context.in_hand._tasks.values()))
+        assert (task.kind, task.about) == (UPKEEP, ("much",))
+        seen.append(id(task))
+        return BITE if len(seen) < 3 else 0
+
+    monkeypatch.setattr(
+        "service.workers.upkeep.limits.limits_of_all",
+        lambda _: [Limit(name="much", bite=bite)],
+    )
+    run_retention(context)
+    assert len(seen) == 3
+    assert not context.in_hand.of_kind(UPKEEP)
