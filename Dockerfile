@@ -6,6 +6,7 @@ WORKDIR /src
 COPY deploy/lock deploy/lock
 COPY .ci/install .ci/install
 COPY pyproject.toml README.md LICENSE ./
+COPY surefoot surefoot
 COPY models models
 COPY service service
 COPY migrations migrations

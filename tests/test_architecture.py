@@ -63,13 +63,17 @@ def room(name: str) -> str:
     return name.split(".")[1]
 
 
-def test_models_never_import_the_service():
-    for path in sources("models"):
-        assert not [name for name in imports(path) if name.split(".")[0] == "service"], path
+@pytest.mark.parametrize(
+    ("top", "below"), [("models", {"models"}), ("surefoot", {"models", "surefoot"})]
+)
+def test_models_and_the_python_face_import_nothing_above_them(top, below):
+    ours = {"models", "surefoot", "service", "studies", "migrations", "tests"}
+    for path in sources(top):
+        assert {name.split(".")[0] for name in imports(path)} & ours <= below, path
 
 
 def test_nothing_that_is_shipped_imports_a_study():
-    for top in ("models", "service", "migrations"):
+    for top in ("surefoot", "models", "service", "migrations"):
         for path in sources(top):
             assert not [name for name in imports(path) if name.split(".")[0] == "studies"], path
 

@@ -1,0 +1,124 @@
+"""A camera: its lens and its prior pose, as its calibration has them."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from models.errors import ShapeError
+from models.geometry.ground import ground_from_pixel
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+
+_PRIOR = ("prior_pose", "true_pose")  # a registration's, and a recorded scene's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """A pose in metres and degrees; x and y are of the camera's centre in the world."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float = 0.0
+    heading_deg: float = 0.0
+    x_m: float = 0.0
+    y_m: float = 0.0
+
+    @classmethod
+    def of(cls, pose: CameraPose) -> Self:
+        """The same pose, its angles in degrees."""
+        return cls(
+            height_m=pose.height_m,
+            tilt_deg=math.degrees(pose.tilt_rad),
+            roll_deg=math.degrees(pose.roll_rad),
+            heading_deg=math.degrees(pose.heading_rad),
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+        )
+
+    @property
+    def in_radians(self) -> CameraPose:
+        """The same pose, its angles in radians.
+
+        Raises:
+            ShapeError: a number is not finite, the height is not above 0, the tilt beyond +-90 deg.
+        """
+        return CameraPose(
+            height_m=self.height_m,
+            tilt_rad=math.radians(self.tilt_deg),
+            roll_rad=math.radians(self.roll_deg),
+            heading_rad=math.radians(self.heading_deg),
+            x_m=self.x_m,
+            y_m=self.y_m,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """A lens, in pixels, and the pose at which the camera is known to have stood."""
+
+    intrinsics: Intrinsics
+    prior_pose: Pose
+
+    def as_json(self) -> str:
+        """What `read_camera` reads."""
+        return json.dumps(asdict(self), indent=1)
+
+
+def read_camera(path: str | Path) -> Camera:
+    """The camera of a JSON file in the form of a registration over HTTP.
+
+    `intrinsics` has width, height, fx, fy, cx, cy and perhaps distortion (k1, k2, p1, p2, k3);
+    `prior_pose` (or `true_pose`) height_m, tilt_deg and perhaps roll_deg, heading_deg, x_m, y_m.
+    What else is there is not looked at.
+
+    Raises:
+        ShapeError: the file is missing, no JSON, or lacks a number.
+    """
+    try:
+        return camera_of(json.loads(Path(path).read_text()))
+    except (OSError, ValueError) as error:
+        raise ShapeError(f"{path}: {error}") from error
+
+
+def camera_of(body: dict[str, Any]) -> Camera:
+    """The camera of a registration's body.
+
+    Raises:
+        ShapeError: a number is missing, or is none that a camera can have.
+    """
+    prior = next((body[name] for name in _PRIOR if name in body), None)
+    if prior is None:
+        raise ShapeError("prior_pose: height_m and tilt_deg are needed, got none")
+    try:
+        lens = dict(body["intrinsics"])
+        camera = Camera(
+            intrinsics=Intrinsics(**{**lens, "distortion": tuple(lens.get("distortion", [0] * 5))}),
+            prior_pose=Pose(**prior),
+        )
+    except (KeyError, TypeError) as error:
+        raise ShapeError(f"intrinsics, prior_pose: {error}") from error
+    _ = camera.prior_pose.in_radians  # refuses what no camera can have
+    return camera
+
+
+def ground(
+    camera: Camera, points: Sequence[Sequence[float]], pose: Pose | None = None
+) -> list[tuple[float, float] | None]:
+    """Places (x, y) on the ground of pixels (u, v), in metres; None above the horizon.
+
+    Args:
+        camera: whose lens, and whose prior pose unless another is given.
+        points: pixels of feet, u right and v down.
+        pose: where the camera stands by now, such as a result's.
+    """
+    stands = (pose or camera.prior_pose).in_radians
+    pixels = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    places, valid = ground_from_pixel(camera.intrinsics, stands.rotation, stands.centre_m, pixels)
+    return [
+        (float(x), float(y)) if seen else None for (x, y), seen in zip(places, valid, strict=True)
+    ]

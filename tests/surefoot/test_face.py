@@ -1,0 +1,142 @@
+"""The Python face: a camera's file and tracks in, whether it has moved and its pose out."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import surefoot
+from models.simulation.simulated_site import SiteConfig
+from tests.conftest import ROOT, SCENES
+from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
+
+LANES = SiteConfig(aside_m=0.8, standing_share=0.0)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    return surefoot.Camera(intrinsics=LENS, prior_pose=surefoot.Pose.of(PRIOR))
+
+
+@pytest.fixture(scope="module")
+def people():
+    return tracks_of(3, (PRIOR, 200), (KNOCKED, 80), config=LANES)
+
+
+@pytest.fixture(scope="module")
+def site(camera, people):
+    return surefoot.learn(camera, people[0])
+
+
+def test_a_knock_is_told_with_the_pose_and_intervals_that_hold_it(site, people):
+    result = surefoot.estimate(site, people[1])
+    assert result.moved
+    assert "tilt" in result.why
+    truth = surefoot.Pose.of(KNOCKED)
+    intervals = result.intervals(0.999)
+    assert set(intervals) == {"tilt_deg", "roll_deg", "height_m", "heading_deg"}
+    for name, (low, high) in intervals.items():
+        assert low < getattr(truth, name) < high, name
+    narrow = result.intervals(0.9)["tilt_deg"]
+    assert narrow[1] - narrow[0] == pytest.approx(2 * 1.6449 * result.sd["tilt_deg"], rel=1e-4)
+    moved_by = truth.tilt_deg - surefoot.Pose.of(PRIOR).tilt_deg
+    assert result.drift["tilt_deg"] == pytest.approx(moved_by, abs=1)
+
+
+def test_a_camera_that_stands_has_not_moved(camera):
+    known, after = tracks_of(5, (PRIOR, 200), (PRIOR, 80), config=LANES)
+    result = surefoot.estimate(surefoot.learn(camera, known), after)
+    assert not result.moved
+    assert result.pose.tilt_deg == pytest.approx(camera.prior_pose.tilt_deg, abs=1)
+
+
+def test_tracks_may_come_in_any_order(camera, site, people):
+    known, after = (list(np.random.default_rng(1).permutation(part)) for part in people)
+    again = surefoot.learn(camera, known)
+    assert surefoot.estimate(again, after) == surefoot.estimate(site, people[1])
+
+
+def test_a_site_is_kept_in_a_file(site, people, tmp_path):
+    site.save(tmp_path / "gate.site")
+    kept = surefoot.read_site(tmp_path / "gate.site")
+    assert kept.camera == site.camera
+    one, other = (surefoot.estimate(each, people[1]) for each in (site, kept))
+    assert other.moved == one.moved
+    assert other.pose.tilt_deg == pytest.approx(one.pose.tilt_deg, abs=1e-3)  # kept rounded
+    (tmp_path / "torn.site").write_bytes((tmp_path / "gate.site").read_bytes()[:-300])
+    with pytest.raises(surefoot.CalibrationError, match="torn.site: no site of ours"):
+        surefoot.read_site(tmp_path / "torn.site")
+
+
+def test_too_few_people_are_said(camera, people):
+    with pytest.raises(surefoot.CalibrationError, match="5"):
+        surefoot.learn(camera, people[0][:3])
+
+
+def test_a_camera_is_read_of_a_registration(tmp_path):
+    lens = {"width": 1280, "height": 720, "fx": 900, "fy": 900, "cx": 639.5, "cy": 359.5}
+    body = {"id": "gate", "intrinsics": lens, "prior_pose": {"height_m": 5, "tilt_deg": 45}}
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(body))
+    camera = surefoot.read_camera(path)
+    # Straight ahead at 45 deg below the horizon: as far as the camera is high; north is +Y.
+    middle, above = surefoot.ground(camera, [(639.5, 359.5), (639.5, -5000.0)])
+    assert middle == pytest.approx((0.0, 5.0), abs=1e-9)
+    assert above is None
+    for wrong, message in (
+        ({**body, "prior_pose": {"height_m": 5}}, "tilt_deg"),
+        ({**body, "prior_pose": {"height_m": -5, "tilt_deg": 4}}, "height_m: must be above 0"),
+        ({"intrinsics": lens}, "prior_pose: height_m and tilt_deg are needed"),
+    ):
+        path.write_text(json.dumps(wrong))
+        with pytest.raises(surefoot.CalibrationError, match=message):
+            surefoot.read_camera(path)
+
+
+def test_tracks_are_read_of_mot_text_and_of_feet(tmp_path):
+    mot = tmp_path / "mot.txt"
+    rows = [f"{1 + 10 * n},7,{100 + n},50,21,80,1,-1,-1,-1" for n in range(6)]
+    mot.write_text("\n".join([*reversed(rows), "1,8,5,5,20,80,1,-1,-1,-1", ""]))
+    (track,) = surefoot.read_tracks(mot, frame_rate_hz=25, started_at_s=1000.0)  # one is too short
+    np.testing.assert_allclose(track.time_s, 1000 + 0.4 * np.arange(6))
+    np.testing.assert_allclose(track.uv[0], [100 - 1 + 10.5, 50 - 1 + 80])  # they count from 1
+    assert track.top_v[0] == 49
+    with pytest.raises(surefoot.CalibrationError, match="frame_rate_hz is needed"):
+        surefoot.read_tracks(mot)
+    feet = tmp_path / "feet.csv"
+    lines = [f"7,{time_s},{u},{v}" for time_s, (u, v) in zip(track.time_s, track.uv, strict=True)]
+    feet.write_text("\n".join(["track_id,time_s,u_px,v_px", *lines]))
+    (same,) = surefoot.read_tracks(feet)
+    np.testing.assert_allclose(same.uv, track.uv)
+    feet.write_text("nothing of the kind")
+    with pytest.raises(surefoot.CalibrationError, match="neither MOTChallenge text nor CSV"):
+        surefoot.read_tracks(feet, frame_rate_hz=25)
+
+
+@pytest.mark.skipif(not SCENES.is_dir(), reason=f"no recorded scenes in {SCENES}")
+def test_recorded_people_in_five_lines():
+    camera = surefoot.read_camera(SCENES / "wildtrack_c1" / "camera.json")
+    tracks = surefoot.read_tracks(SCENES / "wildtrack_c1" / "tracks.csv")
+    site = surefoot.learn(camera, tracks[:130])
+    result = surefoot.estimate(site, tracks[130:])
+    assert not result.moved
+    assert result.pose.height_m == pytest.approx(camera.prior_pose.height_m, rel=0.1)
+    for name, (low, high) in result.intervals(0.99).items():
+        assert low < getattr(camera.prior_pose, name) < high, name
+
+
+def test_it_brings_neither_torch_nor_the_service():
+    program = "import sys, surefoot; print(sorted({'torch', 'service', 'cv2'} & set(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_pose_keeps_its_angles():
+    pose = surefoot.Pose(height_m=4, tilt_deg=20, roll_deg=-3, heading_deg=300)
+    assert surefoot.Pose.of(pose.in_radians).heading_deg == pytest.approx(300)
+    assert pose.in_radians.tilt_rad == pytest.approx(math.radians(20))
