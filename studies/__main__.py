@@ -1,5 +1,7 @@
 """`python -m studies`: evaluate, protocol, http, flow-, alarm- and creep-study, centred, paper."""
 
+import ast
+import importlib
 from pathlib import Path
 from typing import Annotated
 
@@ -283,6 +285,36 @@ for _command in (
     evaluate, protocol, http, flow_study, alarm_study, creep_study, centred, paper,
 ):  # fmt: skip
     app.command()(_command)
+
+# Studies with arguments of their own: `python -m studies NAME --help`.
+_OTHERS = {
+    "still-days": "studies.changes.still_days",
+    "cuts": "studies.changes.cut_study",
+    "heads": "studies.paths.heads_study",
+    "arrivals": "studies.alarms.rhythm_study",
+    "base-study": "studies.base_model.base_study",
+    "base-model": "studies.base_model.making",
+    "start-weights": "studies.start_weights.making",
+}
+
+
+def _first_line(module: str) -> str:
+    """The first line of a module's docstring, without importing what it needs."""
+    source = Path(__file__).parent.parent.joinpath(*module.split(".")).with_suffix(".py")
+    return (ast.get_docstring(ast.parse(source.read_text())) or "").splitlines()[0]
+
+
+def _run(context: typer.Context) -> None:
+    importlib.import_module(_OTHERS[str(context.info_name)]).main(context.args)
+
+
+for _name, _module in _OTHERS.items():
+    app.command(
+        _name,
+        help=_first_line(_module),
+        add_help_option=False,
+        context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
+    )(_run)
 
 if __name__ == "__main__":
     app()

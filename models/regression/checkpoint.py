@@ -1,9 +1,10 @@
-"""Weights as files named by their hash."""
+"""Weights as files: those of cameras by their hash, and those that trainings start from."""
 
 import hashlib
 import os
 from pathlib import Path
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 
@@ -11,6 +12,10 @@ from models.errors import CheckpointError
 from models.regression.network import PoseRegressor, network_for
 from models.regression.recipe import Recipe
 from models.regression.weights_files import weights_path
+from models.serialization import Format, unpack
+
+START = Path(__file__).parent / "start" / "start.safetensors.gz"
+START_FORMAT = Format(name="regressor_start", version=1)
 
 
 def save_weights(network: PoseRegressor, folder: Path) -> str:
@@ -48,4 +53,22 @@ def load_weights(folder: Path, digest: str, recipe: Recipe) -> PoseRegressor:
     except (SafetensorError, RuntimeError) as error:
         raise CheckpointError(f"weights {digest}: not of recipe {recipe.name}: {error}") from error
     network.eval()
+    return network
+
+
+def starting_network(recipe: Recipe, path: Path = START) -> PoseRegressor:
+    """The network that a training by a recipe begins with.
+
+    Raises:
+        CheckpointError: it starts from weights that are missing, damaged or of another network.
+    """
+    network = network_for(recipe)
+    if recipe.start == "fresh":
+        return network
+    try:
+        arrays = unpack(START_FORMAT, path.read_bytes())
+        state = {name: torch.from_numpy(array).float() for name, array in arrays.items()}
+        network.load_state_dict(state)
+    except (OSError, RuntimeError, TypeError) as error:
+        raise CheckpointError(f"starting weights: {error}") from error
     return network

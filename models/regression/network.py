@@ -1,4 +1,4 @@
-"""The network: trajectory in, height and orientation out."""
+"""The network: trajectory in, height and orientation out; its loss, and its predictions."""
 
 import math
 
@@ -8,8 +8,11 @@ from torch import Tensor, nn
 from torch.nn.utils.rnn import pack_padded_sequence
 
 from models.geometry.rotation import Array, quaternion_from_rotation, rotation_from_angles
-from models.regression.inputs import CHANNELS
+from models.regression.inputs import CHANNELS, network_inputs
 from models.regression.recipe import Recipe, TrainingPlan
+from models.tracks.trajectory import Windows
+
+_PREDICTED_AT_ONCE = 2048  # windows
 
 
 class PoseRegressor(nn.Module):
@@ -96,6 +99,24 @@ def pose_from_output(output: Array, plan: TrainingPlan) -> tuple[Array, Array]:
         return height, quaternion_from_rotation(rotation_from_angles(tilt, roll, prior.heading_rad))
     q = output[:, 1:] / np.linalg.norm(output[:, 1:], axis=1, keepdims=True)
     return output[:, 0], np.where(q[:, :1] < 0, -q, q)
+
+
+def predict_windows(
+    network: PoseRegressor, windows: Windows, plan: TrainingPlan
+) -> tuple[Array, Array]:
+    """Heights (B,) in metres and unit quaternions wxyz (B, 4), w >= 0, of windows."""
+    if not len(windows):
+        return np.empty(0), np.empty((0, 4))
+    points = network_inputs(windows.uv, plan)
+    lengths = torch.from_numpy(windows.lengths)
+    with torch.inference_mode():
+        rows = torch.cat(
+            [
+                network(points[at : at + _PREDICTED_AT_ONCE], lengths[at : at + _PREDICTED_AT_ONCE])
+                for at in range(0, len(windows), _PREDICTED_AT_ONCE)
+            ]
+        )
+    return pose_from_output(rows.double().numpy(), plan)
 
 
 def _perceptron(*widths: int) -> nn.Sequential:

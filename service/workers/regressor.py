@@ -9,8 +9,7 @@ import torch
 
 from models.regression.averaging import average_windows
 from models.regression.checkpoint import load_weights
-from models.regression.network import PoseRegressor
-from models.regression.prediction import predict_windows
+from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.tracks.trajectory import cut_windows
 from service.store.tracks.stored import StoredTrack

@@ -3,7 +3,7 @@
 Places differ in their hours, flows, walking groups, rain, holidays, seasons and in how their tracks
 are posted; some are stations, where people come by the train.
 
-    python -m studies.alarms.rhythm_study --years 50
+    python -m studies arrivals --years 50
 """
 
 import argparse
@@ -235,9 +235,10 @@ def describe(results: Sequence[YearResult]) -> str:
     return "\n".join(lines)
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+def main(arguments: Sequence[str]) -> None:
+    """Print what simulated years come to."""
+    parser = argparse.ArgumentParser("studies arrivals", description=__doc__)
     parser.add_argument("--years", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     sys.stdout.write(describe(study_rhythm(given.years, given.seed)) + "\n")

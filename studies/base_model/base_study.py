@@ -4,7 +4,7 @@ By time, as `protocol --tables time`: the earlier people are the reference, the 
 moved, the later ones walk before it; or by random halves of the people. Cases of one window share
 its people, so that it is windows that are counted where two ways are held against one another.
 
-    python -m studies.base_model.base_study ../shared/scenes/*/ ../shared/long/atc_20121024
+    python -m studies base-study ../shared/scenes/*/ ../shared/long/atc_20121024
 """
 
 import argparse
@@ -155,7 +155,7 @@ def _of_window(outcomes: Sequence[BaseOutcome], window: str, way: str) -> Array:
 
 def main(arguments: Sequence[str]) -> None:
     """Print how far off each way is, and how often it is nearer than what is served."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies base-study", description=__doc__)
     parser.add_argument("recordings", type=Path, nargs="+")
     parser.add_argument("--seeds", default="0", help="of knocks, halves, moments; with commas")
     parser.add_argument("--knocks", default=",".join(_KNOCKS))
@@ -169,7 +169,3 @@ def main(arguments: Sequence[str]) -> None:
                 outcomes += scene_outcomes(scene, int(seed), knocks, chosen.split)
             sys.stderr.write(f"{scene.scene_id} is done\n")
     sys.stdout.write("\n".join(told(outcomes)) + "\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -1,6 +1,6 @@
 """Makes the base model: one command, one seed, a quarter of an hour of one core.
 
-    python -m studies.base_model.making --seed 0
+    python -m studies base-model --seed 0
 
 Each round is kept beside the weights, so that the same command goes on where it was ended.
 """
@@ -69,7 +69,7 @@ def _medians(errors: Array) -> list[float]:
 
 def main(arguments: Sequence[str]) -> None:
     """Train, write the weights and how they were made; a line for each round."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies base-model", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=BasePlan(seed=0).rounds)
     parser.add_argument("--output", type=Path, default=SHIPPED)
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str]) -> None:
         )
         sys.stdout.flush()
     making = {
-        "command": f"python -m studies.base_model.making {' '.join(arguments)}".strip(),
+        "command": f"python -m studies base-model {' '.join(arguments)}".strip(),
         "seed": plan.seed,
         "rounds": plan.rounds,
         "sets": 2 * plan.rounds * plan.cameras * plan.sites_each,
@@ -100,7 +100,3 @@ def main(arguments: Sequence[str]) -> None:
     }
     store_base_model(training.network, chosen.output, making)
     kept.unlink()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -5,12 +5,11 @@ every other seen from where the camera stands, every other from where it was kno
 of them. None should be cut. Then the last 40 people of windows as long as they can be, a third of
 them at the most, are seen from a camera that was turned by 5 deg: each should be cut there.
 
-    python -m studies.changes.cut_study ../shared/scenes/*/ ../shared/long/atc_20121024
+    python -m studies cuts ../shared/scenes/*/ ../shared/long/atc_20121024
 """
 
 import argparse
 import math
-import sys
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -134,7 +133,7 @@ def _outcomes_of(windows: int, turns: int, seed: int, place: tuple[Path, int]) -
 
 def main(arguments: Sequence[str]) -> None:
     """Print how many windows were cut, without a change and with one."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies cuts", description=__doc__)
     parser.add_argument("recordings", type=Path, nargs="+")
     parser.add_argument("--windows", type=int, default=80, help="of each camera, without a change")
     parser.add_argument("--turns", type=int, default=8, help="of each camera, of each kind")
@@ -151,7 +150,3 @@ def main(arguments: Sequence[str]) -> None:
         found = [one for each in pool.imap(work, places, chunksize=1) for one in each]
     for line in _told(found):
         print(line)  # noqa: T201
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

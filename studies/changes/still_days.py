@@ -1,6 +1,6 @@
 """Recorded days of cameras that stand: what alarms there, and how much people's habits move.
 
-`python -m studies.changes.still_days RECORDING... [--alarms-a-year 1]`: after a reference
+`python -m studies still-days RECORDING... [--alarms-a-year 1]`: after a reference
 of 1,000 people, and after others that begin later, the chart reads everybody who comes. The same
 people are then looked at as a camera would that has just been moved, to tell how many walking
 groups it takes. Nothing grows, and nobody says that a camera is where it should be.
@@ -169,7 +169,7 @@ def told(days: Sequence[StillDay]) -> Iterator[str]:
 
 def main(arguments: Sequence[str]) -> None:
     """Print what alarms before still cameras, and how soon moved ones do."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies still-days", description=__doc__)
     parser.add_argument("recordings", type=Path, nargs="+")
     parser.add_argument("--alarms-a-year", type=float, default=1.0)
     chosen = parser.parse_args(arguments)
@@ -179,7 +179,3 @@ def main(arguments: Sequence[str]) -> None:
             days += still_days(scene, chosen.alarms_a_year)
             sys.stderr.write(f"{scene.scene_id} is done\n")
     sys.stdout.write("\n".join(told(days)) + "\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -23,7 +23,7 @@ from models.regression.averaging import (
     averaged_estimate,
     pose_of,
 )
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.recipe import TrainingPlan, plan_training
 from models.regression.training import TrainingProgress, train
 from models.simulation.walkers import WalkConfig

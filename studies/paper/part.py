@@ -10,7 +10,7 @@ OnShare = Callable[[float], None]
 # What a regressor's figures are made by, and those of what is served.
 TRAINED = (
     "models.regression.training",
-    "models.regression.prediction",
+    "models.regression.network",
     "models.regression.averaging",
     "models.simulation.pose_offset",
 )

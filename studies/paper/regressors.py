@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
-from models.regression.dataset import held_out_set
-from models.regression.losses import loss_on
-from models.regression.network import PoseRegressor
-from models.regression.prediction import predict_windows
-from models.regression.recipe import TrainingPlan
-from models.regression.training import train
+from models.regression.dataset import SyntheticSet, held_out_set
+from models.regression.network import PoseRegressor, predict_windows
+from models.regression.recipe import Recipe, TrainingPlan
+from models.regression.training import batch_loss, train
 from models.simulation.poses import PoseRange
 from models.tracks.scenes import Scene, load_scene
 from studies.paper.centred_run import averaged_of
@@ -123,7 +122,7 @@ def _trained(scene: Scene, plan: TrainingPlan, on_share: OnShare) -> Figures:
         orientation = 2 * math.sin(math.radians(angle_deg) / 4)
         epochs.append(
             _Epoch(
-                held_out=loss_on(network, held_out, plan.recipe),
+                held_out=_loss_on(network, held_out, plan.recipe),
                 test=height_m + plan.recipe.alpha * orientation,
                 height_m=height_m,
                 angle_deg=angle_deg,
@@ -160,3 +159,9 @@ def _trained(scene: Scene, plan: TrainingPlan, on_share: OnShare) -> Figures:
 def served_answer(case: ProtocolCase) -> Answer:
     """What the service would serve, with all that a site's reference teaches it."""
     return fused(learn_case(case))
+
+
+def _loss_on(network: PoseRegressor, data: SyntheticSet, recipe: Recipe) -> float:
+    """The mean loss of a whole set, which nothing is learned of."""
+    with torch.inference_mode():
+        return float(batch_loss(network, data, np.arange(len(data)), recipe))

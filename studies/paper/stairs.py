@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.recipe import TrainingPlan
 from models.regression.training import train
 from models.tracks.scenes import Scene, load_scene

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from models.pose import learn_site, observe
 from models.reasons import TracksCode
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.training import train
 from models.tracks.scenes import Scene, load_scene
 from models.tracks.trajectory import by_end

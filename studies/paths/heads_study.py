@@ -5,7 +5,7 @@ under simulated heads: a jitter of 3 % of the stature, a lean of each person's o
 forward, a detector that puts heads to the right. `columns` are heads right above the feet in the
 picture, as of trackers that make them of boxes.
 
-    python -m studies.paths.heads_study --sites 6 --scenes ../shared/scenes/*/
+    python -m studies heads --sites 6 --scenes ../shared/scenes/*/
 """
 
 import argparse
@@ -140,7 +140,7 @@ def _told(outcomes: Sequence[HeadOutcome]) -> Iterator[str]:
 
 def main(arguments: Sequence[str]) -> None:
     """Print, for each place and way, the errors' median and 90th percentile, and coverage."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies heads", description=__doc__)
     parser.add_argument("--sites", type=int, default=6)
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--scenes", type=Path, nargs="*", default=[])
@@ -152,7 +152,3 @@ def main(arguments: Sequence[str]) -> None:
         cases += [case for case in drawn if len(case.seen) >= _LEAST_SEEN]
     outcomes = [outcome for case in cases for outcome in head_outcomes(case)]
     sys.stdout.write("\n".join(_told(outcomes)) + "\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

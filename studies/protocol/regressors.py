@@ -9,7 +9,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate, without_offset
 from models.geometry.pose import CameraPose
 from models.regression.averaging import average_windows, averaged_estimate
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.recipe import plan_training
 from models.regression.training import train
 from models.simulation.walkers import WalkConfig

@@ -8,8 +8,7 @@ import numpy.typing as npt
 from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.regression.averaging import TrackPredictions, average_windows
-from models.regression.network import PoseRegressor
-from models.regression.prediction import predict_windows
+from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan
 from models.simulation.poses import PoseSet, random_poses
 from models.simulation.walkers import Walks, simulate_walks

@@ -1,14 +1,16 @@
 """Makes the starting weights: one command, one seed, some ten minutes of one core.
 
-    python -m studies.start_weights.making --seed 0
+    python -m studies start-weights --seed 0
 
 Each round is kept beside the weights, so that the same command goes on where it was ended.
 """
 
 import argparse
+import hashlib
+import json
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +18,9 @@ import numpy as np
 import torch
 
 from models.geometry.rotation import angle_between
+from models.regression.checkpoint import START, START_FORMAT
 from models.regression.network import PoseRegressor, pose_from_output
-from models.regression.starting import SHIPPED, store_start
+from models.serialization import pack
 from studies.start_weights.rounds import StartPlan, StartTraining
 
 
@@ -39,12 +42,28 @@ def held_out_figures(network: PoseRegressor, plan: StartPlan) -> dict[str, Any]:
     return {"cameras": len(off["off_m"]), "walks": sum(map(len, off["off_m"])), **medians}
 
 
+def store_start(network: PoseRegressor, path: Path, making: Mapping[str, Any]) -> None:
+    """Write the weights in half precision, and beside them as JSON how they were made."""
+    arrays = {
+        name: np.asarray(value).astype(np.float16) for name, value in network.state_dict().items()
+    }
+    data = pack(START_FORMAT, arrays)
+    path.write_bytes(data)
+    record = {**making, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    making_of(path).write_text(json.dumps(record, indent=2) + "\n")
+
+
+def making_of(path: Path) -> Path:
+    """Where it says how a file of weights was made."""
+    return path.with_name("start.json")
+
+
 def main(arguments: Sequence[str]) -> None:
     """Train, write the weights and how they were made; a line for each round."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser("studies start-weights", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rounds", type=int, default=StartPlan(seed=0).rounds)
-    parser.add_argument("--output", type=Path, default=SHIPPED)
+    parser.add_argument("--output", type=Path, default=START)
     chosen = parser.parse_args(arguments)
     torch.set_num_threads(1)
     plan = StartPlan(seed=chosen.seed, rounds=chosen.rounds)
@@ -60,7 +79,7 @@ def main(arguments: Sequence[str]) -> None:
         )
         sys.stdout.flush()
     making = {
-        "command": f"python -m studies.start_weights.making {' '.join(arguments)}".strip(),
+        "command": f"python -m studies start-weights {' '.join(arguments)}".strip(),
         "seed": plan.seed,
         "rounds": plan.rounds,
         "walks": training.walks,
@@ -72,7 +91,3 @@ def main(arguments: Sequence[str]) -> None:
     }
     store_start(training.network, chosen.output, making)
     kept.unlink()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -11,9 +11,9 @@ import torch
 
 from models.errors import DegenerateGeometryError
 from models.regression.dataset import SyntheticSet, equal_length_batches, walks_of
-from models.regression.losses import batch_loss
 from models.regression.network import network_for
 from models.regression.recipe import DEFAULT, TrainingPlan
+from models.regression.training import batch_loss
 from models.simulation.poses import random_poses
 from models.simulation.walkers import WalkConfig
 from studies.regressors.resumable import resume_training, save_training

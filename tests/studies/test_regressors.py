@@ -13,7 +13,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of
 from models.regression import training
 from models.regression.averaging import average_windows, averaged_estimate
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.recipe import DEFAULT, TrainingPlan, plan_training
 from models.regression.training import train
 from models.simulation.poses import repeated_pose

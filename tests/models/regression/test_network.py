@@ -16,8 +16,8 @@ from models.regression.network import (
     offsets_of,
     pose_from_output,
     pose_loss,
+    predict_windows,
 )
-from models.regression.prediction import predict_windows
 from models.regression.recipe import DEFAULT, PAPER, Recipe, TrainingPlan
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Windows

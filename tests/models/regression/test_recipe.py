@@ -6,7 +6,7 @@ import pytest
 
 from models.errors import ShapeError
 from models.regression.averaging import average_windows, averaged_estimate
-from models.regression.prediction import predict_windows
+from models.regression.network import predict_windows
 from models.regression.recipe import PAPER, plan_training
 from models.regression.training import check_held_out, train
 from models.simulation.poses import repeated_pose

@@ -8,7 +8,7 @@ import torch
 from models.errors import CalibrationError, DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.regression import centring, training
+from models.regression import training
 from models.regression.dataset import walks_of
 from models.regression.recipe import DEFAULT, PAPER, TrainingPlan
 from models.regression.training import (
@@ -41,7 +41,7 @@ class StopError(Exception):
 def hardly_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Most of a tiny training are its check and its centring, which few tests are about."""
     monkeypatch.setattr(training, "_HELD_OUT_WALKS", 100)
-    monkeypatch.setattr(centring, "_WALKS", 100)
+    monkeypatch.setattr(training, "_CENTRING_WALKS", 100)
 
 
 @pytest.fixture

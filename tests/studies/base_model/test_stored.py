@@ -37,4 +37,4 @@ def test_the_shipped_one_is_small_and_as_its_record_says():
     data = SHIPPED.read_bytes()
     assert record["bytes"] == len(data) < 600_000
     assert record["sha256"] == hashlib.sha256(data).hexdigest()
-    assert record["command"].startswith("python -m studies.base_model.making")
+    assert record["command"].startswith("python -m studies base-model")

@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from models.errors import CheckpointError
+from models.regression.checkpoint import START, starting_network
 from models.regression.network import network_for
 from models.regression.recipe import DEFAULT, PAPER
-from models.regression.starting import SHIPPED, making_of, starting_network, store_start
-from studies.start_weights.making import held_out_figures
+from studies.start_weights.making import held_out_figures, making_of, store_start
 from studies.start_weights.rounds import StartPlan, StartTraining
 
 SMALL = StartPlan(seed=3, rounds=2, cameras=3, walks_each=30, batch=30)
@@ -68,7 +68,7 @@ def test_what_is_damaged_missing_or_another_is_refused(tmp_path: Path):
     path = tmp_path / "start.safetensors.gz"
     with pytest.raises(CheckpointError, match="starting weights"):
         starting_network(DEFAULT, path)
-    path.write_bytes(SHIPPED.read_bytes()[:-20])
+    path.write_bytes(START.read_bytes()[:-20])
     with pytest.raises(CheckpointError, match="not readable"):
         starting_network(DEFAULT, path)
     store_start(network_for(PAPER), path, {})
@@ -84,11 +84,11 @@ def test_the_papers_recipe_begins_with_fresh_weights(tmp_path: Path):
 
 
 def test_the_shipped_ones_are_as_their_record_says():
-    record = json.loads(making_of(SHIPPED).read_text())
-    data = SHIPPED.read_bytes()
+    record = json.loads(making_of(START).read_text())
+    data = START.read_bytes()
     assert record["bytes"] == len(data) < 2_600_000
     assert record["sha256"] == hashlib.sha256(data).hexdigest()
-    assert record["command"].startswith("python -m studies.start_weights.making")
+    assert record["command"].startswith("python -m studies start-weights")
 
 
 def test_they_tell_more_than_the_prior_pose_of_cameras_that_they_never_saw():
