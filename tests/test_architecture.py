@@ -104,8 +104,11 @@ def test_the_pipeline_is_composed_in_one_place():
 
 def test_only_routes_and_the_application_see_schemas():
     for path in sources("service"):
-        if any(name.startswith("service.api.schemas") for name in imports(path)):
-            assert {"api", "routes"} & set(path.parts), path
+        api = {name for name in imports(path) if name.startswith("service.api.")}
+        if any(not name.startswith("service.api.middleware") for name in api):
+            assert {"api", "routes", "app.py"} & set(path.parts), path
+        if "middleware" in path.parts:
+            assert all(name.startswith("service.api.middleware") for name in api), path
 
 
 def test_only_one_module_knows_the_engine_outside_the_worker():

@@ -1,1 +1,1 @@
-"""HTTP routes: they translate, and call one use case each."""
+"""HTTP routes with their schemas above them: they translate, and call one use case each."""

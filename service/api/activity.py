@@ -1,15 +1,44 @@
 """`GET /activity`: who did what when, in pages or as a stream of lines to keep elsewhere."""
 
 from collections.abc import Iterator
-from typing import Annotated
+from datetime import datetime
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query
 from fastapi.responses import Response, StreamingResponse
+from pydantic import BaseModel, ConfigDict
 
 from service.access.activity import list_activity
+from service.api.fields import Text
 from service.api.middleware.dependencies import AppState, StateDep
-from service.api.schemas.activity import ActivityPage, EntryOut
-from service.api.schemas.base import Text
+from service.enums import Activity, AlertKind, Outcome
+
+
+class EntryOut(BaseModel):
+    """What somebody did; without a name, the service by itself."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    id: int
+    at: datetime
+    what: Activity
+    by: str | None
+    via: str | None
+    camera_id: str | None
+    subject_id: str | None
+    kind: AlertKind | None
+    until: datetime | None
+    outcome: Outcome | None
+    note: str | None
+    details: dict[str, Any]
+
+
+class ActivityPage(BaseModel):
+    """Entries, oldest first; `next_cursor` is the `after` of the next page."""
+
+    items: list[EntryOut]
+    next_cursor: int | None
+
 
 router = APIRouter(tags=["operation"])
 

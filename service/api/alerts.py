@@ -6,8 +6,7 @@ from fastapi import APIRouter, Query
 from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
-from service.api.schemas.alerts import (
+from service.api.alerts_schemas import (
     AcknowledgeBody,
     AlertDetail,
     AlertList,
@@ -15,7 +14,8 @@ from service.api.schemas.alerts import (
     ResolveBody,
     SilenceBody,
 )
-from service.api.schemas.base import Text
+from service.api.fields import Text
+from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.cameras import decisions
 from service.enums import AlertState
 from service.store.alerts import AlertFilter

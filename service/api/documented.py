@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic import BaseModel, Field
 from pydantic.json_schema import models_json_schema
 
 from service.api.middleware.scopes import need_of
-from service.api.schemas.problem import Problem
 
 _SCHEME = "token"
 _REF = "#/components/schemas/{model}"
@@ -36,6 +36,24 @@ _WORDS = {
     507: "No room left to store it",
 }
 _WITH_RETRY_AFTER = (429, 503)
+
+
+class ProblemField(BaseModel):
+    """One thing wrong in a request."""
+
+    pointer: str = Field(description="JSON Pointer into the body, or the name of a parameter")
+    reason: str = Field(description="what is needed, and what came")
+
+
+class Problem(BaseModel):
+    """What went wrong; programs go by `code`, which stays, people by `detail`."""
+
+    type: str = "about:blank"
+    title: str
+    status: int
+    code: str
+    detail: str
+    errors: list[ProblemField] | None = None
 
 
 def document_errors(app: FastAPI) -> None:

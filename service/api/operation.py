@@ -1,12 +1,46 @@
 """`/healthz` and `/readyz`."""
 
+from typing import Self
+
 from fastapi import APIRouter, Response
+from pydantic import BaseModel
 
 from service.api.middleware.dependencies import CallerDep, StateDep
 from service.api.middleware.reach import auth_on
-from service.api.schemas.operation import HealthOut, ReadyOut
-from service.enums import Health
-from service.operations.health import check_readiness
+from service.enums import Health, Readiness
+from service.operations import health as checks
+
+
+class HealthOut(BaseModel):
+    """The process answers."""
+
+    status: Health
+
+
+class ReadyOut(BaseModel):
+    """Whether the service can do its work; some problems are named while it can."""
+
+    status: Readiness
+    store_writable: bool
+    worker_alive: bool
+    worker_silent_s: float | None
+    queue_lag_s: float
+    failing_cameras: int
+    problems: list[str]
+
+    @classmethod
+    def from_value(cls, value: checks.Readiness) -> Self:
+        """The body of a readiness check."""
+        return cls(
+            status=Readiness.READY if value.ready else Readiness.NOT_READY,
+            store_writable=value.store_writable,
+            worker_alive=value.worker_alive,
+            worker_silent_s=value.worker_silent_s,
+            queue_lag_s=value.queue_lag_s,
+            failing_cameras=value.failing_cameras,
+            problems=list(value.problems),
+        )
+
 
 router = APIRouter(tags=["operation"])
 
@@ -20,7 +54,7 @@ async def health() -> HealthOut:
 @router.get("/readyz", responses={503: {"model": ReadyOut}})
 def ready(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
     """Whether the store can be written, a worker is alive and the queue keeps up."""
-    readiness = check_readiness(state.store, state.settings)
+    readiness = checks.check_readiness(state.store, state.settings)
     if not readiness.ready:
         response.status_code = 503
     body = ReadyOut.from_value(readiness)

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import PlainTextResponse
 
+from service.api.fields import Moment
 from service.api.middleware.dependencies import (
     ActorDep,
     AppState,
@@ -18,8 +19,7 @@ from service.api.middleware.dependencies import (
 from service.api.middleware.direct.kept import KeptAnswer
 from service.api.middleware.direct.straight import StraightRoute, straight
 from service.api.middleware.direct.written import written
-from service.api.schemas.base import Moment
-from service.api.schemas.cameras.poses import (
+from service.api.poses_schemas import (
     AcceptBody,
     History,
     HistoryPoint,

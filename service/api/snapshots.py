@@ -1,14 +1,25 @@
 """`/cameras/{id}/snapshot`: a still image, off unless switched on, and the only picture kept."""
 
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Request, Response
+from pydantic import BaseModel
 
 from service.api.middleware.dependencies import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
-from service.api.schemas.cameras.snapshots import SnapshotOut
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
 from service.store.operation.actor import set_actor
+
+
+class SnapshotOut(BaseModel):
+    """What is known of a still image."""
+
+    sha256: str
+    width: int
+    height: int
+    stored_at: datetime
+
 
 router = APIRouter(prefix="/cameras/{camera_id}/snapshot", tags=["cameras"])
 

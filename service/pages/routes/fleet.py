@@ -6,9 +6,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
+from service.api.fields import Text
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
-from service.api.schemas.base import Text
 from service.operations import health
 from service.pages.rows import banners_of, counts_of, rows_of, urgent
 from service.pages.views import fleet

@@ -6,10 +6,10 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
+from service.api.cameras import CameraOut
 from service.api.middleware.dependencies import BodyDep, StateDep, WriteDep
 from service.api.middleware.pages import render
-from service.api.schemas.cameras.cameras import CameraOut
-from service.api.schemas.cameras.registration import (
+from service.api.registration_schemas import (
     FilledOut,
     PreviewBody,
     PreviewOut,

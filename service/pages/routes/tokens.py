@@ -11,7 +11,7 @@ from service.access.tokens import MadeToken, TokenSpec
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.api.middleware.pages import render
 from service.api.middleware.reach import auth_on
-from service.api.schemas.tokens import TokenBody, TokenList, TokenMade, TokenOut
+from service.api.tokens_schemas import TokenBody, TokenList, TokenMade, TokenOut
 from service.errors import FieldError, MalformedError
 from service.pages.routes.forms import Form, FormDep
 

@@ -6,7 +6,7 @@ import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
 from service.alerts import alerts
-from service.api.schemas.alerts import AlertOut
+from service.api.alerts_schemas import AlertOut
 from service.enums import MessageType
 from service.notifications.outbox import ALERT_FIELDS, ALERT_FLAGS
 from service.reasons import as_said

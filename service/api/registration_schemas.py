@@ -7,10 +7,10 @@ from pydantic import BaseModel, Field, ValidationError
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from service.api.schemas.base import Body, Finite, Triple
-from service.api.schemas.cameras.cameras import CameraBody
-from service.api.schemas.cameras.geometry import IntrinsicsBody, PriorPoseBody
-from service.api.schemas.cameras.typed import (
+from service.api.cameras import CameraBody
+from service.api.fields import Body, Finite, Triple
+from service.api.geometry_schemas import IntrinsicsBody, PriorPoseBody
+from service.api.typed_schemas import (
     TypedAngles,
     TypedLens,
     TypedMatrix,

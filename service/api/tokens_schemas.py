@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, Field
 
 from service.access.tokens import MAX_NAME, MadeToken, TokenSpec
-from service.api.schemas.base import Body, CameraId, Moment
+from service.api.fields import Body, CameraId, Moment
 from service.enums import TokenScope, TokenState
 from service.store.tables.access import TokenRecord
 

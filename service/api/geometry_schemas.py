@@ -10,7 +10,7 @@ from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
-from service.api.schemas.base import Body, Finite, Triple
+from service.api.fields import Body, Finite, Triple
 
 # Of numbers beyond these nothing can be computed, let alone drawn.
 _HIGHEST_M, _FARTHEST_M = 10_000.0, 1e8

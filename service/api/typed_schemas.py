@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import Field, field_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from service.api.schemas.base import Body, CameraId, Finite, Triple
-from service.api.schemas.cameras.cameras import CameraName, FrameRate, ReferenceTracks
-from service.api.schemas.cameras.geometry import (
+from service.api.cameras import CameraName, FrameRate, ReferenceTracks
+from service.api.fields import Body, CameraId, Finite, Triple
+from service.api.geometry_schemas import (
     Centre,
     FocalLength,
     IntrinsicsBody,

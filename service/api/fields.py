@@ -1,7 +1,7 @@
-"""What several bodies share."""
+"""Types of fields, and the base class, that several bodies share."""
 
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import (
     AfterValidator,
@@ -12,6 +12,8 @@ from pydantic import (
     StringConstraints,
     field_validator,
 )
+
+from service.reasons import CODES
 
 _EARLIEST, _LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
 
@@ -34,7 +36,20 @@ Moment = Annotated[AwareDatetime, AfterValidator(_checked_moment)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Text = Annotated[str, AfterValidator(_without_nul)]
+CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
 Who = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+# Beside every `reason`: its code, and the numbers and names that belong to it.
+ReasonCode = Annotated[
+    str,
+    Field(
+        description="code of the first of the reasons; null where there is none",
+        json_schema_extra={"enum": list(CODES)},
+    ),
+]
+ReasonValues = Annotated[
+    dict[str, Any],
+    Field(description="its numbers, with the unit in their names, and names; may be empty"),
+]
 
 
 class Body(BaseModel):
@@ -46,6 +61,3 @@ class Body(BaseModel):
     @classmethod
     def _no_nul(cls, value: object) -> object:
         return _without_nul(value) if isinstance(value, str) else value
-
-
-CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]

@@ -7,9 +7,8 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from models.monitoring.verdict import Drift
-from service.api.schemas.base import Body, Who
-from service.api.schemas.cameras.geometry import PoseOut
-from service.api.schemas.reasons import ReasonCode, ReasonValues
+from service.api.fields import Body, ReasonCode, ReasonValues, Who
+from service.api.geometry_schemas import PoseOut
 from service.cameras.poses import PoseView
 from service.enums import PoseState, ReferenceState
 from service.estimation.drift_words import FIELDS

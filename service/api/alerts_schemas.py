@@ -6,8 +6,7 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from service.api.schemas.base import Body, Moment, Who
-from service.api.schemas.reasons import ReasonCode, ReasonValues
+from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Who
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.formats.degrees import in_degrees
 from service.notifications.outbox import is_silenced
