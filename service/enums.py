@@ -14,7 +14,6 @@ class PoseState(StrEnum):
     OK = "ok"
     DRIFTING = "drifting"
     NO_DATA = "no_data"
-    OUT_OF_RANGE = "out_of_range"
 
 
 class Cause(StrEnum):
@@ -49,7 +48,6 @@ class AlertKind(StrEnum):
 
     DRIFT = "drift"
     NO_DATA = "no_data"
-    OUT_OF_RANGE = "out_of_range"
     CLOCK = "clock"
     STALE = "stale"
     TRACKER = "tracker"

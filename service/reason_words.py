@@ -8,7 +8,7 @@ from typing import Any
 
 from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode
-from service.enums import Cause, TrainingState
+from service.enums import Cause
 from service.reasons import ServiceCode
 
 _Values = Mapping[str, Any]
@@ -18,13 +18,6 @@ _SINCE = {
     Cause.MAINTENANCE: "since the maintenance",
     Cause.PUT_BACK: "since the camera was put back",
     Cause.FALSE_ALARM: "since the alert was called a false alarm",
-}
-_TRAININGS = {
-    TrainingState.QUEUED: "is queued",
-    TrainingState.RUNNING: "is running",
-    TrainingState.SUCCEEDED: "has ended",
-    TrainingState.FAILED: "has failed",
-    TrainingState.CANCELLED: "was cancelled",
 }
 
 
@@ -273,12 +266,6 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ServiceCode.TRACKS_SINCE: _since,
     ServiceCode.LAST_IDENTIFIABLE: lambda v: "when it was last told:",
     ServiceCode.MAINTENANCE: _maintenance,
-    ServiceCode.RANGE_EDGE: lambda v: (
-        f"{v['number']} is at the edge of the range that the model in use was trained for"
-    ),
-    ServiceCode.TRAINING_AROUND: lambda v: (
-        f"a training around the new estimate {_TRAININGS[TrainingState(v['state'])]}"
-    ),
     ServiceCode.WITHOUT_PART: lambda v: f"without the {v['part'].replace('_', ' ')}: {v['why']}",
     ServiceCode.SILENT_USUAL: _silent,
     ServiceCode.SILENT_UNUSUAL: _silent,

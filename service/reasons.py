@@ -20,8 +20,6 @@ class ServiceCode(StrEnum):
     TRACKS_SINCE = "tracks_since"
     LAST_IDENTIFIABLE = "last_told"
     MAINTENANCE = "maintenance"
-    RANGE_EDGE = "range_edge"
-    TRAINING_AROUND = "training_around"
     WITHOUT_PART = "without_part"
     SILENT_USUAL = "silent_usual"
     SILENT_UNUSUAL = "silent_unusual"

@@ -21,8 +21,7 @@ from service.enums import (
     Severity,
 )
 from service.errors import ConflictError, NotFoundError
-from service.formats.degrees import in_degrees
-from service.notifications.outbox import json_time, queue_alert
+from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
 from service.store import alerts, maintenance
@@ -40,6 +39,12 @@ _KEPT_AS = {
     AlertActivity.SILENCE_ENDED: Activity.ALERT_SILENCE_ENDED,
     AlertActivity.RESOLVED: Activity.ALERT_RESOLVED,
 }
+# What of an alert's body an event has.
+_EVENT_FIELDS = (
+    *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
+    *("drift", "outcome", "acknowledged_by", "silenced_until", "silence_reason", "silenced_by"),
+    *("track_source", "camera_ids", "group_id"),
+)
 # What messages say of an activity; that an alert grew is told with what made it grow.
 _NOTIFIED_AS = {
     AlertActivity.OPENED: MessageType.ALERT_OPENED,
@@ -267,24 +272,7 @@ def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
     ):
         return
     record.notified = True
-    payload = {
-        "id": record.id,
-        "camera_id": record.camera_id,
-        "kind": record.kind,
-        "state": record.state,
-        "severity": record.severity,
-        "reason": record.reason,
-        "reason_code": record.reason_code,
-        "reason_values": record.reason_values,
-        "drift": in_degrees(record.drift),
-        "outcome": record.outcome,
-        "acknowledged_by": record.acknowledged_by,
-        "silenced_until": record.silenced_until and json_time(record.silenced_until),
-        "silence_reason": record.silence_reason,
-        "silenced_by": record.silenced_by,
-        "track_source": record.track_source,
-        "camera_ids": record.camera_ids,
-        "group_id": record.group_id,
-    }
-    events.add(session, EventType.ALERT, payload, datetime.now(UTC))
-    queue_alert(session, record, message)
+    body = alert_body(record)
+    event = {name: body[name] for name in _EVENT_FIELDS}
+    events.add(session, EventType.ALERT, event, datetime.now(UTC))
+    queue_alert(session, record, body, message)

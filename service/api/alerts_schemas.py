@@ -1,15 +1,14 @@
 """Bodies of `/alerts`."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, Field
 
 from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Who
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
-from service.formats.degrees import in_degrees
-from service.notifications.outbox import is_silenced
+from service.notifications.outbox import alert_body
 from service.store.tables.activity import ActivityRecord
 from service.store.tables.alerts import AlertRecord
 
@@ -42,8 +41,6 @@ class AlertOut(BaseModel):
     `acknowledged` and `silenced` are flags of a firing alert, not states.
     """
 
-    model_config = ConfigDict(from_attributes=True)
-
     id: str
     camera_id: str | None
     kind: AlertKind
@@ -71,18 +68,10 @@ class AlertOut(BaseModel):
     camera_ids: list[str] | None
     group_id: str | None
 
-    @field_validator("drift", mode="before")
-    @classmethod
-    def _degrees(cls, stored: dict[str, Any]) -> dict[str, Any]:
-        return in_degrees(stored)
-
     @classmethod
     def from_record(cls, record: AlertRecord) -> Self:
         """The body of a stored alert."""
-        body = cls.model_validate(record)
-        body.acknowledged = record.acknowledged_at is not None
-        body.silenced = is_silenced(record, datetime.now(UTC))
-        return body
+        return cls.model_validate(alert_body(record))
 
 
 class ActOut(BaseModel):

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from service.alerts.arrival_rates import CameraRhythm, unpacked
 from service.alerts.presence import is_no_data
-from service.enums import AlertKind, AlertSource, Answer, Cause, Origin, PoseState, Severity
+from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.notifications.outbox import is_silenced
 from service.settings import Settings
 from service.store import fleet, metrics
@@ -25,8 +25,6 @@ from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.windows.attendance import Attendance, attendance_by
 from service.windows.references import made_against
-
-MOVED = (PoseState.DRIFTING, PoseState.OUT_OF_RANGE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,10 +147,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
     state: PoseState
     if holding:
         estimate = estimate if judged else facts.last_identifiable
-        drifts = any(alert.kind != AlertKind.OUT_OF_RANGE for alert in holding)
-        state = PoseState.DRIFTING if drifts else PoseState.OUT_OF_RANGE
-        if estimate is not None and estimate.state in MOVED:
-            state = estimate.state
+        state = PoseState.DRIFTING
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
     elif silent:

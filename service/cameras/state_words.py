@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from models.reasons import Reason, Value
 from models.walking.reference.assumed import FEWEST_WALKERS
 from service.alerts.presence import silence_of
-from service.cameras.standing import MOVED, Standing
+from service.cameras.standing import Standing
 from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
@@ -32,7 +32,7 @@ def reasons_of(session: Session, settings: Settings, standing: Standing, so_far:
     estimate = standing.estimate
     if standing.judged and estimate is not None and standing.state != PoseState.NO_DATA:
         found += estimate.reasons
-    elif standing.state in MOVED:
+    elif standing.state == PoseState.DRIFTING:
         if estimate is not None and estimate.identifiable:
             found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
         else:
@@ -40,7 +40,7 @@ def reasons_of(session: Session, settings: Settings, standing: Standing, so_far:
     if not standing.judged:
         found += _missing(session, settings, standing, so_far)
     silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
-    if silence is not None and standing.state in (PoseState.NO_DATA, *MOVED):
+    if silence is not None and standing.state in (PoseState.NO_DATA, PoseState.DRIFTING):
         found += silence.reasons
     return tuple(found)
 

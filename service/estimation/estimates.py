@@ -34,7 +34,7 @@ from service.store.operation import events
 from service.store.packing import identifiable_drift
 from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
-from service.training.ranges import beyond_range, train_around
+from service.training.ranges import train_at_edge
 from service.windows.references import is_overtaken, made_against
 
 
@@ -117,22 +117,15 @@ def _judge(
     verdict = judge(drift, limits, drifted, reading, earlier, creep)
     record.drift_streak, record.drifted = verdict.streak, list(verdict.drifted)
     record.drift_since = _since(reference, verdict, since, evidence, finding, first=last is None)
-    edge = beyond_range(session, camera_id, pose_after(drift, evidence.prior), drift.identifiable)
     record.state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     if verdict.drifting:
         record.state = PoseState.DRIFTING
-    training = None
-    if edge is not None:
-        record.state = PoseState.OUT_OF_RANGE
-        training = train_around(
-            session, queue, settings, camera_id, pose_after(drift, evidence.prior)
-        )
+    pose = pose_after(drift, evidence.prior)
+    train_at_edge(session, queue, settings, camera_id, pose, drift.identifiable)
     record.reasons = some(
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, limits),
         clock,
-        edge,
-        training,
         None if finding.reading is None else reason_of_reading(finding.reading),
         finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
@@ -144,7 +137,7 @@ def _judge(
     if charted and clock is None and reading is not None and reading.parameter == CLOCK:
         clock = reason_of_reading(reading)
     charted = charted or (creep is not None and creep.moved)
-    _alert(session, settings, record, drift, verdict, charted=charted, clock=clock, edge=edge)
+    _alert(session, settings, record, drift, verdict, charted=charted, clock=clock)
 
 
 def _alert(
@@ -156,7 +149,6 @@ def _alert(
     *,
     charted: bool,
     clock: Reason | None,
-    edge: Reason | None,
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     camera_id = record.camera_id
@@ -164,11 +156,6 @@ def _alert(
     body = identifiable_drift(drift)
     severity = Severity.CRITICAL if verdict.excess >= 2 else Severity.WARNING
     since = record.drift_since
-    if edge is not None:
-        kind = AlertKind.OUT_OF_RANGE
-        open_alert(session, settings, camera_id, kind, severity, body, since, reasons=(edge,))
-    elif AlertKind.OUT_OF_RANGE in firing:
-        end_alert(session, camera_id, AlertKind.OUT_OF_RANGE, Outcome.CLEARED)
     if not verdict.drifting:
         for kind in firing & {AlertKind.DRIFT, AlertKind.CLOCK}:
             end_alert(session, camera_id, kind, Outcome.CLEARED)

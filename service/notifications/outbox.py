@@ -18,53 +18,26 @@ from service.store import webhooks
 from service.store.tables.alerts import AlertRecord
 from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
 
-# What of an alert a message has: the body of `GET /alerts/{id}`, frozen at the time of the change.
-ALERT_FIELDS = (
-    "id",
-    "camera_id",
-    "kind",
-    "state",
-    "severity",
-    "reason",
-    "reason_code",
-    "reason_values",
-    "drift",
-    "opened_at",
-    "changed_at",
-    "updated_at",
-    "acknowledged_by",
-    "acknowledged_at",
-    "silenced_until",
-    "silence_reason",
-    "silenced_by",
-    "resolved_at",
-    "resolved_by",
-    "outcome",
-    "note",
-    "track_source",
-    "camera_ids",
-    "group_id",
+_ALERT_FIELDS = (
+    *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
+    *("drift", "opened_at", "changed_at", "updated_at", "acknowledged_by", "acknowledged_at"),
+    *("silenced_until", "silence_reason", "silenced_by", "resolved_at", "resolved_by"),
+    *("outcome", "note", "track_source", "camera_ids", "group_id"),
 )
-ALERT_FLAGS = ("acknowledged", "silenced")
 # A silenced alert is quiet but for these.
 _TOLD_IN_SILENCE = (MessageType.ALERT_SILENCED, MessageType.ALERT_RESOLVED)
 _JOB_LOST = timedelta(seconds=30)
 
 
-def queue_alert(session: Session, record: AlertRecord, message: MessageType) -> None:
-    """Tell the webhooks that want it of a change to an alert.
-
-    Args:
-        session: of the change itself.
-        record: the alert, changed.
-        message: what is told of it.
-    """
+def queue_alert(
+    session: Session, record: AlertRecord, body: dict[str, Any], message: MessageType
+) -> None:
+    """Tell the webhooks that want it of a change to an alert, with its body as of now."""
     now = datetime.now(UTC)
     if is_silenced(record, now) and message not in _TOLD_IN_SILENCE:
         return
     for webhook in webhooks.enabled(session):
         if webhook.kinds is None or record.kind in webhook.kinds:
-            body = alert_body(record)
             add_delivery(session, webhook, message, body, now, alert_id=record.id)
 
 
@@ -106,15 +79,16 @@ def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetim
 
 
 def alert_body(record: AlertRecord) -> dict[str, Any]:
-    """An alert as clients see it."""
-    values = {name: getattr(record, name) for name in ALERT_FIELDS}
-    values["drift"] = in_degrees(record.drift)
+    """An alert as clients see it, in the API, in webhooks and, in part, in events."""
+    values = {name: getattr(record, name) for name in _ALERT_FIELDS}
     body = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
-    flags = (record.acknowledged_at is not None, is_silenced(record, datetime.now(UTC)))
-    return {**body, **dict(zip(ALERT_FLAGS, flags, strict=True))}
+    body["drift"] = in_degrees(record.drift)
+    body["acknowledged"] = record.acknowledged_at is not None
+    body["silenced"] = is_silenced(record, datetime.now(UTC))
+    return body
 
 
 def is_silenced(record: AlertRecord, now: datetime) -> bool:

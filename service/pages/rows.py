@@ -7,19 +7,16 @@ from datetime import datetime, tzinfo
 
 from markupsafe import Markup
 
-from service.cameras.standing import MOVED
 from service.enums import AlertKind, PoseState, Severity
 from service.pages.drawings.sparkline import sparkline
 from service.pages.views.fleet import FleetAlert, FleetCamera, FleetGroup
 from service.pages.wording.camera_words import KINDS
 from service.pages.wording.words import STATES, ago, clock_time, duration, from_seconds, situation
 from service.reason_words import group_in_words
-from service.store.alerts import POSE_KINDS
 
 # What a state says by itself; every other alert is named.
 _SAID = {
     PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
-    PoseState.OUT_OF_RANGE: POSE_KINDS,
     PoseState.NO_DATA: (AlertKind.NO_DATA,),
 }
 
@@ -95,7 +92,7 @@ def counts_of(cameras: Sequence[FleetCamera]) -> list[tuple[PoseState, str, int]
 
 def urgent(cameras: Sequence[FleetCamera]) -> int:
     """How many have moved."""
-    return sum(camera.state in MOVED for camera in cameras)
+    return sum(camera.state == PoseState.DRIFTING for camera in cameras)
 
 
 def _row(camera: FleetCamera, now: datetime, zone: tzinfo) -> Row:
@@ -139,7 +136,7 @@ def _flags(camera: FleetCamera, now: datetime) -> tuple[str, ...]:
         flags.append(f"maintenance for {duration(left_s)} more")
     if camera.alert is not None:
         flags += _alert_flags(camera.alert, now)
-    elif camera.state in MOVED and camera.attended_until is None:
+    elif camera.state == PoseState.DRIFTING and camera.attended_until is None:
         flags.append("no alert is open")
     for alert in camera.alerts:
         if alert.kind not in _SAID.get(camera.state, ()):

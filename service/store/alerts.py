@@ -11,11 +11,7 @@ from service.enums import AlertKind, AlertState, Outcome
 from service.store.database.deleting import delete_some
 from service.store.tables.alerts import AlertRecord
 
-POSE_KINDS = (
-    AlertKind.DRIFT,
-    AlertKind.CLOCK,
-    AlertKind.OUT_OF_RANGE,
-)  # that hold a camera against its prior pose
+POSE_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that hold a camera against its prior pose
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.

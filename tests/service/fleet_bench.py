@@ -192,8 +192,8 @@ def every_state(fleet: Fleet, numbers: Iterable[int]) -> None:
                 fleet.add(camera_id, state="learning", tracks=30)
                 fleet.attend(camera_id, hours=2.0, began_h=0.1)
             case 2:
-                fleet.add(camera_id, state="out_of_range", **turned)
-                fleet.knock(camera_id, kind="out_of_range", severity="warning", by="Ines")
+                fleet.add(camera_id, state="drifting", **turned)
+                fleet.knock(camera_id, severity="warning", by="Ines")
             case 3:
                 fleet.add(camera_id)
             case 4:

@@ -22,7 +22,6 @@ from tests.service.shifted_clock import ShiftedClock
 CAMERAS = ("one", "two")
 STREET = "street"  # is looked at by the real job
 NUMBERS = ("height_m", "tilt_deg", "roll_deg", "heading_deg")
-MOVED = ("drifting", "out_of_range")
 UNIDENTIFIABLE = st.sampled_from([(), (), (), ("tilt",), ("tilt", "roll", "height")])
 
 some = st.integers(0, 10)

@@ -32,7 +32,7 @@ function sift() {
     chip.classList.toggle("empty-state", !count);
     chip.setAttribute("aria-pressed", String(chip.dataset.state === state));
   }
-  const urgent = (counts.drifting ?? 0) + (counts.out_of_range ?? 0);
+  const urgent = counts.drifting ?? 0;
   document.title = (urgent ? `(${urgent}) ` : "") + plainTitle;
   none.hidden = shown > 0;
   if (!shown && list.children.length) none.textContent = "No camera is like that.";

@@ -5,7 +5,7 @@ import { debounced } from "./events.js";
 
 const WAIT_MS = 250;
 const DRAFT = "surefoot-register";
-const SHAPES = { critical: "i-drifting", warning: "i-out_of_range", good: "i-ok", info: "i-info" };
+const SHAPES = { critical: "i-drifting", warning: "i-warning", good: "i-ok", info: "i-info" };
 const form = document.getElementById("register");
 const says = document.getElementById("says");
 

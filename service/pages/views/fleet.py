@@ -24,7 +24,6 @@ _HISTORY = 24  # estimates of a sparkline
 # How soon a camera without an alert needs a person.
 _RANKS = {
     PoseState.DRIFTING: 2,
-    PoseState.OUT_OF_RANGE: 2,
     PoseState.NO_DATA: 4,
     PoseState.LEARNING: 6,
     PoseState.OK: 7,

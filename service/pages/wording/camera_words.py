@@ -21,7 +21,6 @@ from service.store.tables.estimates import EstimateRecord
 KINDS = {
     AlertKind.DRIFT: "The camera moved",
     AlertKind.CLOCK: "The clock looks wrong",
-    AlertKind.OUT_OF_RANGE: "Beyond the model's range",
     AlertKind.NO_DATA: "No people come",
     AlertKind.STALE: "Its estimate is not being made",
     AlertKind.TRACKER: "Another tracker posts",

@@ -6,7 +6,6 @@ from datetime import UTC, datetime, tzinfo
 
 from models.geometry.plane_parameters import ANGLES
 from models.quantiles import Z90
-from service.cameras.standing import MOVED
 from service.enums import AlertKind, PoseState
 from service.pages.views.camera_page import CameraPage
 from service.pages.wording.moments import when
@@ -33,7 +32,7 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
     standing = page.pose.standing
     state, known = standing.state, estimate is not None and bool(estimate.identifiable)
     doubts = [alert for alert in standing.alerts if alert.kind in POSE_KINDS]
-    if state in MOVED and not standing.judged:
+    if state == PoseState.DRIFTING and not standing.judged:
         words = _moved(page, estimate, zone) if estimate is not None and known else _alarmed(doubts)
         return f"{words} That is what is known last: the next people will tell how it stands now."
     if estimate is not None and standing.judged and estimate.drifted:
@@ -47,10 +46,6 @@ def _how_it_stands(page: CameraPage, estimate: EstimateRecord | None, zone: tzin
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
-    if state == PoseState.OUT_OF_RANGE:
-        how = moved_words(estimate)
-        edge = "At the edge of what its model was trained for"
-        return f"{edge}{how and ': it ' + how}, as {people}{_sure(estimate)}."
     if estimate.drift_streak > 0 or estimate.suspected:
         how = moved_words(estimate)
         return f"It may have moved{how and ': it ' + how}. The next people will tell."

@@ -12,7 +12,6 @@ from service.pages.views.fleet import FleetCamera
 
 STATES = {
     PoseState.DRIFTING: "Moved",
-    PoseState.OUT_OF_RANGE: "Far off",
     PoseState.NO_DATA: "No people",
     PoseState.LEARNING: "Learning",
     PoseState.OK: "Steady",
@@ -41,8 +40,6 @@ def situation(camera: FleetCamera, now: datetime) -> str:
         return "where it should be, as somebody said; the next people will tell"
     if moved and not camera.judged:
         moved = f"{moved} when it was last told"
-    if camera.state == PoseState.OUT_OF_RANGE:
-        return f"{moved or 'moved'}: further than it was trained for, so this is rough"
     if camera.state == PoseState.DRIFTING:
         return moved or "moved, but by how much is not told yet"
     return "standing still"

@@ -165,7 +165,7 @@ def test_put_back_by_resolving_holds_the_camera_to_its_reference_by_new_tracks(b
     answer = {"outcome": "put_back", "by": "Ada"}
     bench.http.post(f"/alerts/{drift['id']}/resolve", json=answer).raise_for_status()
     # As by a reset, all that held the camera against its prior pose ends ...
-    assert {alert["kind"] for alert in bench.alerts()} == {"drift", "out_of_range"}
+    assert {alert["kind"] for alert in bench.alerts()} == {"drift"}
     assert {(a["outcome"], a["resolved_by"]) for a in bench.alerts()} == {("put_back", "Ada")}
     body = bench.pose()
     assert (body["state"], body["estimated"]) == ("learning", [])

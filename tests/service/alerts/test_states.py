@@ -138,6 +138,9 @@ def test_what_was_seen_before_a_false_alarm_alarms_no_more_but_what_comes_does(b
 def test_a_false_alarm_is_said_of_all_alerts_about_the_pose(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=14.0))
+    with bench.store.write() as session:
+        words = as_said("its people walk too fast")
+        open_alert(session, bench.settings, "corner", "clock", "warning", {}, None, reasons=words)
     assert len(bench.alerts(state="firing")) == 2
     resolve(bench, "false_alarm")
     assert bench.alerts(state="firing") == []

@@ -128,7 +128,7 @@ def test_two_or_a_minority_or_moves_at_other_times_are_no_group(town):
 def test_what_is_no_matter_of_the_tracker_makes_no_group(town):
     town.build(3)
     for n in range(3):
-        town.moves(n, kind="out_of_range")
+        town.moves(n, kind="tracker")
     assert all(alert["group_id"] is None for alert in town.alerts())
 
 

@@ -239,12 +239,12 @@ def test_a_public_url_makes_links_and_names_come_of_kinds():
     body = dict.fromkeys(
         ("camera_id", "changed_at", "resolved_at", "acknowledged_by", "outcome"), None
     )
-    body |= {"id": "a1", "kind": "out_of_range", "severity": "warning", "reason": "r", "drift": {}}
+    body |= {"id": "a1", "kind": "no_data", "severity": "warning", "reason": "r", "drift": {}}
     body["opened_at"] = "2026-11-21T10:00:00Z"
     (alert,) = postable_alerts(body, "https://surefoot.example/", changed=False)
     assert alert["generatorURL"] == "https://surefoot.example/alerts/a1"
     assert "camera_id" not in alert["labels"]  # of no one camera
-    assert alert["labels"]["alertname"] == alert_name("out_of_range") == "SurefootCameraOutOfRange"
+    assert alert["labels"]["alertname"] == alert_name("no_data") == "SurefootCameraNoData"
 
 
 def test_a_group_is_told_as_one_alert_of_its_tracker(post_room):

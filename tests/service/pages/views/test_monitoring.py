@@ -11,6 +11,7 @@ import yaml
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.alerts import alerts
+from service.reasons import as_said
 from service.workers.processes.workforce import register_worker
 from tests.service.bench import moved
 from tests.service.pages.views.test_metrics import PROMTOOL, needs_promtool
@@ -43,7 +44,11 @@ def series(bench):
         register_worker(session, "local-0", 1)
         record = alerts.show_alert(session, bench.alerts()[0]["id"])
         record.silenced_until = datetime.now(UTC) + timedelta(hours=1)
-        alerts.show_alert(session, bench.alerts()[1]["id"]).group_id = record.id
+        words = as_said("another tracker")
+        member = alerts.open_alert(
+            session, bench.settings, "corner", "tracker", "warning", {}, None, reasons=words
+        )
+        member.group_id = record.id
     found = {}
     for family in families(bench.http.get("/metrics").text):
         for sample in family.samples:
