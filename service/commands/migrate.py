@@ -9,11 +9,10 @@ from service.data_dir import (
     StartError,
     make_file,
     make_private,
-    require_space,
     telling_of,
 )
 from service.job_queue import migrate_engine_tables
-from service.notifications.key_settling import settle_keys
+from service.notifications.keys import settle_key
 from service.operations.before_migration import copy_before
 from service.operations.placing import finish_restore
 from service.settings import Settings
@@ -27,7 +26,7 @@ _LOOK_S = 10.0  # reads a gigabyte or more
 
 
 def migrate(settings: Settings) -> None:
-    """Create or upgrade all tables, seal secrets, make old files shrinkable; one process at a time.
+    """Create or upgrade all tables and see to the key; one process at a time.
 
     Before the schema of a database changes it is copied, and where that fails put back.
 
@@ -52,8 +51,7 @@ def migrate(settings: Settings) -> None:
             _require_sound(settings.database_path)
             _migrate_tables(settings)
             migrate_engine_tables(settings)
-            settle_keys(settings)
-            _make_shrinkable(settings.database_path)
+            settle_key(settings)
 
 
 def _require_sound(path: Path) -> None:
@@ -90,16 +88,3 @@ def _migrate_tables(settings: Settings) -> None:
             "a copy of it: install the release that ran before, and report this"
         ) from error
     log.info("migrated", extra={"from": found, "to": head})
-
-
-def _make_shrinkable(path: Path) -> None:
-    """Write a file of an early release anew, once; without the space for it, at a later start."""
-    if files.shrinks(path):
-        return
-    try:
-        require_space(path.parent, 2 * files.size(path) + 2**20, "giving unused space back")
-    except StartError as error:
-        log.warning("not_rebuilt", extra={"reason": str(error)})
-        return
-    log.info("rebuilding", extra={"path": str(path), "bytes": files.size(path)})
-    files.rebuild(path)

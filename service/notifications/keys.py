@@ -8,7 +8,6 @@ from models.reasons import Reason
 from service.data_dir import KEY_FILE, StartError
 from service.notifications.sealing import (
     Sealer,
-    is_sealed,
     key_id_of,
     read_key_file,
     sealer_of,
@@ -18,6 +17,7 @@ from service.notifications.signing import new_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
+from service.store.database.store import Store
 from service.store.tables.deliveries import WebhookRecord
 
 NEW_KEY_FILE = f"{KEY_FILE}.new"
@@ -25,13 +25,14 @@ NEW_KEY_FILE = f"{KEY_FILE}.new"
 
 def secret_of(settings: Settings, record: WebhookRecord) -> str | None:
     """The secret of a webhook in plain text; None where it has none."""
-    return None if record.secret is None else _opened(sealer_of(settings), record, record.secret)
+    stored = record.secret
+    return None if stored is None else sealer_of(settings).open(stored, _purpose(record.id))
 
 
 def old_secret_of(settings: Settings, record: WebhookRecord) -> str | None:
     """The secret that it had before the last rotation."""
     stored = record.old_secret
-    return None if stored is None else _opened(sealer_of(settings), record, stored)
+    return None if stored is None else sealer_of(settings).open(stored, _purpose(record.id))
 
 
 def sealed_secret(settings: Settings, webhook_id: str, secret: str) -> str:
@@ -39,8 +40,8 @@ def sealed_secret(settings: Settings, webhook_id: str, secret: str) -> str:
     return sealer_of(settings).seal(secret, _purpose(webhook_id))
 
 
-def settle_key(session: Session, settings: Settings) -> int:
-    """See that there is a key, that it opens what is sealed, and that all is; how many were not.
+def settle_key(settings: Settings) -> None:
+    """See that there is a key, and that it opens all stored secrets.
 
     A key file is made where there is no key and nothing was ever sealed with one. A rotation that
     was cut off is ended, or taken back.
@@ -48,9 +49,8 @@ def settle_key(session: Session, settings: Settings) -> int:
     Raises:
         StartError: the key is missing or does not open what is stored.
     """
-    records = webhooks.every(session)
-    stored = [text for record in records for text in _stored(record)]
-    sealed = [text for text in stored if is_sealed(text)]
+    stored = _stored_secrets(settings)
+    sealed = [text for _, text in stored]
     path, new_path = settings.data_dir / KEY_FILE, settings.data_dir / NEW_KEY_FILE
     if settings.secret_key is None:
         if new_path.exists():
@@ -63,15 +63,7 @@ def settle_key(session: Session, settings: Settings) -> int:
                 )
             write_key_file(path)
     _check_file_or_environment(settings, sealed)
-    sealer = sealer_of(settings)
-    plain = 0
-    for record in records:
-        for text in _stored(record):
-            if is_sealed(text):
-                _opened(sealer, record, text)
-        plain += sum(not is_sealed(text) for text in _stored(record))
-        _seal_plain(record, sealer)
-    return plain
+    require_openable(sealer_of(settings), stored)
 
 
 def reseal(session: Session, old: Sealer, new: Sealer) -> int:
@@ -85,7 +77,7 @@ def reseal(session: Session, old: Sealer, new: Sealer) -> int:
         for name in ("secret", "old_secret"):
             text = getattr(record, name)
             if text is not None:
-                plain = _opened(old, record, text)
+                plain = old.open(text, _purpose(record.id))
                 setattr(record, name, new.seal(plain, _purpose(record.id)))
                 count += 1
     return count
@@ -103,8 +95,8 @@ def give_up_secrets(session: Session, new: Sealer) -> int:
     return count
 
 
-def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> int:
-    """Check that a key opens all secrets; returns how many are sealed.
+def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> None:
+    """Check that a key opens all secrets.
 
     Args:
         sealer: with the key.
@@ -113,10 +105,8 @@ def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> int:
     Raises:
         StartError: it does not open one.
     """
-    sealed = [(webhook_id, text) for webhook_id, text in stored if is_sealed(text)]
-    for webhook_id, text in sealed:
+    for webhook_id, text in stored:
         sealer.open(text, _purpose(webhook_id))
-    return len(sealed)
 
 
 def _end_rotation(settings: Settings, sealed: list[str]) -> None:
@@ -141,19 +131,19 @@ def _check_file_or_environment(settings: Settings, sealed: list[str]) -> None:
         )
 
 
-def _stored(record: WebhookRecord) -> list[str]:
-    return [text for text in (record.secret, record.old_secret) if text is not None]
-
-
-def _seal_plain(record: WebhookRecord, sealer: Sealer) -> None:
-    for name in ("secret", "old_secret"):
-        text = getattr(record, name)
-        if text is not None and not is_sealed(text):
-            setattr(record, name, sealer.seal(text, _purpose(record.id)))
-
-
-def _opened(sealer: Sealer, record: WebhookRecord, text: str) -> str:
-    return sealer.open(text, _purpose(record.id)) if is_sealed(text) else text
+def _stored_secrets(settings: Settings) -> list[tuple[str, str]]:
+    """The ids of webhooks with their secrets as they are stored."""
+    store = Store(settings)
+    try:
+        with store.read() as session:
+            return [
+                (record.id, text)
+                for record in webhooks.every(session)
+                for text in (record.secret, record.old_secret)
+                if text is not None
+            ]
+    finally:
+        store.close()
 
 
 def _purpose(webhook_id: str) -> str:

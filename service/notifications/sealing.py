@@ -56,14 +56,9 @@ class Sealer:
         return text.decode()
 
 
-def is_sealed(text: str) -> bool:
-    """Whether a stored secret is sealed; those of earlier releases are not."""
-    return text.startswith(_PREFIX)
-
-
 def key_id_of(sealed: str) -> str:
     """The id of the key that something was sealed with."""
-    return sealed.removeprefix(_PREFIX).split(":")[0]
+    return sealed.partition(_PREFIX)[2].split(":")[0]
 
 
 def sealer_of(settings: Settings) -> Sealer:

@@ -19,7 +19,7 @@ from service.data_dir import (
 )
 from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import require_openable
-from service.notifications.sealing import is_sealed, sealer_of
+from service.notifications.sealing import sealer_of
 from service.operations.manifest import hash_file
 from service.operations.placing import READY
 from service.settings import Settings
@@ -109,9 +109,6 @@ def _database(path: Path) -> Iterator[Finding]:
         yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
     missing = sorted(set(ENGINE_TABLES) - files.tables(path))
     yield _finding("job engine", missing, "its tables are there", "missing: ")
-    shrinks = files.shrinks(path)
-    detail = "unused space is given back" if shrinks else "the file cannot shrink until a start"
-    yield Finding(what="shrinking", verdict=Verdict.OK if shrinks else Verdict.NOTE, detail=detail)
 
 
 def _weights(settings: Settings) -> Iterator[Finding]:
@@ -150,17 +147,12 @@ def _broken_models(settings: Settings) -> dict[str, str]:
 
 def _key(settings: Settings, path: Path) -> Finding:
     secrets = files.webhook_secrets(path)
-    sealed = [text for _, text in secrets if is_sealed(text)]
     try:
-        if sealed:
+        if secrets:
             require_openable(sealer_of(settings), secrets)
     except StartError as error:
         return Finding(what="key", verdict=Verdict.FAULT, detail=str(error))
-    plain = len(secrets) - len(sealed)
-    if plain:
-        detail = f"{plain} secrets in plain text: the next start seals them"
-        return Finding(what="key", verdict=Verdict.NOTE, detail=detail)
-    return Finding(what="key", verdict=Verdict.OK, detail=f"opens {len(sealed)} secrets")
+    return Finding(what="key", verdict=Verdict.OK, detail=f"opens {len(secrets)} secrets")
 
 
 def _modes(folder: Path) -> Finding:

@@ -20,7 +20,7 @@ from service.data_dir import (
     telling_of,
 )
 from service.notifications.keys import require_openable
-from service.notifications.sealing import is_sealed, read_key_file, sealer_of
+from service.notifications.sealing import read_key_file, sealer_of
 from service.operations.manifest import (
     MANIFEST,
     Manifest,
@@ -151,7 +151,7 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         if not path.exists() or hash_file(path).sha256 != digest:
             raise StartError(f"restore: weights {digest} of the backup are missing or damaged")
     secrets = files.webhook_secrets(database)
-    if any(is_sealed(text) for _, text in secrets):
+    if secrets:
         in_archive = (folder / KEY_FILE).exists()
         if not in_archive and settings.secret_key is None:
             raise StartError(

@@ -23,7 +23,7 @@ from service.data_dir import (
     telling_of,
 )
 from service.notifications.keys import require_openable
-from service.notifications.sealing import is_sealed, sealer_of
+from service.notifications.sealing import sealer_of
 from service.operations.manifest import (
     FORMAT,
     MANIFEST,
@@ -124,8 +124,7 @@ def _describe(settings: Settings, scratch: Path, missing: list[str]) -> Manifest
     database = scratch / DATABASE
     secrets = files.webhook_secrets(database)
     key, key_id = "none", ""
-    sealed = any(is_sealed(text) for _, text in secrets)
-    if settings.secret_key is not None or (settings.data_dir / KEY_FILE).exists() or sealed:
+    if settings.secret_key is not None or (settings.data_dir / KEY_FILE).exists() or secrets:
         sealer = sealer_of(settings)
         require_openable(sealer, secrets)
         key, key_id = "environment", sealer.key_id

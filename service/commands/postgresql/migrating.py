@@ -6,18 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import alembic.command
-from alembic.script import ScriptDirectory
+from alembic.migration import MigrationContext
 from sqlalchemy import Connection, text
 
 from service.data_dir import StartError
 from service.job_queue import migrate_engine_tables
-from service.notifications.key_settling import settle_keys
+from service.notifications.keys import settle_key
 from service.settings import Settings
 from service.store.database.revisions import alembic_config, known_revisions, require_known
 from service.store.postgresql.backend import postgresql_engine
 from service.store.postgresql.faults import telling_of_server
 from service.store.postgresql.keys import LOCKS, lock_key
-from service.store.postgresql.schema import make_schema, revision
 
 log = logging.getLogger("surefoot.migrate")
 
@@ -26,7 +25,7 @@ _VERSION = 130_000  # the first with 64-bit numbers of transactions
 
 
 def migrate_server(settings: Settings) -> None:
-    """Create or upgrade all tables and seal secrets.
+    """Create or upgrade all tables and see to the key.
 
     The schema changes in one transaction: where a step fails, none was made.
 
@@ -35,18 +34,15 @@ def migrate_server(settings: Settings) -> None:
     """
     with telling_of_server(settings.store_url), _locked(settings) as connection:
         _require_fit(connection)
-        found, head = revision(connection), known_revisions()[0]
+        found = MigrationContext.configure(connection).get_current_revision()
+        head = known_revisions()[0]
         require_known(found, "the database")
-        if found is None:
-            config = alembic_config(settings.store_url)
-            make_schema(connection, ScriptDirectory.from_config(config))
         connection.commit()
-        if found not in (None, head):
-            alembic.command.upgrade(alembic_config(settings.store_url), "head")
         if found != head:
+            alembic.command.upgrade(alembic_config(settings.store_url), "head")
             log.info("migrated", extra={"from": found, "to": head})
         migrate_engine_tables(settings)
-        settle_keys(settings)
+        settle_key(settings)
 
 
 @contextmanager

@@ -119,7 +119,7 @@ def drop_models(path: Path, model_ids: Sequence[str]) -> None:
 
 
 def webhook_secrets(path: Path) -> list[tuple[str, str]]:
-    """The secrets of webhooks as they are stored, with the webhooks' ids; of any revision."""
+    """The secrets of webhooks as they are stored, with the webhooks' ids."""
     if "webhooks" not in tables(path):
         return []
     with connected(path) as connection:
@@ -133,20 +133,6 @@ def size(path: Path) -> int:
     """Bytes of a database with its log."""
     both = (path, path.with_name(path.name + "-wal"))
     return sum(one.stat().st_size for one in both if one.exists())
-
-
-def shrinks(path: Path) -> bool:
-    """Whether a file can give back pages; those of early releases cannot before `rebuild`."""
-    with connected(path) as connection:
-        return bool(connection.execute("PRAGMA auto_vacuum").fetchone()[0])
-
-
-def rebuild(path: Path) -> None:
-    """Write a database anew so that it can give back pages; needs as much space again."""
-    with connected(path) as connection:
-        connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
-        connection.execute("VACUUM")
-        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
 
 
 def wipe_log(path: Path, patience_ms: int = _BUSY_MS) -> None:

@@ -54,7 +54,7 @@ def _shrink(context: JobContext) -> None:
     left = None
     while not context.stopping.wait(_PAUSE_S):
         free = files.free_pages(path)
-        if free <= _PAGES_LEFT or free == left or not files.shrinks(path):
+        if free <= _PAGES_LEFT or free == left:
             break
         left = free
         with context.in_hand.task(UPKEEP, "shrink"):

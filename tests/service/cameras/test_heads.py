@@ -1,16 +1,12 @@
 """Points that carry heads: stored as posted, read as verticals, and refused by name."""
 
 import json
-import sqlite3
 
-import alembic.command
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from sqlalchemy import select
 
-from service.settings import Settings
-from service.store.database.revisions import alembic_config
 from service.store.database.store import Store
 from service.store.packing import intrinsics_of, seen_of, trajectory_of, unpack
 from service.store.tables.cameras import CameraRecord
@@ -18,7 +14,6 @@ from service.store.tables.tracks import TrackRecord
 from service.store.tracks import tracks
 from tests.conftest import track
 from tests.service.conftest import problem
-from tests.test_migrations import put
 
 T0 = 1_700_000_000.0
 POINTS = [[T0 + 0.5 * n, 600.1 + 9 * n, 520.3, 590.7 + 9 * n, 310.9 - n] for n in range(6)]
@@ -118,18 +113,3 @@ def test_not_a_number_is_refused(corner):
         "/cameras/corner/tracks", content=body, headers={"Content-Type": "application/json"}
     )
     assert answer.json()["rejected"][0]["code"] == "not_finite"
-
-
-def test_tracks_of_a_database_of_before_have_no_heads(tmp_path):
-    settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.store_url)
-    alembic.command.upgrade(config, "2026_11_28_anchors")
-    with sqlite3.connect(settings.database_path) as connection:
-        put(connection, "cameras", id="old", distortion="[0, 0, 0, 0, 0]")
-        put(connection, "tracks", id=1, camera_id="old", points=np.zeros(15).tobytes())
-    alembic.command.upgrade(config, "head")
-    with Store(settings).read() as session:
-        assert session.scalars(select(TrackRecord)).one().heads is None
-    alembic.command.downgrade(config, "2026_11_28_anchors")
-    with sqlite3.connect(settings.database_path) as connection:
-        assert connection.execute("SELECT count(*) FROM tracks").fetchone() == (1,)

@@ -4,7 +4,6 @@ import math
 import time
 from dataclasses import replace
 
-import alembic.command
 import pytest
 from sqlalchemy import select
 
@@ -16,14 +15,10 @@ from service.estimation.anchoring import (
     save_anchor_days,
 )
 from service.estimation.growth import load_growth
-from service.settings import Settings
 from service.store import flow_maps, references
-from service.store.database.revisions import alembic_config
-from service.store.database.store import Store
 from service.store.tables.references import AnchorRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
-from tests.test_migrations import put
 
 WANTED, A_DAY, WINDOW = 100, 30, 60
 
@@ -204,25 +199,3 @@ def test_a_false_alarm_has_the_log_begin_anew(known):
     with known.context.store.read() as session:
         reference = references.newest(session, "corner")
         assert reference.window_from_s > known.clock_s - DAY_S
-
-
-def test_a_store_of_before_has_its_present_maps_for_first_ones(tmp_path):
-    settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.store_url)
-    alembic.command.upgrade(config, "2026_11_26_stored_models")
-    store = Store(settings)
-    with store.engine.begin() as connection:
-        raw = connection.connection.driver_connection
-        for n, (data, chart) in {1: (b"map", b"chart"), 2: (b"map", None), 3: (None, None)}.items():
-            name = f"camera-{n}"
-            put(raw, "cameras", id=name, distortion="[0, 0, 0, 0, 0]")
-            put(raw, "prior_poses", id=n, camera_id=name)
-            put(raw, "site_references", id=n, camera_id=name, prior_pose_id=n, doubts="[]")
-            put(raw, "flow_maps", reference_id=n, data=data, chart=chart, to_s=7.5)
-    alembic.command.upgrade(config, "head")
-    with store.read() as session:
-        (kept,) = session.scalars(select(AnchorRecord)).all()
-        assert (kept.reference_id, kept.flow, kept.chart) == (1, b"map", b"chart")
-        assert (kept.to_s, kept.creep, kept.logged_to_s) == (7.5, None, None)
-    alembic.command.downgrade(config, "2026_11_26_stored_models")
-    alembic.command.upgrade(config, "head")

@@ -13,13 +13,12 @@ from service.commands.migrate import migrate
 from service.data_dir import StartError
 from service.notifications.keys import secret_of
 from service.notifications.sealing import Sealer
-from service.notifications.signing import new_secret
 from service.notifications.webhooks import WebhookSpec, create_webhook, rotate_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
 from service.store.database.store import Store
-from tests.stores.databases import ask, only_sqlite
+from tests.stores.databases import only_sqlite
 
 SPEC = WebhookSpec(
     url="https://example.org/hook", name="hook", kinds=None, format="webhook", enabled=True
@@ -43,11 +42,6 @@ def read(settings, webhook_id):
         return secret_of(settings, webhooks.find(session, webhook_id))
 
 
-def put_plain(settings, webhook_id, secret):
-    said = f"secret = '{secret}', old_secret = '{secret}'"
-    ask(settings, f"UPDATE webhooks SET {said} WHERE id = '{webhook_id}'")
-
-
 @only_sqlite("reads the file")
 def test_a_secret_is_in_the_answer_and_not_in_the_file(settings):
     webhook_id, secret = hook(settings)
@@ -57,17 +51,6 @@ def test_a_secret_is_in_the_answer_and_not_in_the_file(settings):
         later = rotate_secret(session, settings, webhook_id).secret
     assert read(settings, webhook_id) == later != secret
     assert b"whsec_" not in everything(settings)
-
-
-@only_sqlite("there were none on PostgreSQL")
-def test_secrets_of_earlier_releases_are_sealed_and_leave_nothing_behind(settings):
-    webhook_id, _ = hook(settings)
-    plain = new_secret()
-    put_plain(settings, webhook_id, plain)
-    assert plain.encode() in everything(settings)
-    migrate(settings)
-    assert plain.encode() not in everything(settings)
-    assert read(settings, webhook_id) == plain
 
 
 def test_a_key_is_made_once_and_is_nobody_elses(settings):

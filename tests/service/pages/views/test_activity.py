@@ -1,25 +1,20 @@
 """The log of what was done: it only grows, outlives cameras, and can be taken elsewhere."""
 
 import json
-import sqlite3
 from datetime import UTC, datetime, timedelta
 
-import alembic.command
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from service.access.activity import note
-from service.commands.migrate import alembic_config, migrate
 from service.enums import Activity
-from service.settings import Settings
 from service.store.database.store import Store
 from service.store.tables.activity import ActivityRecord
 from service.workers.upkeep.limits import limits_of_all
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
-from tests.test_migrations import put
 
 
 def entries(http, **query):
@@ -102,55 +97,6 @@ def test_only_age_ends_an_entry(settings):
         assert limits["activity"].bite(session) == 2
     with store.read() as session:
         assert session.execute(text("SELECT note FROM activity")).all() == [("1824",), ("0",)]
-
-
-def test_what_is_known_of_the_past_is_carried_over(tmp_path):
-    settings = Settings(data_dir=tmp_path)
-    config = alembic_config(settings.store_url)
-    alembic.command.upgrade(config, "2026_11_22_snapshots")
-    with sqlite3.connect(settings.database_path) as connection:
-        put(connection, "cameras", id="c", distortion="[0, 0, 0, 0, 0]", reference_tracks=50)
-        put(connection, "prior_poses", id=1, camera_id="c", origin="registered",
-            created_at="2026-11-20 08:00:00", trusted_by=None)  # fmt: skip
-        put(connection, "prior_poses", id=2, camera_id="c", origin="accepted", trusted_by="Ada",
-            created_at="2026-11-20 12:00:00")  # fmt: skip
-        put(connection, "site_references", id=1, camera_id="c", prior_pose_id=1,
-            origin="registered", ready_at="2026-11-20 09:00:00")  # fmt: skip
-        put(connection, "site_references", id=2, camera_id="c", prior_pose_id=1, origin="reset",
-            requested_by="Bo", created_at="2026-11-20 11:00:00")  # fmt: skip
-        put(connection, "alerts", id="a", camera_id="c", kind="drift", state="resolved",
-            opened_at="2026-11-20 10:00:00", resolved_at="2026-11-20 10:40:00", outcome="put_back",
-            resolved_by="Bo")  # fmt: skip
-        put(connection, "alert_acts", id=1, alert_id="a", act="acknowledged", by="Ada",
-            at="2026-11-20 10:20:00", note="on it")  # fmt: skip
-        put(connection, "alert_acts", id=2, alert_id="a", act="resolved", by="Bo",
-            outcome="put_back", at="2026-11-20 10:40:00")  # fmt: skip
-        put(connection, "alerts", id="b", camera_id="c", kind="no_data", state="firing",
-            opened_at="2026-11-20 13:00:00")  # fmt: skip
-        put(connection, "maintenance_windows", id="w", camera_id="c", requested_by="Cy",
-            created_at="2026-11-20 14:00:00", to_at="2026-11-20 16:00:00",
-            reason="lens")  # fmt: skip
-        put(connection, "trainings", id="t", camera_id="c", prior_pose_id=1, state="failed",
-            error="too few", finished_at="2026-11-20 15:00:00")  # fmt: skip
-    migrate(settings)
-    with sqlite3.connect(settings.database_path) as connection:
-        rows = connection.execute("SELECT what, by, kind, outcome, note FROM activity ORDER BY id")
-        assert rows.fetchall() == [
-            ("camera.registered", None, None, None, None),
-            ("reference.learned", None, None, None, None),
-            ("alert.opened", None, "drift", None, None),
-            ("alert.acknowledged", "Ada", "drift", None, "on it"),
-            ("alert.resolved", "Bo", "drift", "put_back", None),
-            ("reference.reset", "Bo", None, None, None),
-            ("pose.accepted", "Ada", None, None, None),
-            ("alert.opened", None, "no_data", None, None),
-            ("maintenance.planned", "Cy", None, None, "lens"),
-            ("training.failed", None, None, None, "too few"),
-        ]
-    alembic.command.downgrade(config, "2026_11_22_snapshots")
-    with sqlite3.connect(settings.database_path) as connection:
-        rows = connection.execute("SELECT alert_id, act, by FROM alert_acts ORDER BY id").fetchall()
-        assert rows == [("a", "acknowledged", "Ada"), ("a", "resolved", "Bo")]
 
 
 def test_the_page_tells_what_the_log_tells(bench):
