@@ -1,4 +1,4 @@
-"""What is usual at a site: the mean of log speed or log stature by place and direction.
+"""The mean of log speed or log stature at a site, by place and direction.
 
 m(x, d) = c + a d_x + b d_y + g (d_x^2 - d_y^2) + 2 e d_x d_y + sum_k w_k exp(-|x - x_k|^2 / 2 l^2)
 is linear in its coefficients, which have Gaussian priors.
@@ -17,7 +17,7 @@ from models.walking.measures import Measured
 # The squares of Gaussian bumps one length apart sum to pi, wherever one looks.
 _BUMP_SHARE = np.pi
 _MOST_BUMPS = 150
-_NO_WAY, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
+_NO_DIRECTION, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,31 +35,43 @@ class FieldShape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bumps:
-    """Bumps exp(-|x - x_k|^2 / 2 l^2) of one length, centred at (K, 2) on a square grid."""
+class Field:
+    """A linear model of the mean: a level, four directions, and bumps exp(-|x - x_k|^2 / 2 l^2).
+
+    The bumps are of one length, centred at (K, 2) on a square grid. A field without directions has
+    a level and bumps only. A prior variance for each of its P coefficients is in `prior_variance`
+    (P,); `prior_mean` (P,) is the level and zeros.
+    """
 
     centres: Array
     length_m: float
+    directional: bool
+    prior_mean: Array
+    prior_variance: Array
 
-    def features(self, measured: Measured, directional: bool) -> Array:
+    def freer(self, share: float) -> "Field":
+        """The same field with that share of its freedom, the level's apart."""
+        variance = self.prior_variance * share**2
+        variance[0] = self.prior_variance[0]
+        return replace(self, prior_variance=variance)
+
+    def features(self, measured: Measured) -> Array:
         """The rows (M, P) that coefficients are multiplied by: 1, four of directions, the bumps."""
         exponents, pair = exponents_at(measured.place, self.centres, self.length_m)
         falls = np.exp(exponents, out=exponents)
-        direction = measured.direction if directional else _NO_WAY
+        direction = measured.direction if self.directional else _NO_DIRECTION
         assert direction is not None
-        return features_of(falls, pair, directional, direction)
+        return features_of(falls, pair, self.directional, direction)
 
-    def slopes(
-        self, measured: Measured, features: Array, coefficients: Array, directional: bool
-    ) -> Array:
+    def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
         """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
-        first = 5 if directional else 1
+        first = 5 if self.directional else 1
         # Three products with a vector take half as long as one with a matrix of three columns.
         pulls = np.zeros((3, features.shape[1]))
         pulls[:2, first:] = coefficients[first:] * self.centres.T
         pulls[2, first:] = coefficients[first:]
-        direction, d_direction = _NO_WAY, _NO_CHANGE
-        if directional:
+        direction, d_direction = _NO_DIRECTION, _NO_CHANGE
+        if self.directional:
             assert measured.direction is not None
             assert measured.d_direction is not None
             direction, d_direction = measured.direction, measured.d_direction
@@ -71,67 +83,10 @@ class Bumps:
             measured.place,
             measured.d_place,
             coefficients,
-            directional,
+            self.directional,
             direction,
             d_direction,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Field:
-    """A linear model of the mean: a level, four directions, and bumps centred at (K, 2).
-
-    A field without directions has a level and bumps only. A prior variance for each of its P
-    coefficients is in `prior_variance` (P,); `prior_mean` (P,) is the level and zeros. `abrupt`
-    are finer bumps beside them, the last of the coefficients, where a site asks for such.
-    """
-
-    centres: Array
-    length_m: float
-    directional: bool
-    prior_mean: Array
-    prior_variance: Array
-    abrupt: Bumps | None = None
-
-    def freer(self, share: float) -> "Field":
-        """The same field with that share of its freedom, the level's apart."""
-        variance = self.prior_variance * share**2
-        variance[0] = self.prior_variance[0]
-        return replace(self, prior_variance=variance)
-
-    def with_abrupt(self, bumps: Bumps, sd: float) -> "Field":
-        """The same field with finer bumps beside it, by which a place may vary so much more."""
-        count = len(bumps.centres)
-        return replace(
-            self,
-            abrupt=bumps,
-            prior_mean=np.concatenate([self.prior_mean, np.zeros(count)]),
-            prior_variance=np.concatenate(
-                [self.prior_variance, np.full(count, sd**2 / _BUMP_SHARE)]
-            ),
-        )
-
-    def features(self, measured: Measured) -> Array:
-        """The rows (M, P) that the coefficients are multiplied by."""
-        features = self._smooth.features(measured, self.directional)
-        if self.abrupt is None:
-            return features
-        return np.hstack([features, self.abrupt.features(measured, False)[:, 1:]])
-
-    def slopes(self, measured: Measured, features: Array, coefficients: Array) -> Array:
-        """Derivatives (M, 3) of the mean at each row by tilt, roll, log height."""
-        if self.abrupt is None:
-            return self._smooth.slopes(measured, features, coefficients, self.directional)
-        smooth = coefficients.size - len(self.abrupt.centres)
-        slopes = self._smooth.slopes(
-            measured, features[:, :smooth], coefficients[:smooth], self.directional
-        )
-        own = slice(smooth - 1, None)  # the first of these is taken for a level, which has no slope
-        return slopes + self.abrupt.slopes(measured, features[:, own], coefficients[own], False)
-
-    @property
-    def _smooth(self) -> Bumps:
-        return Bumps(centres=self.centres, length_m=self.length_m)
 
 
 def field_over(measured: Measured, shape: FieldShape) -> Field:

@@ -19,7 +19,6 @@ from models.walking.reference.assumed import assumed_speed_reference
 from models.walking.reference.doubt import doubt_of
 from models.walking.reference.freedom import as_free_as_told
 from models.walking.reference.inflation import pose_variance_inflation
-from models.walking.reference.stairs import with_room_for_stairs
 from models.walking.speed_reference import (
     PLAUSIBLE_OFFSET,
     SpeedReference,
@@ -45,7 +44,6 @@ def learn_speed_reference(
     """
     blank = assumed_speed_reference(observations, prior, walk)
     blank = as_free_as_told(observations, prior, blank, seed)
-    blank = with_room_for_stairs(observations, prior, blank)
     site = learned_at(observations, prior, blank, _SPREAD_ROUNDS)
     whole = fit_pose(
         channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
