@@ -37,6 +37,7 @@ OTHERS = {
     ("workers/in_hand.py", "upkeep"): "the engine's name of a job",
     ("workers/upkeep/rounds.py", "clock"): "the name of a round",
     ("reasons.py", "maintenance"): "the code of a reason, defined there",
+    ("alerts/alerts.py", "drift"): "the name of a field",
     ("estimation/growth.py", "registered"): "the key of an estimator's answer",
     ("notifications/outbox.py", "acknowledged"): "the name of a flag",
     ("notifications/outbox.py", "drift"): "the name of a field",
