@@ -20,21 +20,23 @@ from models.walking.measures import Measured
 from models.walking.mixed_model import (
     FISHER,
     Curvature,
+    Normal,
     Spread,
     Weights,
     composite_log_likelihoods,
     curvature,
     hierarchical_log_likelihood,
+    regress,
     relearn,
     reweigh,
     track_curvatures,
 )
 
 _MOST_ROUNDS = 40
-_LEARNING_ROUNDS = 40
 _LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round, in tilt, roll, log height
 _NEAR = 0.2  # of the longest move
 _CONVERGED = 1e-5
+_FIELD_SETTLED = 1e-4  # of a log at any row
 _ROUGHLY = 0.1  # standard deviations: a round more moves it by some hundredths
 
 
@@ -120,32 +122,25 @@ def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
 
     The spread is learned anew so many times; with 0 it is taken as given.
     """
-    spread = start.spread
-    precision = np.linalg.inv(start.covariance)
-    features = start.field.features(measured)
-    mean, covariance = start.mean, start.covariance
+    features, spread = start.field.features(measured), start.spread
+    value, valid, rows = measured.value, measured.valid, measured.rows
+    prior = Normal(mean=start.mean, covariance=start.covariance)
+    found = prior
     for round_ in range(spread_rounds + 1):
-        for _ in range(_LEARNING_ROUNDS):
-            residual = measured.value - features @ mean
-            weights = reweigh(residual, measured.value, measured.valid, measured.rows, spread)
-            sums = curvature(-features, residual, weights, measured.rows, spread)
-            covariance = np.linalg.inv(sums.matrix + precision)
-            move = -covariance @ (sums.gradient + precision @ (mean - start.mean))
-            mean = mean + move
-            if np.abs(features @ move).max(initial=0.0) < 1e-4:
-                break
+        found, weights = regress(
+            features, value, valid, rows, spread, prior, found.mean,
+            lambda move: bool(np.abs(features @ move).max(initial=0.0) < _FIELD_SETTLED),
+        )  # fmt: skip
         if round_ < spread_rounds:
-            residual = measured.value - features @ mean
-            spread = relearn(
-                residual, measured.value, measured.valid, measured.rows, weights, spread
-            )
+            residual = value - features @ found.mean
+            spread = relearn(residual, value, valid, rows, weights, spread)
     inlier = weights.inlier
     return Learned(
         field=start.field,
-        mean=mean,
-        covariance=covariance,
+        mean=found.mean,
+        covariance=found.covariance,
         spread=spread,
-        usual=float((inlier * (features @ mean)).sum() / max(float(inlier.sum()), 1e-9)),
+        usual=float((inlier * (features @ found.mean)).sum() / max(float(inlier.sum()), 1e-9)),
     )
 
 

@@ -13,6 +13,7 @@ Aitkin and Tunnicliffe Wilson 1980. Ours are weights by the predicted a_i, witho
 tracks' own shares, and a correlation by moments.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ from models.walking.loops.weights import (
 # The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
 # average, say 1. Source: Lange, Little and Taylor 1989.
 FISHER = (FREEDOM + 3) / (FREEDOM + 1)
+_MOST_ROUNDS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +101,42 @@ class Curvature:
 
     matrix: Array
     gradient: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Normal:
+    """A normal distribution: mean (P,) and covariance (P, P)."""
+
+    mean: Array
+    covariance: Array
+
+
+def regress(
+    features: Array,
+    value: Array,
+    valid: Mask,
+    rows: Rows,
+    spread: Spread,
+    prior: Normal,
+    begin: Array,
+    settled: Callable[[Array], bool],
+) -> tuple[Normal, Weights]:
+    """The coefficients (P,) of features (M, P) that explain values (M,), with the rows' weights.
+
+    Gauss-Newton from a beginning (P,), with weights anew in every round until a move (P,) is
+    settled. The covariance is by the weights.
+    """
+    mean, precision = begin, np.linalg.inv(prior.covariance)
+    for _ in range(_MOST_ROUNDS):
+        residual = value - features @ mean
+        weights = reweigh(residual, value, valid, rows, spread)
+        sums = curvature(-features, residual, weights, rows, spread)
+        covariance = np.linalg.inv(sums.matrix + precision)
+        move = -covariance @ (sums.gradient + precision @ (mean - prior.mean))
+        mean = mean + move
+        if settled(move):
+            break
+    return Normal(mean=mean, covariance=covariance), weights
 
 
 def reweigh(

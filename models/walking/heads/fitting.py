@@ -1,17 +1,30 @@
 """Tilt and roll by heads above feet, whatever they were before, and what heads are above.
 
-Gauss-Newton on tilt, roll and what is usual of leans, weights anew in every round; begun on a grid,
-since far from the truth everybody seems to be somebody else.
+How people lean is the mixed model without trends, correlation and outliers: row j of track i leans
+by y_ij = x_ij' beta + a_i + e_ij, what is usual (a detector's bias, and how people lean the way
+they walk), the person's own, and a deviation. Gauss-Newton on tilt, roll and what is usual, weights
+anew in every round; begun on a grid, since far from the truth everybody seems to be somebody else.
 """
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Mask
 from models.tracks.head_foot import Uprights
-from models.walking.heads.habits import FISHER, Normal, Spread, log_likelihood, relearned, sums_of
+from models.tracks.observations import Rows
 from models.walking.heads.lean_angles import Leans, measure_leans
+from models.walking.loops.weights import FREEDOM
+from models.walking.mixed_model import (
+    FISHER,
+    Curvature,
+    Normal,
+    Spread,
+    curvature,
+    regress,
+    reweigh,
+)
 
 _ROUNDS = 40
 _CONVERGED = 1e-6
@@ -22,27 +35,45 @@ _START_TRACKS = 60
 _TILT_LIMIT = np.radians(89.0)
 UNKNOWN_HABIT_SD = np.radians([4.0, 4.0])  # of a detector's bias, and of the lean of who walks
 _SHARE_SD = 1.0  # of the share of columns before any head is seen
+_LEAST_SD = 1e-3  # a tenth of a degree or less: not even a drawing is as upright
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeanSpread:
+    """Standard deviations of leans in radians: between people, and within one."""
+
+    between_sd: float
+    within_sd: float
+
+    @property
+    def mixed(self) -> Spread:
+        """The same for the mixed model, without correlation and outliers."""
+        return Spread(
+            between_sd=self.between_sd, trend_sd=1.0, within_sd=self.within_sd, correlation=0.0,
+            outlier_share=0.0, outlier_mean=0.0, outlier_sd=1.0,
+        )  # fmt: skip
+
+
+ASSUMED_SPREAD = LeanSpread(between_sd=0.03, within_sd=0.04)
 
 
 def learn_habit(
-    uprights: Uprights, at: Array, spread: Spread, *, rounds: int
-) -> tuple[Normal, Spread]:
+    uprights: Uprights, at: Array, spread: LeanSpread, *, rounds: int
+) -> tuple[Normal, LeanSpread]:
     """What is usual of leans at a known tilt and roll (2,).
 
     The spread is learned anew so many times; with 0 it is taken as given.
     """
     leans = measure_leans(uprights, at)
     features = _features(leans)
-    habit = Normal(mean=np.zeros(2), covariance=np.diag(UNKNOWN_HABIT_SD**2))
+    prior = Normal(mean=np.zeros(2), covariance=np.diag(UNKNOWN_HABIT_SD**2))
     for _ in range(rounds):
-        found = _solved(features, leans, uprights, habit, spread)
-        residual = leans.value - features @ found.mean
-        sums = sums_of(features, residual, leans.valid, uprights.owner_idx, spread)
-        spread = relearned(residual, leans.valid, uprights.owner_idx, sums)
-    return _solved(features, leans, uprights, habit, spread), spread
+        found = _regressed(features, leans, uprights, prior, spread)
+        spread = _relearned(leans.value - features @ found.mean, leans.valid, uprights, spread)
+    return _regressed(features, leans, uprights, prior, spread), spread
 
 
-def column_share(uprights: Uprights, at: Array, spread: Spread) -> tuple[float, float]:
+def column_share(uprights: Uprights, at: Array, spread: LeanSpread) -> tuple[float, float]:
     """How far heads follow the picture's columns at a tilt and roll (2,), give or take one sd.
 
     0 is where leans are the same all over the picture, 1 where heads are right above the feet in
@@ -54,11 +85,11 @@ def column_share(uprights: Uprights, at: Array, spread: Spread) -> tuple[float, 
     prior = Normal(
         mean=np.zeros(3), covariance=np.diag(np.append(UNKNOWN_HABIT_SD, _SHARE_SD) ** 2)
     )
-    found = _solved(features, leans, uprights, prior, spread)
+    found = _regressed(features, leans, uprights, prior, spread)
     return float(found.mean[2]), float(np.sqrt(found.covariance[2, 2]))
 
 
-def fit_angles(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -> Normal:
+def fit_angles(uprights: Uprights, near: Array, habit: Normal, spread: LeanSpread) -> Normal:
     """Tilt and roll (2,) by heads, with the curvature's covariance (2, 2).
 
     Args:
@@ -77,7 +108,7 @@ def fit_angles(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -
         features = _features(leans)
         residual = np.where(leans.valid, leans.value - features @ coefficients, 0.0)
         jacobian = np.column_stack([leans.jacobian, -features])
-        sums = sums_of(jacobian, residual, leans.valid, uprights.owner_idx, spread)
+        sums = _sums(jacobian, residual, leans.valid, uprights, spread)
         matrix = sums.matrix + precision
         off = np.concatenate([angles - near, coefficients - habit.mean])
         move = -np.linalg.solve(matrix, sums.gradient + precision @ off)
@@ -89,7 +120,7 @@ def fit_angles(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -
     return Normal(mean=angles, covariance=np.asarray(FISHER * np.linalg.inv(matrix)[:2, :2]))
 
 
-def _start(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -> Array:
+def _start(uprights: Uprights, near: Array, habit: Normal, spread: LeanSpread) -> Array:
     """The tilt and roll (2,) of a grid of which a few tracks are the likeliest."""
     tracks = uprights.tracks
     chosen = np.linspace(0, tracks.size - 1, min(_START_TRACKS, tracks.size)).astype(np.int64)
@@ -102,7 +133,7 @@ def _start(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -> Ar
         leans = measure_leans(few, angles)
         # A foot above the horizon is no foot: as unlikely as one that lies.
         residual = np.where(leans.valid, leans.value - _features(leans) @ habit.mean, 1.0)
-        likely = log_likelihood(residual, np.ones(len(few), bool), few.owner_idx, spread)
+        likely = _log_likelihood(residual, few, spread)
         if likely > best:
             best, found = likely, angles
     return np.asarray(found)
@@ -113,18 +144,55 @@ def _features(leans: Leans) -> Array:
     return np.column_stack([np.ones(len(leans.value)), leans.sideways]) * leans.valid[:, None]
 
 
-def _solved(
-    features: Array, leans: Leans, uprights: Uprights, prior: Normal, spread: Spread
+def _regressed(
+    features: Array, leans: Leans, uprights: Uprights, prior: Normal, spread: LeanSpread
 ) -> Normal:
     """The coefficients (P,) of features (M, P) that explain leans."""
-    precision = np.linalg.inv(prior.covariance)
-    mean = prior.mean
-    for _ in range(_ROUNDS):
-        residual = leans.value - features @ mean
-        sums = sums_of(-features, residual, leans.valid, uprights.owner_idx, spread)
-        matrix = sums.matrix + precision
-        move = -np.linalg.solve(matrix, sums.gradient + precision @ (mean - prior.mean))
-        mean = mean + move
-        if np.abs(move).max() < _CONVERGED:
-            break
-    return Normal(mean=mean, covariance=FISHER * np.linalg.inv(matrix))
+    found, _ = regress(
+        features, leans.value, leans.valid, _rows_of(uprights), spread.mixed, prior, prior.mean,
+        lambda move: bool(np.abs(move).max() < _CONVERGED),
+    )  # fmt: skip
+    return Normal(mean=found.mean, covariance=FISHER * found.covariance)
+
+
+def _sums(
+    jacobian: Array, residual: Array, valid: Mask, uprights: Uprights, spread: LeanSpread
+) -> Curvature:
+    rows, mixed = _rows_of(uprights), spread.mixed
+    weights = reweigh(residual, residual, valid, rows, mixed)
+    return curvature(jacobian, residual, weights, rows, mixed)
+
+
+def _rows_of(uprights: Uprights) -> Rows:
+    """Rows in the middles of their tracks, where no trend is, and linked to none."""
+    count = len(uprights)
+    return Rows(
+        owner_idx=uprights.owner_idx, linked=np.zeros(count, dtype=bool), time_s=np.zeros(count),
+        when=np.zeros(count), owners=uprights.owners,
+    )  # fmt: skip
+
+
+def _relearned(residual: Array, valid: Mask, uprights: Uprights, spread: LeanSpread) -> LeanSpread:
+    """The spread that explains residuals (M,) best, by one round of EM.
+
+    Few rows of a person tell their own lean: its variance counts, which `relearn` leaves out.
+    """
+    rows, mixed = _rows_of(uprights), spread.mixed
+    weights = reweigh(residual, residual, valid, rows, mixed)
+    after = reweigh(residual, residual, valid, rows, mixed, rounds=4)  # own leans by these weights
+    own, variance = after.own[:, 0], after.own_covariance[:, 0, 0]
+    apart = (residual - own[rows.owner_idx]) ** 2 + variance[rows.owner_idx]
+    within = float((weights.row * apart).sum()) / max(float(valid.sum()), 1.0)
+    between = float((weights.track * (own**2 + variance))[uprights.tracks].mean())
+    return LeanSpread(
+        between_sd=max(float(np.sqrt(between)), _LEAST_SD),
+        within_sd=max(float(np.sqrt(within)), _LEAST_SD),
+    )
+
+
+def _log_likelihood(residual: Array, uprights: Uprights, spread: LeanSpread) -> float:
+    """About how likely residuals (M,) are, each track by the mean of its rows; for comparing."""
+    number = np.bincount(uprights.owner_idx, minlength=uprights.owners)
+    mean = np.bincount(uprights.owner_idx, residual, uprights.owners) / np.maximum(number, 1)
+    variance = spread.between_sd**2 + spread.within_sd**2
+    return float(-(FREEDOM + 1) / 2 * np.log1p(mean**2 / variance / FREEDOM).sum())

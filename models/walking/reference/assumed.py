@@ -12,7 +12,6 @@ from models.walking.field import FieldShape, field_over
 from models.walking.fit import assumed
 from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.mixed_model import Spread
-from models.walking.reference.inflation import ASSUMED_INFLATION
 from models.walking.speed_reference import SpeedReference
 
 # Fewer who walk for a few seconds make no estimate, and no reference.
@@ -40,6 +39,7 @@ _TOPS_SPREAD = Spread(
     outlier_sd=0.5,
 )
 _LEAST_SPEED_SD = 0.15  # of the log of a site's mean: 1.05 to 1.43 m/s were seen where 1.4 is usual
+ASSUMED_INFLATION = 3.0  # squared errors over predicted variances
 _FEWEST_BOXED = 8
 _ONE_SIZE = 0.02  # people differ by 4 %: boxes that differ by less are drawn, not measured
 

@@ -1,8 +1,4 @@
-"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there.
-
-Ours: the offset is shrunk by its own noise, K = P (P + S)^-1 for a plausible P and its covariance
-S, where P is as large as the offset itself asks for (empirical Bayes: Morris 1983).
-"""
+"""Learn a site from tracks at a known pose: its speeds, its boxes, and our own bias there."""
 
 from dataclasses import replace
 
@@ -12,19 +8,24 @@ from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
-from models.tracks.observations import Observations
+from models.tracks.observations import Observations, of_tracks
 from models.walking.fit import assumed, fit_pose
 from models.walking.heads.reference import learn_verticals
-from models.walking.reference.assumed import assumed_speed_reference
+from models.walking.reference.assumed import ASSUMED_INFLATION, assumed_speed_reference
 from models.walking.reference.doubt import doubt_of
 from models.walking.reference.freedom import as_free_as_told
-from models.walking.reference.inflation import pose_variance_inflation
 from models.walking.speed_reference import (
     PLAUSIBLE_OFFSET,
     SpeedReference,
     channels_of,
     learned_at,
     pose_prior,
+)
+from models.walking.variance_inflation import (
+    Tracks,
+    shrink_offset,
+    squared_ratio,
+    variance_inflation,
 )
 
 _SPREAD_ROUNDS = 5
@@ -49,8 +50,8 @@ def learn_speed_reference(
         channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
     )
     offset = whole.candidate - plane_parameters_of(prior)
-    inflation = pose_variance_inflation(observations, prior, blank, site, offset)
-    kept, covariance = shrink_offset(offset, whole.covariance * inflation)
+    inflation = _variance_inflation(observations, prior, blank, site, offset)
+    kept, covariance = shrink_offset(offset, whole.covariance * inflation, PLAUSIBLE_OFFSET)
     site = replace(
         site,
         offset=kept,
@@ -62,15 +63,33 @@ def learn_speed_reference(
     return replace(site, doubt=doubt_of(observations, prior, blank, site))
 
 
-def shrink_offset(offset: Array, noise: Array) -> tuple[Array, Array]:
-    """What is kept of an offset (3,) of a covariance (3, 3), and what is not known of that.
+def _variance_inflation(
+    observations: Observations,
+    prior: CameraPose,
+    blank: SpeedReference,
+    site: SpeedReference,
+    offset: Array,
+) -> float:
+    """How much larger squared errors are than predicted, by the variance components of all."""
+    at, blank = plane_parameters_of(prior), _with_components(blank, site)
 
-    A bias is of a degree or so, and what the tracks leave free is not taken for one; but where
-    they leave no doubt, people walk unlike those of most sites, and it is a large one.
-    """
-    plausible = np.diag(np.maximum(PLAUSIBLE_OFFSET**2, offset**2 - np.diag(noise)))
-    kept = plausible @ np.linalg.inv(plausible + noise)
-    return kept @ offset, kept @ noise
+    def error_ratio(train: Tracks, test: Tracks) -> float:
+        part = learned_at(of_tracks(observations, train), prior, blank, 0)
+        channels = channels_of(of_tracks(observations, test), part, prior)
+        fit = fit_pose(channels, at, pose_prior(prior))
+        return squared_ratio(fit.candidate - at - offset, fit.covariance)
+
+    walkers = np.unique(observations.steps.rows.owner_idx)
+    return variance_inflation(walkers, error_ratio, ASSUMED_INFLATION)
+
+
+def _with_components(blank: SpeedReference, site: SpeedReference) -> SpeedReference:
+    """The blank site's fields with the learned site's variance components."""
+    statures = None
+    if blank.statures is not None and site.statures is not None:
+        statures = replace(blank.statures, spread=site.statures.spread)
+    speeds = replace(blank.speeds, spread=site.speeds.spread)
+    return replace(blank, speeds=speeds, statures=statures)
 
 
 def relearned(

@@ -15,8 +15,10 @@ from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_estimate
 from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference, shrink_offset
+from models.walking.reference.learning import learn_speed_reference
 from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.speed_reference import PLAUSIBLE_OFFSET
+from models.walking.variance_inflation import shrink_offset
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FAR = CameraPose(
@@ -73,11 +75,11 @@ def test_an_offset_beyond_doubt_is_taken_off_almost_whole():
         np.array([math.radians(0.1), math.radians(-6.5), 0.3]),
         np.square([math.radians(1), math.radians(1), 0.1]),
     )
-    kept, covariance = shrink_offset(offset, np.diag(noise))
+    kept, covariance = shrink_offset(offset, np.diag(noise), PLAUSIBLE_OFFSET)
     assert_allclose(np.degrees(kept[:2]), [0.05, -6.5 * 41.25 / 42.25])
     assert kept[2] == pytest.approx(0.3 * 8 / 9)
     assert_allclose(np.diag(covariance) / noise, [1 / 2, 41.25 / 42.25, 8 / 9])
-    assert_array_equal(shrink_offset(np.zeros(3), np.diag(noise))[0], 0)
+    assert_array_equal(shrink_offset(np.zeros(3), np.diag(noise), PLAUSIBLE_OFFSET)[0], 0)
 
 
 def test_times_that_differ_make_an_estimate_less_sure():
