@@ -36,7 +36,7 @@ MODEL_ROOMS = [
     {"geometry"},
     {"tracks"},
     {"simulation"},
-    {"walking", "doors"},
+    {"walking"},
     {"regression"},
     {"paths"},
     {"monitoring"},

@@ -8,20 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.doors.door_map import DoorGrain
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.paths.likelihood import Walkers, walkers_of
-from models.paths.map.density_map import Grain
+from models.paths.map.density_map import Bandwidths
 from models.paths.registration import Site
-from models.paths.site_doors import Quarter, door_grain, with_quarters_doors
-from models.paths.site_map import best_grain, mapped
+from models.paths.site_map import best_bandwidths, mapped
 from models.tracks.observations import Observations, of_tracks
 
 FEWEST_GROUPS = 12
 _FOLDS = 4
-# Grains are chosen anew of twice as many tracks, which bear a finer one, and in the next part of a
-# day, in which people may walk elsewhere: to choose takes a sixth of the time of learning a map.
+# Bandwidths are chosen anew of twice as many tracks, which bear finer ones, and in the next part of
+# a day, in which people may walk elsewhere: to choose takes a sixth of the time of learning a map.
 _MORE, _HOLD_S = 2, 6 * 3600.0
 
 
@@ -36,14 +34,10 @@ class Fold:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Grains:
-    """The grains of map and doors that predict people best; without doors, these have none.
+class ChosenBandwidths:
+    """The bandwidths that predict people best, by so many `tracks`; the last ended `to_s`."""
 
-    They were chosen of so many `tracks`, the last of which ended `to_s`.
-    """
-
-    flow: Grain
-    doors: DoorGrain | None
+    bandwidths: Bandwidths
     tracks: int
     to_s: float
 
@@ -55,10 +49,10 @@ class Grains:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folds:
-    """All quarters, and the grains of their maps and doors."""
+    """All quarters, and the bandwidths of their maps."""
 
     each: tuple[Fold, ...]
-    grains: Grains
+    chosen: ChosenBandwidths
 
 
 def fold_maps(
@@ -67,7 +61,7 @@ def fold_maps(
     at: Array,
     seed: int,
     weights: Array | None = None,
-    grains: Grains | None = None,
+    chosen: ChosenBandwidths | None = None,
 ) -> Folds | None:
     """A map of each three quarters of the groups; None where fewer than 12 groups walk.
 
@@ -77,7 +71,7 @@ def fold_maps(
         at: the known pose (4,).
         seed: of the quarters; walking groups stay together.
         weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
-        grains: that were chosen before; they are chosen anew where they do not hold.
+        chosen: bandwidths, before; they are chosen anew where they do not hold.
     """
     walkers = walkers_of(observations, at)
     if walkers.walking_groups < FEWEST_GROUPS:
@@ -91,33 +85,24 @@ def fold_maps(
         if left_out.people:
             learned_of = walkers_of(of_tracks(observations, known), at)
             parts.append((learned_of, left_out, known, asked))
-    kept = grains if grains is not None and grains.hold_for(observations) else None
-    if kept is None:
+    if chosen is None or not chosen.hold_for(observations):
         learned = [(of, weights[known], left_out) for of, left_out, known, _ in parts]
-        grain = best_grain(learned, intrinsics, at)
-    else:
-        grain = kept.flow
-    quarters = [
-        Quarter(
-            known=of,
-            weights=weights[known],
-            asked=left_out,
-            site=mapped(of, weights[known], intrinsics, at, grain),
+        chosen = ChosenBandwidths(
+            bandwidths=best_bandwidths(learned, intrinsics, at),
+            tracks=observations.tracks,
+            to_s=float(observations.ended_s.max()),
         )
-        for of, left_out, known, _ in parts
-    ]
-    if kept is None:
-        doors, sites = door_grain(quarters, at)
-        to_s = float(observations.ended_s.max())
-        kept = Grains(flow=grain, doors=doors, tracks=observations.tracks, to_s=to_s)
-    else:
-        sites = with_quarters_doors(quarters, at, kept.doors)
     return Folds(
         each=tuple(
-            Fold(site=site, walkers=left_out, known=known, asked=asked)
-            for site, (_, left_out, known, asked) in zip(sites, parts, strict=True)
+            Fold(
+                site=mapped(of, weights[known], intrinsics, at, chosen.bandwidths),
+                walkers=left_out,
+                known=known,
+                asked=asked,
+            )
+            for of, left_out, known, asked in parts
         ),
-        grains=kept,
+        chosen=chosen,
     )
 
 

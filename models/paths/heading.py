@@ -55,10 +55,4 @@ def _halves(walkers: Walkers) -> tuple[Walkers, Walkers]:
 
 
 def _part(walkers: Walkers, kept: Mask) -> Walkers:
-    owners = np.unique(walkers.steps.rows.owner_idx[kept])
-    return replace(
-        walkers,
-        steps=steps_where(walkers.steps, kept),
-        weight=walkers.weight[kept],
-        moments=None if walkers.moments is None else walkers.moments.of_owners(owners),
-    )
+    return replace(walkers, steps=steps_where(walkers.steps, kept), weight=walkers.weight[kept])

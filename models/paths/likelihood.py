@@ -23,7 +23,6 @@ from models.paths.compiled.steps import (
 from models.paths.map.density_map import FlowMap
 from models.paths.map.placement import place_steps
 from models.paths.map.view import Coverage, known_shares
-from models.tracks.exposure import Moments
 from models.tracks.observations import Observations, Steps, steps_where
 from models.walking.groups import walking_groups_of
 
@@ -44,14 +43,13 @@ class Walkers:
     """Steps of people who move.
 
     `weight` (M,) adds up to at most 2 a track; `group_idx` (tracks,) is the walking group of each
-    track. `moments` are theirs too; None where nobody looked for doors.
+    track.
     """
 
     steps: Steps
     weight: Array
     group_idx: npt.NDArray[np.int64]
     tracks: int
-    moments: Moments | None = None
 
     @property
     def people(self) -> int:
@@ -88,9 +86,6 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
             rows.time_s, rows.owner_idx, placed.place[moving], way[moving], observations.tracks
         ),
         tracks=observations.tracks,
-        moments=None
-        if observations.moments is None
-        else observations.moments.of_owners(np.unique(rows.owner_idx)),
     )
 
 

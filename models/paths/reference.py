@@ -8,19 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.doors.door_map import DoorMap
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
 from models.paths.cross_fit import CrossFit, cross_fit
-from models.paths.folds import Folds, Grains, fold_maps
+from models.paths.folds import ChosenBandwidths, Folds, fold_maps
 from models.paths.likelihood import walkers_of
 from models.paths.map.density_map import FlowMap
 from models.paths.map.view import Coverage
 from models.paths.path_test import UsualFit, usual_fit
 from models.paths.registration import Shape, Site
-from models.paths.site_doors import with_doors
 from models.paths.site_map import mapped
 from models.paths.turn_detection import StillScores, learn_scores
 from models.serialization import stored_as
@@ -43,8 +41,7 @@ class FlowReference:
     `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
     peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
     together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
-    its two tests go by. `doors` is None where there are none. `grains` are what map and
-    doors were learned by, for the next ones; None of what was stored before they were kept.
+    its two tests go by. `bandwidths` are what the map was learned by, for the next one.
     """
 
     flow: FlowMap
@@ -57,12 +54,11 @@ class FlowReference:
     people: float
     still: StillScores
     fit: UsualFit
-    doors: DoorMap | None = None
-    grains: Grains | None = None
+    bandwidths: ChosenBandwidths
 
     def site(self, intrinsics: Intrinsics) -> Site:
         """What walkers are registered to."""
-        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics, doors=self.doors)
+        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics)
 
     def variance_inflation_for(self, people: float) -> float:
         """How much larger squared errors are for so many people than the curvature says."""
@@ -132,13 +128,11 @@ def learn_flow(
     unsure = _LEFT_NOISE * inflation * scatter / count**2
     walkers = walkers_of(observations, at)
     weights = np.ones(observations.tracks) if weights is None else weights
-    whole = mapped(walkers, weights, intrinsics, at, folds.grains.flow)
-    whole = with_doors(whole, walkers, weights, at, folds.grains.doors)
+    whole = mapped(walkers, weights, intrinsics, at, folds.chosen.bandwidths)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
     return FlowReference(
         flow=whole.flow,
         coverage=whole.coverage,
-        doors=whole.doors,
         bias=bias,
         bias_covariance=unsure,
         spread=np.sqrt(np.diag(scatter) / count),
@@ -147,7 +141,7 @@ def learn_flow(
         people=float(counted.sum() ** 2 / (counted**2).sum()),
         still=learn_scores(crossed.scores, crossed.bent, seed),
         fit=usual_fit(crossed.fits),
-        grains=folds.grains,
+        bandwidths=folds.chosen,
     )
 
 

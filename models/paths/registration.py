@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.doors.door_map import DoorMap
-from models.doors.likelihood import anchored_door_scores, door_likelihood, door_values
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.paths.likelihood import (
@@ -40,37 +38,25 @@ _EVEN = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """What walkers are registered to: a flow map, its coverage, the camera's intrinsics, doors."""
+    """What walkers are registered to: a flow map, its coverage and the camera's intrinsics."""
 
     flow: FlowMap
     coverage: Coverage
     intrinsics: Intrinsics
-    doors: DoorMap | None = None
 
     def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
         """How likely the walkers are, seen from a candidate (4,)."""
-        found = likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
-        if self.doors is None or walkers.moments is None:
-            return found
-        values, scores = door_likelihood(walkers.moments, self.doors, candidate)
-        values = found.values + values
-        return Likelihood(value=float(values.sum()), values=values, scores=found.scores + scores)
+        return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
 
     def track_log_likelihoods(self, walkers: Walkers, candidates: Array) -> Array:
         """The log likelihood (K, N) of each track alone, seen from candidates (K, 4)."""
-        values = track_values(walkers, self.flow, self.coverage, self.intrinsics, candidates)
-        if self.doors is None or walkers.moments is None:
-            return values
-        return values + door_values(walkers.moments, self.doors, candidates)
+        return track_values(walkers, self.flow, self.coverage, self.intrinsics, candidates)
 
     def scores(self, walkers: Walkers, candidates: Array, anchor: Array) -> Array:
         """Scores (..., N, 4) at candidates (..., 4) of who is on ground that an anchor knows."""
-        scores = anchored_scores(
+        return anchored_scores(
             walkers, self.flow, self.coverage, self.intrinsics, candidates, anchor
         )
-        if self.doors is None or walkers.moments is None:
-            return scores
-        return scores + anchored_door_scores(walkers.moments, self.doors, candidates, anchor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

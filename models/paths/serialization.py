@@ -19,9 +19,6 @@ def flow_to_bytes(reference: FlowReference) -> bytes:
         del values[name]  # made anew of the map
     values["flow.log_density"] = to_levels(reference.flow.log_density)
     values["flow.unseen"] = np.rint(reference.flow.unseen * 255).astype(np.uint8)
-    if reference.doors is not None:
-        values["doors.ratio"] = to_levels(np.log(reference.doors.ratio))
-        values["doors.known"] = np.rint(reference.doors.known * 255).astype(np.uint8)
     return pack(_FORMAT, values)
 
 
@@ -35,9 +32,6 @@ def flow_from_bytes(data: bytes) -> FlowReference:
     try:
         values["flow.log_density"] = of_levels(values["flow.log_density"])
         values["flow.unseen"] = values["flow.unseen"] / 255
-        if "doors.ratio" in values:  # what was stored before there were any has none
-            values["doors.ratio"] = np.exp(of_levels(values["doors.ratio"]))
-            values["doors.known"] = values["doors.known"] / 255
     except KeyError as error:
         raise CheckpointError(f"flow: {error} is missing") from error
     flow = restored(FlowMap, under(values, "flow"))

@@ -11,16 +11,16 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.paths.likelihood import Walkers
-from models.paths.map.density_map import Grain, learn_map, slot_of
+from models.paths.map.density_map import Bandwidths, learn_map, slot_of
 from models.paths.map.placement import place_steps
 from models.paths.map.view import coverage_of, in_view
 from models.paths.registration import Site
 
 _SHADE_M = 2.0  # over which the edge of what the reference saw is blurred, as the map is
-_GRAINS = (
-    Grain(),
-    Grain(smooth_m=0.7, smooth_kappa=10.0),
-    Grain(smooth_m=0.5, smooth_kappa=16.0),
+_TRIED = (
+    Bandwidths(),
+    Bandwidths(place_m=0.7, direction_kappa=10.0),
+    Bandwidths(place_m=0.5, direction_kappa=16.0),
 )
 _SLOTS = 4  # parts of a day: night, morning, afternoon, evening, wherever midnight UTC falls
 _FEWEST_A_SLOT = 80  # people that a part of the day is asked by
@@ -28,7 +28,7 @@ _CLEAR = 3.0  # standard errors by which parts of the day must predict better
 
 
 def mapped(
-    walkers: Walkers, weights: Array, intrinsics: Intrinsics, at: Array, grain: Grain
+    walkers: Walkers, weights: Array, intrinsics: Intrinsics, at: Array, bandwidths: Bandwidths
 ) -> Site:
     """The map of walkers seen from a known pose (4,), each counted by its weight (tracks,)."""
     flow = learn_map(
@@ -36,15 +36,15 @@ def mapped(
         _evenly(walkers) * weights[walkers.steps.rows.owner_idx],
         walkers.steps.rows.time_s,
         lambda places: in_view(intrinsics, at, places, _SHADE_M),
-        grain,
+        bandwidths,
     )
     return Site(flow=flow, coverage=coverage_of(flow), intrinsics=intrinsics)
 
 
-def best_grain(
+def best_bandwidths(
     folds: list[tuple[Walkers, Array, Walkers]], intrinsics: Intrinsics, at: Array
-) -> Grain:
-    """The grain of map that predicts people best; parts of the day where it is clear that they do.
+) -> Bandwidths:
+    """The bandwidths that predict people best; parts of the day where it is clear that they do.
 
     Args:
         folds: walkers to learn of with their weights, and others to predict.
@@ -52,16 +52,15 @@ def best_grain(
         at: the known pose (4,).
     """
 
-    def held_out(grain: Grain) -> Array:
-        return np.concatenate(
-            [
-                _held_out_log_likelihoods(asked, mapped(known, weights, intrinsics, at, grain), at)
-                for known, weights, asked in folds
-            ]
-        )
+    def held_out(bandwidths: Bandwidths) -> Array:
+        found = []
+        for known, weights, asked in folds:
+            site = mapped(known, weights, intrinsics, at, bandwidths)
+            found.append(_held_out_log_likelihoods(asked, site, at))
+        return np.concatenate(found)
 
-    asked = {grain: held_out(grain) for grain in _GRAINS}
-    best = max(asked, key=lambda grain: float(asked[grain].mean()))
+    asked = {tried: held_out(tried) for tried in _TRIED}
+    best = max(asked, key=lambda tried: float(asked[tried].mean()))
     everyone = np.concatenate([_slot_of_people(walkers) for _, _, walkers in folds])
     if (np.bincount(everyone, minlength=_SLOTS) >= _FEWEST_A_SLOT).sum() < 2:
         return best

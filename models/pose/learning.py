@@ -8,7 +8,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.chart_learning import learn_chart
-from models.paths.folds import Grains, fold_maps
+from models.paths.folds import ChosenBandwidths, fold_maps
 from models.paths.reference import candidate_of, learn_flow
 from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
@@ -31,7 +31,7 @@ def learn_site(
     weights: Array | None = None,
     speed_tracks: int | None = None,
     chart: bool = True,
-    grains: Grains | None = None,
+    chosen: ChosenBandwidths | None = None,
 ) -> CameraSite:
     """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
 
@@ -49,7 +49,7 @@ def learn_site(
         weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
         speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
         chart: whether the chart is wanted: it takes as long as all the rest.
-        grains: of the map that grows, which are kept for some hours.
+        chosen: the bandwidths of the map that grows, which are kept for some hours.
 
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step, and how people walk is not known.
@@ -60,7 +60,7 @@ def learn_site(
         first = tracks if speed_tracks is None else _first(tracks, speed_tracks)
         speed_reference = learn_speed_reference(first, prior, walk, seed)
     site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
-    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, grains)
+    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, chosen)
     if folds is None:
         return site
     return replace(

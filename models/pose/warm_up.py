@@ -28,9 +28,7 @@ _RATE = AlarmRate(alarms_a_year=1.0, tracks_a_year=10_000.0)
 def warm_up(seed: int = 0) -> PoseFinding:
     """Learn a site, knock its camera, estimate its pose and read its chart."""
     rng, config = np.random.default_rng(seed), SiteConfig()
-    lanes = [
-        replace(lane, doors_m=(0.0, math.inf)) for lane in draw_lanes(_LENS, _PRIOR, config, rng)
-    ]
+    lanes = draw_lanes(_LENS, _PRIOR, config, rng)
     known = by_end(walk_site(_LENS, _PRIOR, lanes, config, _PEOPLE, rng))
     site = learn_site(observe(known, _LENS, _PRIOR), _LENS, _PRIOR, seed=seed)
     people = by_end(walk_site(_LENS, _KNOCK.apply(_PRIOR), lanes, config, _PEOPLE, rng))

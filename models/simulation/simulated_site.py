@@ -11,7 +11,7 @@ from models.errors import DegenerateGeometryError
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array
 from models.geometry.upright import tops_seen
 from models.tracks.trajectory import Trajectory
 
@@ -20,8 +20,6 @@ _REACH_M = 40.0  # half the length of a walk
 _MOST_DRAWS = 60
 _BETWEEN_S = 20.0  # one sets out after another
 _PLACES_DRAWN = 10
-_SILL_M = 0.25  # how far people are from a door's middle
-_FUNNEL_M = 4.0  # from a door on people walk beside one another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,15 +46,10 @@ class SiteConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lane:
-    """A straight way on the ground: a point (2,) that it passes, and its direction (2,).
-
-    `doors_m` are how far along from its point it begins and ends, at doors: endless where there
-    are none.
-    """
+    """A straight, endless way on the ground: a point (2,) on it, and its direction (2,)."""
 
     point: Array
     direction: Array
-    doors_m: tuple[float, float] = (-math.inf, math.inf)
 
 
 def draw_lanes(
@@ -187,16 +180,13 @@ def _walk(
         along = rng.uniform(-_REACH_M, _REACH_M) + rng.normal(0, 0.05, 40)
     aside = rng.normal(0, config.aside_m) * np.array([-lane.direction[1], lane.direction[0]])
     ground = lane.point + aside + along[:, None] * lane.direction
-    outdoors = np.ones(len(ground), dtype=bool)
-    if np.isfinite(lane.doors_m).any():
-        ground, outdoors = _through_doors(lane, along, aside, rng)
     uv, valid = pixel_from_ground(intrinsics, pose.rotation, pose.centre_m, ground)
     tall = np.full(len(ground), config.stature_mean_m * math.exp(rng.normal(0, config.stature_sd)))
     tops = tops_seen(intrinsics, pose.rotation, pose.centre_m, ground, tall)
     uv = uv + rng.normal(0, config.noise_px, uv.shape)
     tops = tops + rng.normal(0, config.noise_px, tops.shape)
     near = np.linalg.norm(ground - pose.centre_m[:2], axis=1) < config.farthest_m
-    seen = valid & near & outdoors & intrinsics.contains(uv)
+    seen = valid & near & intrinsics.contains(uv)
     runs = np.split(np.arange(seen.size), np.flatnonzero(np.diff(seen)) + 1)
     longest = max((run for run in runs if seen[run[0]]), key=len, default=np.arange(0))
     if longest.size < 2:
@@ -204,20 +194,6 @@ def _walk(
     time_s = start_s + _STEP_S * longest.astype(np.float64)
     track = Trajectory(time_s=time_s, uv=uv[longest], top_v=tops[longest])
     return track if track.long_enough else None
-
-
-def _through_doors(
-    lane: Lane, along: Array, aside: Array, rng: np.random.Generator
-) -> tuple[Array, Mask]:
-    """Where a walk is (N, 2) that comes together at the lane's doors, and when it is between them.
-
-    Who walks aside of the lane's middle does so from 4 m off a door on.
-    """
-    first, last = np.array(lane.doors_m) + rng.normal(0, _SILL_M, 2)
-    off = np.minimum(along - first, last - along)
-    beside = np.clip(off / _FUNNEL_M, 0, 1)[:, None] * aside
-    within = rng.normal(0, _SILL_M) * np.array([-lane.direction[1], lane.direction[0]])
-    return lane.point + beside + within + along[:, None] * lane.direction, off > 0
 
 
 def _deviations(count: int, config: SiteConfig, rng: np.random.Generator) -> Array:

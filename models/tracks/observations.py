@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from models.errors import ShapeError
 from models.geometry.rotation import Array, Mask
-from models.tracks.exposure import Moments
 from models.tracks.head_foot import Uprights
 
 
@@ -63,7 +62,7 @@ class Tops:
 class Observations:
     """All that is read of a set of tracks, and when each of them ended (tracks,).
 
-    `uprights` are of heads, `moments` of doors; None where nobody looked for any.
+    `uprights` are of heads; None where nobody looked for any.
     """
 
     steps: Steps
@@ -71,7 +70,6 @@ class Observations:
     ended_s: Array
     tracks: int
     uprights: Uprights | None = None
-    moments: Moments | None = None
 
     @property
     def walkers(self) -> int:
@@ -113,7 +111,6 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
         uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
-        moments=None if observations.moments is None else observations.moments.of_tracks(chosen),
     )
 
 

@@ -9,7 +9,6 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
-from models.tracks.exposure import observe_moments
 from models.tracks.head_foot import observe_uprights
 from models.tracks.linking import link_pieces, walks_of
 from models.tracks.observations import Observations
@@ -69,7 +68,6 @@ def observe_walks(
         observe_each(walks, intrinsics),
         ended_s=np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64),
         uprights=observe_uprights(walks, intrinsics),
-        moments=observe_moments(walks, intrinsics, pose),
     )
     return Walks(observations=observations, walk_idx=walk_idx)
 

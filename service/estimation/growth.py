@@ -132,7 +132,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
         weights=weights,
-        grains=None if period.kept is None else flow_from_bytes(period.kept).grains,
+        chosen=None if period.kept is None else flow_from_bytes(period.kept).bandwidths,
     )
     return paths_of(grown)
 

@@ -27,14 +27,14 @@ _SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins wi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Grain:
-    """How fine a map is: the Gaussian over places, the von Mises kernel over directions, the day.
+class Bandwidths:
+    """Of a map: the Gaussian's over places, the von Mises kernel's over directions, the day's.
 
     `slots` is into how many parts the day falls.
     """
 
-    smooth_m: float = 1.0
-    smooth_kappa: float = 6.0  # 24 deg
+    place_m: float = 1.0
+    direction_kappa: float = 6.0  # 24 deg
     slots: int = 1
 
 
@@ -110,7 +110,7 @@ def learn_map(
     weight: Array,
     time_s: Array,
     seen_at: Callable[[Array], Array],
-    grain: Grain,
+    bandwidths: Bandwidths,
 ) -> FlowMap:
     """The map of steps seen from a known pose, each counted by its weight (M,).
 
@@ -119,7 +119,7 @@ def learn_map(
         weight: those of a person add up to how much that person counts.
         time_s: when each step was (M,).
         seen_at: which part (N,) of the ground around places (N, 2) that pose sees.
-        grain: how fine the map is.
+        bandwidths: of its kernels.
 
     Raises:
         ValueError: no step counts.
@@ -133,11 +133,11 @@ def learn_map(
     cell_m = max(_CELL_M, float((high - low).max()) / (_MOST_CELLS - 2))
     size = np.ceil((high - low) / cell_m).astype(np.int64) + 2
     at = (place - low) / cell_m
-    slots = grain.slots
+    slots, sd = bandwidths.slots, bandwidths.place_m / cell_m
     slot_idx = slot_of(time_s[used], slots)
     counts = np.stack(
         [
-            _smoothed(_binned(at[own], direction[own], weight[own], size), grain, cell_m)
+            _smoothed(_binned(at[own], direction[own], weight[own], size), bandwidths, cell_m)
             for own in (slot_idx == slot for slot in range(slots))
         ]
     )
@@ -158,7 +158,7 @@ def learn_map(
         unseen=np.rint((1 - seen) * 255) / 255,
         log_level=float(-np.log(max(seen.sum(), 1.0) * DIRECTIONS * node)),
         log_typical=float((share * np.log(share / node)).sum() / slots) - _UNKNOWN_COST,
-        people=(whole.sum(axis=2) * 2 * np.pi * (grain.smooth_m / cell_m) ** 2).astype(np.float32),
+        people=(whole.sum(axis=2) * 2 * np.pi * sd**2).astype(np.float32),
     )
 
 
@@ -176,11 +176,12 @@ def _binned(at: Array, direction: Array, weight: Array, size: npt.NDArray[np.int
     return counts
 
 
-def _smoothed(counts: Array, grain: Grain, cell_m: float) -> Array:
+def _smoothed(counts: Array, bandwidths: Bandwidths, cell_m: float) -> Array:
     """Counts (X, Y, 16) smoothed by a Gaussian over places and a von Mises over directions."""
-    along = [_circulant(_gaussian(length, grain.smooth_m / cell_m)) for length in counts.shape[:2]]
+    sd = bandwidths.place_m / cell_m
+    along = [_circulant(_gaussian(length, sd)) for length in counts.shape[:2]]
     angles = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
-    kernel = np.exp(grain.smooth_kappa * (np.cos(angles) - 1))
+    kernel = np.exp(bandwidths.direction_kappa * (np.cos(angles) - 1))
     # Products of matrices, one for each axis, take a quarter of the time of Fourier transforms.
     smooth = along[1] @ np.tensordot(along[0], counts, axes=1)
     return np.asarray(np.clip(smooth @ _circulant(kernel / kernel.sum()), 0.0, None))

@@ -1,7 +1,6 @@
 """The simulated site keeps to what it is told."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,21 +70,3 @@ def test_a_camera_that_sees_no_ground_is_refused():
     lanes = draw_lanes(LENS, PRIOR, SiteConfig(), np.random.default_rng(0))
     with pytest.raises(DegenerateGeometryError, match="0 of 3 walks"):
         walk_site(LENS, up, lanes, SiteConfig(), 3, np.random.default_rng(0))
-
-
-def test_a_lane_with_a_door_begins_or_ends_there():
-    rng = np.random.default_rng(1)
-    (lane, *_) = draw_lanes(LENS, PRIOR, QUIET, rng)
-    config = replace(QUIET, aside_m=1.5)
-    door = replace(lane, doors_m=(0.0, math.inf))
-    tracks = walk_site(LENS, PRIOR, [door], config, 60, rng)
-    nearest, far_aside = [], []
-    for ground in on_ground(tracks):
-        along = (ground - lane.point) @ lane.direction
-        aside = (ground - lane.point) @ [-lane.direction[1], lane.direction[0]]
-        assert along.min() > -1.0
-        assert along.argmin() in (0, len(along) - 1)
-        nearest.append(np.linalg.norm(ground[along.argmin()] - lane.point))
-        far_aside += list(aside[along > 4.5])
-    assert np.median(nearest) < 1.0
-    assert np.std(far_aside) > 1.0

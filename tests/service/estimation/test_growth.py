@@ -90,7 +90,7 @@ def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     assert grown.tracks == WANTED + 50  # the newest 60 are what it is to judge
     assert grown.to_s == pytest.approx(ended(known, 0, WANTED + 50)[-1])
     assert grown.data != first.data
-    assert flow_from_bytes(grown.data).grains.tracks == WANTED  # kept: few more, the same hours
+    assert flow_from_bytes(grown.data).bandwidths.tracks == WANTED  # kept: few more, the same hours
     known.look()
     assert map_of(known).learned_at == grown.learned_at
     known.keep_to_lanes(PRIOR, 20)

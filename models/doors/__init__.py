@@ -1,1 +1,0 @@
-"""Doors: where walks begin and end inside the picture, as landmarks on the ground."""

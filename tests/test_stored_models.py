@@ -1,0 +1,78 @@
+"""What was stored of a site is read to the bit, and stored again as the same bytes.
+
+The files of `golden/stored_models` were written by `python -m tests.test_stored_models`: made anew
+when a format changes before the first release, and never after it.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
+from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.pose import (
+    WalkConfig,
+    estimate_pose,
+    last_pose_from_bytes,
+    last_pose_to_bytes,
+    learn_site,
+    observe,
+)
+from models.tracks.trajectory import by_end
+from models.walking.reference.learning import learn_speed_reference
+from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from tests.models.sites import LENS, PRIOR, tracks_of
+
+GOLDEN = Path(__file__).parent / "golden" / "stored_models"
+FORMATS = {
+    "speed_reference": (reference_from_bytes, reference_to_bytes),
+    "speed_reference_without_boxes": (reference_from_bytes, reference_to_bytes),
+    "paths": (flow_from_bytes, flow_to_bytes),
+    "chart": (chart_from_bytes, chart_to_bytes),
+    "last_pose": (last_pose_from_bytes, last_pose_to_bytes),
+}
+
+
+def made():
+    """The bytes of all formats, by name, of what 60 people of a simulated site are learned as."""
+    boxed, bare = (_observed(boxes=boxes) for boxes in (True, False))
+    site = learn_site(boxed, LENS, PRIOR)
+    last = estimate_pose(boxed, site).last
+    assert site.flow is not None
+    assert site.chart is not None
+    assert last is not None
+    without_boxes = learn_speed_reference(bare, PRIOR, WalkConfig(), 0)
+    return {
+        "speed_reference": reference_to_bytes(site.speed_reference),
+        "speed_reference_without_boxes": reference_to_bytes(without_boxes),
+        "paths": flow_to_bytes(site.flow),
+        "chart": chart_to_bytes(site.chart),
+        "last_pose": last_pose_to_bytes(last),
+    }
+
+
+def _observed(*, boxes):
+    (tracks,) = tracks_of(3, (PRIOR, 60), boxes=boxes)
+    return observe(by_end(tracks), LENS, PRIOR)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_was_stored_is_read_and_stored_again_as_the_same_bytes(name):
+    read, store = FORMATS[name]
+    data = (GOLDEN / f"{name}.bin").read_bytes()
+    assert store(read(data)) == data
+
+
+def test_what_was_stored_says_what_it_said():
+    read = {name: FORMATS[name][0]((GOLDEN / f"{name}.bin").read_bytes()) for name in FORMATS}
+    assert read["speed_reference"].walking_speed_mps == pytest.approx(1.3, abs=0.1)
+    assert read["speed_reference"].stature_m == pytest.approx(1.7, abs=0.1)
+    assert read["speed_reference_without_boxes"].statures is None
+    assert read["paths"].people == pytest.approx(60, abs=10)
+    assert read["chart"].speed_reference.tracks == read["speed_reference"].tracks
+    assert read["last_pose"].prior == PRIOR
+
+
+if __name__ == "__main__":
+    for name, data in made().items():
+        (GOLDEN / f"{name}.bin").write_bytes(data)
