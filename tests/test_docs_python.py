@@ -1,4 +1,4 @@
-"""The Python of the README of `models/` runs as it stands there, on a MOT text of walkers."""
+"""The Python of the docs runs as it stands there, on a MOT text of walkers."""
 
 import re
 from pathlib import Path
@@ -9,11 +9,13 @@ import pytest
 from models.simulation.simulated_site import SiteConfig
 from tests.models.sites import KNOCKED, PRIOR, near, tracks_of
 
-README = (Path(__file__).parents[2] / "models" / "README.md").read_text()
+DOCS = Path(__file__).parents[1] / "docs"
 
 
 def code() -> str:
-    (found,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    """The one example that there is: another needs a test of its own."""
+    pages = "".join(page.read_text() for page in sorted(DOCS.rglob("*.md")))
+    (found,) = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
     return found
 
 
@@ -35,7 +37,7 @@ def test_ten_lines_learn_a_site_and_find_a_knock(tmp_path, monkeypatch, capsys):
     (tmp_path / "tracks.txt").write_text("\n".join(shuffled))
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(compile(code(), "models/README.md", "exec"), names)  # noqa: S102
+    exec(compile(code(), "docs/start.md", "exec"), names)  # noqa: S102
     found = names["found"]
     assert (np.abs(near(found.pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), found.pose
     assert found.pose.heading_rad == pytest.approx(PRIOR.heading_rad, abs=np.radians(1.5))
