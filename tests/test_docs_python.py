@@ -1,13 +1,17 @@
 """The Python of the docs runs as it stands there, on a MOT text of walkers."""
 
+import json
+import math
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import surefoot
 from models.simulation.simulated_site import SiteConfig
-from tests.models.sites import KNOCKED, PRIOR, near, tracks_of
+from tests.models.sites import KNOCKED, LENS, PRIOR, near, tracks_of
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -35,18 +39,21 @@ def test_ten_lines_learn_a_site_and_find_a_knock(tmp_path, monkeypatch, capsys):
     lines = mot_lines([*known, *after])
     shuffled = np.random.default_rng(0).permutation(lines)  # trackers write frame by frame
     (tmp_path / "tracks.txt").write_text("\n".join(shuffled))
+    camera = {"intrinsics": asdict(LENS), "prior_pose": asdict(surefoot.Pose.of(PRIOR))}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     exec(compile(code(), "docs/start.md", "exec"), names)  # noqa: S102
-    found = names["found"]
-    assert (np.abs(near(found.pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), found.pose
-    assert found.pose.heading_rad == pytest.approx(PRIOR.heading_rad, abs=np.radians(1.5))
+    pose = names["result"].pose.in_radians
+    assert (np.abs(near(pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), pose
+    assert pose.heading_rad == pytest.approx(PRIOR.heading_rad, abs=math.radians(1.5))
     printed = capsys.readouterr().out
-    told = dict(re.findall(r"^(\w+): ([+-][\d.]+) off the prior pose", printed, re.MULTILINE))
-    assert set(told) == {"tilt", "roll", "height", "heading"}
-    assert float(told["tilt"]) == pytest.approx(found.pose.tilt_rad - PRIOR.tilt_rad, abs=6e-4)
-    within = float(re.search(r"tilt: .* give or take ([\d.]+)", printed)[1])
-    assert 0 < within < np.radians(2)
+    assert printed.startswith("True tilt ")
+    told = dict(re.findall(r"^(\w+): ([\d.-]+ to [\d.-]+)$", printed, re.MULTILINE))
+    assert set(told) == {"tilt_deg", "roll_deg", "height_m", "heading_deg"}
+    low, high = map(float, told["tilt_deg"].split(" to "))
+    assert low < math.degrees(pose.tilt_rad) < high < low + 4
+    assert surefoot.read_site("corner.site").camera == names["camera"]
 
 
 def test_it_is_about_ten_lines():

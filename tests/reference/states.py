@@ -19,8 +19,8 @@ states and kinds mean. A `reason` is for people, and its wording may change; `re
 _REASONS = """
 ## Reasons
 
-The first of the reasons gives `reason_code` and `reason_values`, in HTTP with angles in degrees.
-The sentence is an example, made of such values.
+The first of the reasons gives `reason_code` and `reason_values`, over HTTP with angles in degrees.
+The sentence is an example.
 
 | Code | Values | Sentence |
 |---|---|---|
