@@ -14,8 +14,8 @@ from service.enums import PoseState, ReferenceState
 from service.estimation.drift_words import FIELDS
 from service.formats.degrees import in_degrees
 from service.reasons import code_of, values_of
-from service.store.packing import identifiable_drift, identifiable_sd
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
+from service.store.serialization import identifiable_drift, identifiable_sd
 
 
 class AcceptBody(Body):

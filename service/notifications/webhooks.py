@@ -21,7 +21,7 @@ from service.reason_words import in_words
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 OLD_SECRET_STAYS = timedelta(hours=24)
 _BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)

@@ -14,9 +14,9 @@ from service.notifications.outbox import is_silenced
 from service.reasons import Reasons
 from service.settings import Settings
 from service.store import fleet
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.trainings import TrainingRecord
+from service.store.alerts import AlertRecord
+from service.store.estimates import EstimateRecord
+from service.store.trainings import TrainingRecord
 from service.windows.attendance import Attendance
 from service.windows.references import tracks_so_far, wanted_tracks
 

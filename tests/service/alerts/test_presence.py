@@ -14,8 +14,8 @@ from service.alerts.presence import silence_of, watch_presence
 from service.reason_words import in_words
 from service.settings import Settings
 from service.store import rhythms
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
 from service.workers.upkeep.arrival_rates import run_rhythms
