@@ -14,27 +14,27 @@ from sqlalchemy.orm import Session
 from models.reasons import Reason, Value
 from service.access.activity import note
 from service.alerts.alerts import end_alert, open_alert
+from service.alerts.suspected_moves import suspected_moves
 from service.cameras.cameras import require_camera
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.reasons import ServiceCode
+from service.references import (
+    attendance_of,
+    begin_reference,
+    is_before,
+    made_against,
+    wanted_tracks,
+    window_of,
+)
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references
 from service.store.database.store import joined
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.tracks import SourceRecord
 from service.store.tracks import sources
-from service.windows.attendance import attendance_of
-from service.windows.references import (
-    begin_reference,
-    is_outdated,
-    made_against,
-    wanted_tracks,
-    window_of,
-)
-from service.windows.requests import request_estimate
-from service.windows.stillness import doubts
 
 _HOUR_S = 3600.0
 
@@ -261,7 +261,7 @@ def _still_from_s(
     session: Session, settings: Settings, reference: SiteReferenceRecord
 ) -> float | None:
     """Since when a camera is known to have been still, if it is by now."""
-    ended = [each.to_s for each in doubts(session, settings, reference) if each.excluded]
+    ended = [each.to_s for each in suspected_moves(session, settings, reference) if each.excluded]
     began = [] if reference.from_s is None else [reference.from_s]
     return max([*began, *ended], default=None)
 
@@ -276,7 +276,7 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
         return False
     if any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS):
         return False
-    return not is_outdated(last, window_of(session, reference, settings))
+    return not is_before(last.to_s, window_of(session, reference, settings))
 
 
 def _reason(

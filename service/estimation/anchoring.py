@@ -24,14 +24,14 @@ from models.pose import (
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.estimation.paths import LearnedPaths
+from service.estimation.people import Unpacked
+from service.references import window_of
 from service.settings import Settings
 from service.store import cameras, flow_maps, references
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.references import AnchorRecord, SiteReferenceRecord
 from service.store.tracks import windows
 from service.store.tracks.windows import WindowBounds
-from service.windows.references import window_of
-from service.windows.unpacked import Unpacked
 
 _MOST_A_DAY = 100
 

@@ -17,6 +17,8 @@ from service.alerts.alerts import fired_by_estimate
 from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
+from service.estimation.people import Unpacked, until_so_many
+from service.references import made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, flow_maps, references, trainings
 from service.store.packing import intrinsics_of, pose_of_prior
@@ -27,9 +29,6 @@ from service.store.tables.trainings import ModelRecord
 from service.store.tracks import predictions as stored_predictions
 from service.store.tracks import tracks, windows
 from service.store.tracks.stored import StoredTrack
-from service.windows.people import until_so_many
-from service.windows.references import made_against, window_of
-from service.windows.unpacked import Unpacked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

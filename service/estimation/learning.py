@@ -21,16 +21,14 @@ from service.enums import Activity, AlertKind, AlertSource, Severity
 from service.estimation.anchoring import keep_anchor
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
+from service.estimation.people import Unpacked, until_so_many
 from service.reasons import some
+from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
 from service.store import cameras, maintenance, references
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.references import FlowMapRecord
 from service.store.tracks import windows
-from service.windows.attendance import attendance_of
-from service.windows.people import until_so_many
-from service.windows.references import wanted_tracks
-from service.windows.unpacked import Unpacked
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {

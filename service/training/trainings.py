@@ -15,6 +15,7 @@ from models.tracks.trajectory import choose_step_s
 from service.access.activity import note
 from service.enums import Activity, EventType, TrainingState
 from service.errors import ConflictError, NotFoundError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store import cameras, trainings
@@ -23,7 +24,6 @@ from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
 from service.store.tables.cameras import PriorPoseRecord
 from service.store.tables.trainings import ModelRecord, TrainingRecord
 from service.store.tracks import tracks
-from service.windows.requests import request_estimate
 
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200

@@ -20,7 +20,7 @@ from service.job_queue import (
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from service.workers.estimate import run_estimate
-from service.workers.processes.work import WorkKind
+from service.workers.processes.workers import WorkKind
 from service.workers.train import run_training
 
 log = logging.getLogger("surefoot.worker")
@@ -131,7 +131,7 @@ def stop(within_s: float) -> threading.Thread:
 def _guarded(job: Any, context: JobContext, kind: str, about: str) -> None:
     """Run a job; what it did not foresee is logged, and the reconcile finds the work again."""
     try:
-        with context.in_hand.task(kind, about):
+        with context.running.job(kind, about):
             job(context, about)
     except Exception:
         log.exception("job_failed", extra={"job": job.__name__, "arguments": [about]})

@@ -7,15 +7,15 @@ from functools import partial
 
 from models.errors import CalibrationError
 from service.enums import TrainingState
-from service.training.trainings import (
+from service.training import (
     TrainingAttempt,
     begin_training,
     end_training,
     is_wanted,
     publish_model,
     report_progress,
+    share_weights,
 )
-from service.training.weights import share_weights
 from service.workers.context import JobContext
 from service.workers.training_child import Progress, Trained, TrainingDiedError, train_apart
 

@@ -19,7 +19,7 @@ from service.reasons import as_said
 from service.store import references, trainings
 from service.store.database.store import Store
 from service.store.operation import events
-from service.training.trainings import begin_training, publish_model
+from service.training import begin_training, publish_model
 from tests.conftest import track
 
 PRIOR = CameraPose(

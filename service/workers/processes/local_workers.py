@@ -15,7 +15,7 @@ from service.errors import OverloadedError
 from service.settings import Settings
 from service.store.database.store import Store
 from service.workers.processes import exits
-from service.workers.processes.workforce import WORKERS, note_trouble, worker_name
+from service.workers.processes.workers import WORKERS, note_trouble, worker_name
 
 log = logging.getLogger("surefoot.serve")
 

@@ -14,7 +14,7 @@ from service.settings import Settings
 from service.store.database.store import Store
 from service.store.packing import unpack
 from service.store.tables.tracks import TrackRecord
-from service.workers.upkeep.limits import limits_of_camera
+from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

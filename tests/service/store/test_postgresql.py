@@ -22,8 +22,8 @@ from service.store.database.clock import now_in
 from service.store.database.failures import failure_of
 from service.store.database.store import Store
 from service.store.operation import events, workers
-from service.training.weights import fetch_weights, share_weights
-from service.workers.processes.workforce import (
+from service.training import fetch_weights, share_weights
+from service.workers.processes.workers import (
     heartbeat,
     register_worker,
     take_setback,

@@ -21,7 +21,7 @@ _NOT_AGAIN_WITHIN = timedelta(minutes=50)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraRhythm:
+class ArrivalModel:
     """A camera's rhythm, and how late its tracks come at the most, in seconds."""
 
     rhythm: Rhythm
@@ -73,9 +73,9 @@ def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals |
     )
 
 
-def compute_rhythm(
+def compute_arrival_model(
     arrivals: Arrivals, settings: Settings, now: datetime
-) -> tuple[CameraRhythm | None, HourCounts]:
+) -> tuple[ArrivalModel | None, HourCounts]:
     """The rhythm and the counts of its hours; no rhythm where too few days have been seen."""
     known = _counted(arrivals, now)
     counts = known.tracks
@@ -93,7 +93,7 @@ def compute_rhythm(
     cells = cells_of(first, len(seen), settings.zone)
     rhythm = learn_rhythm(seen, cells, watched, first, np.sort(np.array(arrivals.ended_s)))
     delay_s = delay_of(np.array(list(known.latest_s.values())))
-    return CameraRhythm(rhythm=rhythm, delay_s=delay_s), known
+    return ArrivalModel(rhythm=rhythm, delay_s=delay_s), known
 
 
 def _counted(arrivals: Arrivals, now: datetime) -> HourCounts:
@@ -120,10 +120,10 @@ def _counted(arrivals: Arrivals, now: datetime) -> HourCounts:
     return HourCounts(tracks=counts, latest_s=latest_s)
 
 
-def save_rhythm(
+def save_arrival_model(
     session: Session,
     camera_id: str,
-    learned: CameraRhythm | None,
+    learned: ArrivalModel | None,
     counts: HourCounts,
     now: datetime,
 ) -> None:
@@ -133,16 +133,16 @@ def save_rhythm(
         rhythms.put(session, camera_id, profile, asdict(counts), now)
 
 
-def rhythm_of(session: Session, camera_id: str) -> CameraRhythm | None:
+def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
     """The rhythm of a camera; None where too little of it is known."""
     profile = rhythms.profile(session, camera_id)
     return None if profile is None else unpacked(profile)
 
 
-def unpacked(profile: dict[str, Any]) -> CameraRhythm:
+def unpacked(profile: dict[str, Any]) -> ArrivalModel:
     """A rhythm as it was stored."""
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
-    return CameraRhythm(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
+    return ArrivalModel(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
 
 
 def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:
@@ -156,7 +156,7 @@ def _cell(hour: int, zone: tzinfo) -> int:
     return local.hour + (24 if local.weekday() >= 5 else 0)
 
 
-def _packed(learned: CameraRhythm) -> dict[str, Any]:
+def _packed(learned: ArrivalModel) -> dict[str, Any]:
     return {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
 
 

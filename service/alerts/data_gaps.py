@@ -15,13 +15,13 @@ from models.monitoring.arrivals import (
 )
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, open_alert
-from service.alerts.arrival_rates import CameraRhythm, cells_of, rhythm_of
+from service.alerts.arrival_models import ArrivalModel, arrival_model_of, cells_of
 from service.enums import AlertKind, AlertSource, Outcome, Severity
 from service.reasons import Reasons, ServiceCode
+from service.references import attendance_of
 from service.settings import Settings
 from service.store import alerts
 from service.store.tracks import tracks
-from service.windows.attendance import attendance_of
 
 _HOUR_S = 3600.0
 _LOOK_BACK_S = 3 * _HOUR_S  # the level of the day is told by these hours before a silence
@@ -48,21 +48,21 @@ class Silence:
     severity: Severity | None
 
 
-def silence_of(
+def data_gap_of(
     session: Session, settings: Settings, camera_id: str, now: datetime
 ) -> Silence | None:
     """The silence of a camera; None where it has never seen anybody, or just has."""
     last_s = tracks.newest_end_s(session, camera_id)
     if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
         return None
-    known = rhythm_of(session, camera_id)
+    known = arrival_model_of(session, camera_id)
     if known is None:
         return _by_the_limit(session, settings, camera_id, last_s, now)
     return _by_rhythm(session, settings, camera_id, known, last_s, now)
 
 
 def is_no_data(
-    settings: Settings, known: CameraRhythm | None, last_s: float | None, now: datetime
+    settings: Settings, known: ArrivalModel | None, last_s: float | None, now: datetime
 ) -> bool:
     """Whether a camera whose newest track ended then has been silent for too long to be ok."""
     if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
@@ -74,7 +74,7 @@ def is_no_data(
     return now.timestamp() - known.delay_s - last_s > min(gap_s, _STATE_BY_S, limit_s)
 
 
-def watch_presence(
+def watch_data_gap(
     session: Session, settings: Settings, camera_id: str, now: datetime
 ) -> str | None:
     """Open or end the alert about a silent camera; says what it did."""
@@ -86,7 +86,7 @@ def watch_presence(
                 session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note="tracks come again"
             )
             return "tracks come again"
-    silence = silence_of(session, settings, camera_id, now)
+    silence = data_gap_of(session, settings, camera_id, now)
     if silence is None or silence.severity is None:
         return None
     if firing is not None and silence.severity in (firing.severity, Severity.WARNING):
@@ -133,7 +133,7 @@ def _by_rhythm(
     session: Session,
     settings: Settings,
     camera_id: str,
-    known: CameraRhythm,
+    known: ArrivalModel,
     last_s: float,
     now: datetime,
 ) -> Silence:
@@ -171,7 +171,7 @@ def _by_rhythm(
     )
 
 
-def _expected(settings: Settings, known: CameraRhythm, from_s: float, to_s: float) -> float:
+def _expected(settings: Settings, known: ArrivalModel, from_s: float, to_s: float) -> float:
     first = math.floor(from_s / _HOUR_S)
     hours = max(math.floor(to_s / _HOUR_S) - first + 1, 0)
     cells = cells_of(first, hours, settings.zone)

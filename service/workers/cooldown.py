@@ -8,7 +8,7 @@ _REST_S = 3600.0
 _SHARE = 0.1  # of a worker's time, where estimates wait for it
 
 
-class GrowthRests:
+class GrowthCooldown:
     """Which cameras' maps rest, until when, and why."""
 
     def __init__(self) -> None:
@@ -18,7 +18,7 @@ class GrowthRests:
         """Leave a camera's map as it is for an hour."""
         self._rests[camera_id] = (time.monotonic() + _REST_S, why)
 
-    def lacks_of(self, camera_id: str) -> Reasons:
+    def failures_of(self, camera_id: str) -> Reasons:
         """Why a camera's map rests; nothing where it does not."""
         until_s, why = self._rests.get(camera_id, (0.0, ()))
         if time.monotonic() < until_s:
@@ -27,7 +27,7 @@ class GrowthRests:
         return ()
 
 
-class GrowthTurns:
+class GrowthBudget:
     """How much of its time a worker has spent on growth: of hundreds of maps some are always due.
 
     Where estimates wait, no more than a tenth of it: a map that grows an hour later is no worse.

@@ -4,12 +4,21 @@ import hashlib
 import socket
 import time
 from datetime import timedelta
+from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
 from service.store.database.clock import now_in
 from service.store.operation import workers
+
+
+class WorkKind(StrEnum):
+    """Trainings, or all but trainings; as `surefoot worker --only` says it."""
+
+    ESTIMATE = "estimate"
+    TRAIN = "train"
+
 
 WORKERS = "workers/"  # what is written about
 _FORGET_LOST = timedelta(days=7)
