@@ -55,7 +55,7 @@ def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str
 
 
 def is_cooling(until: datetime | None, now: datetime) -> bool:
-    """Whether a camera that may be looked at from a time on is to wait for it.
+    """True where a camera that may be looked at from a time on is to wait for it.
 
     A time beyond the longest cooldown was set before the clock was set back: waiting for it would
     take as long as the clock jumped, so it counts as come.
@@ -65,7 +65,7 @@ def is_cooling(until: datetime | None, now: datetime) -> bool:
 
 
 def cooldown_s(tries: int) -> float:
-    """How long a camera cools down after so many looks in a row that failed: 5 s to 10 min."""
+    """The cooldown of a camera after so many looks in a row that failed: 5 s to 10 min."""
     return float(min(_FIRST_COOLDOWN_S * 2 ** min(tries - 1, 20), LONGEST_COOLDOWN_S))
 
 

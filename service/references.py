@@ -31,21 +31,21 @@ class Attendance:
     announced: tuple[tuple[float, datetime], ...]
 
     def announced_late(self, known_at: datetime, known_to_s: float) -> bool:
-        """Whether a window was told of after a time that reaches into what was known then."""
+        """True where a window was told of after a time that reaches into what was known then."""
         return any(from_s <= known_to_s and at > known_at for from_s, at in self.announced)
 
     def free_since_s(self, now: datetime) -> float | None:
-        """When somebody last left the camera; None where nobody was there."""
+        """The time at which somebody last left the camera; None where nobody was there."""
         left = [to_s for _, to_s in self.spans if to_s <= now.timestamp()]
         return left[-1] if left else None
 
     def under_way(self, now: datetime) -> bool:
-        """Whether somebody is at the camera."""
+        """True while somebody is at the camera."""
         return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
 
 
 def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
-    """When somebody was at a camera."""
+    """The times in which somebody was at a camera."""
     return attendance_by(maintenance.of_camera(session, camera_id), now)
 
 
@@ -156,12 +156,12 @@ def forget_streak(session: Session, camera_id: str) -> None:
 
 
 def is_before(to_s: float, bounds: WindowBounds) -> bool:
-    """Whether tracks, the last of which ended then, are of before a window: none could be in it."""
+    """True where tracks that ended by a time are of before a window: none could be in it."""
     return to_s < max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
 
 
 def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
-    """Whether an estimate was made against a reference, not while that was being learned."""
+    """True where an estimate was made against a reference, not while that was being learned."""
     if reference.ready_at is None or estimate.reference_id != reference.id:
         return False
     if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
@@ -170,12 +170,12 @@ def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bo
 
 
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
-    """How many tracks a reference is learned of: no more than are kept."""
+    """The number of tracks a reference is learned of: no more than are kept."""
     return min(reference.wanted, settings.keep_tracks)
 
 
 def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: int) -> int:
-    """How many of the wanted tracks a reference has, by how many were counted if it is learning."""
+    """The number of wanted tracks that a reference has; as many as were counted while it learns."""
     if reference.ready_at is not None:
         return reference.tracks
     return min(counted, wanted_tracks(reference, settings))

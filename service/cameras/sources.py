@@ -11,6 +11,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
+from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.access.activity import note
 from service.alerts.alerts import end_alert, open_alert
@@ -35,8 +36,6 @@ from service.store.database.store import joined
 from service.store.tables.references import SiteReferenceRecord
 from service.store.tables.tracks import SourceRecord
 from service.store.tracks import sources
-
-_HOUR_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,7 +226,7 @@ def _is_silent(
 
     By when they post and by the times of their tracks: some post once a day.
     """
-    silent_s = settings.source_silent_h * _HOUR_S
+    silent_s = settings.source_silent_h * HOUR_S
     if (other.last_seen_at - counting.last_seen_at).total_seconds() < silent_s:
         return False
     ends = [
@@ -284,7 +283,7 @@ def _reason(
 ) -> Reason:
     values: dict[str, Value] = {
         "sources": [record.name for record in posting],
-        "silent_s": settings.source_silent_h * _HOUR_S,
+        "silent_s": settings.source_silent_h * HOUR_S,
         "wanted": wanted_tracks(reference, settings),
     }
     if reference.source is not None:

@@ -1,4 +1,4 @@
-"""From what the tracks of a window come to, to a stored estimate, its alerts and its training."""
+"""Judge what the tracks of a window come to: a stored estimate, its alerts and its training."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -37,7 +37,7 @@ _UNJUDGED = DriftVerdict(streak=0, excess=0.0, drifted=())
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """What was found of a camera before.
+    """Earlier findings of a camera.
 
     `last` is the newest estimate against its reference, `drifted` what had drifted as long as an
     alert says so.
@@ -49,7 +49,7 @@ class History:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """How a camera stands by a finding, and `since` when, where it has moved.
+    """A camera's state by a finding, and `since` when, where it has moved.
 
     `clock` is why its clock or frame rate looks wrong; `charted` says that the chart or the creep
     is beyond its level.
@@ -140,7 +140,7 @@ def _judge(
     drift: Drift,
     frame_rate_hz: float | None,
 ) -> Judgement:
-    """How a camera stands, by an estimate after its reference."""
+    """The judgement of an estimate after its reference."""
     clock = clock_fault(drift, evidence.prior, frame_rate_hz)
     reading, creep = finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
@@ -179,7 +179,7 @@ def _since(
     evidence: Evidence,
     finding: Finding,
 ) -> datetime | None:
-    """When the camera moved, as far as the tracks tell: at the latest then."""
+    """The time at which the camera had moved at the latest, as far as the tracks tell."""
     since = None if history.last is None else history.last.drift_since
     if verdict.streak <= 0:
         return since if verdict.drifting else None

@@ -1,4 +1,4 @@
-"""What an estimate is made of, read in one transaction."""
+"""The input of an estimate, read in one transaction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -85,7 +85,7 @@ class Evidence:
 def load_evidence(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> Evidence | None:
-    """What there is to judge a camera by; None where there is nothing, or nothing new.
+    """The tracks to judge a camera by, and what else; None where there is nothing, or nothing new.
 
     Tracks that were `unpacked` already are not unpacked again.
     """
@@ -148,7 +148,7 @@ def load_evidence(
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:
-    """How fast people are assumed to walk where a camera looks."""
+    """The assumed walking speed where a camera looks."""
     return WalkConfig(
         speed_mean_mps=camera.walking_speed_mean_mps, speed_sd_mps=camera.walking_speed_sd_mps
     )
@@ -160,7 +160,7 @@ def _is_news(
     model: ModelRecord | None,
     records: Sequence[StoredTrack],
 ) -> bool:
-    """Whether the last estimate was of other tracks, another model or another reference."""
+    """True where the last estimate was of other tracks, another model or another reference."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or last.reference_id != reference.id:
         return True

@@ -1,4 +1,4 @@
-"""What the evidence of an estimate comes to; no transaction is open meanwhile."""
+"""The computation of an estimate; no transaction is open meanwhile."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ from service.store.tables.tracks import PredictionRecord
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What the evidence comes to. `tracks` are those after the `change`, where one was found.
+    """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
     `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
     for it. `reading` is what the drift chart says of the tracks after the change, or of all where
@@ -165,7 +165,7 @@ def _read(
     first: int,
     failures: PartialFailures,
 ) -> Reading | None:
-    """What the chart says; once a person has said how the camera stands, it begins anew."""
+    """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
     rate = AlarmRate(
@@ -180,7 +180,7 @@ def _read(
 
 
 def asked_enough(evidence: Evidence) -> bool:
-    """Whether enough people came since a person last said how the camera stands."""
+    """True where enough people came since a person last said how the camera stands."""
     unanswered = [track.trajectory for track in evidence.tracks if track.unanswered]
     wanted = evidence.limits.people
     if not wanted <= len(unanswered) < MOST_PIECES * wanted:
@@ -189,7 +189,7 @@ def asked_enough(evidence: Evidence) -> bool:
 
 
 def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
-    """What a model says of tracks, as a value."""
+    """A model's predictions of tracks, as a value."""
     return TrackPredictions(
         height_m=np.array([record.height_m for record in records], dtype=np.float64),
         quaternion_wxyz=np.array(

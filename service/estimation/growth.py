@@ -207,7 +207,7 @@ def _may_have_moved(
     kept: FlowMapRecord | None,
     moves: tuple[SuspectedMove, ...],
 ) -> bool:
-    """Whether the camera may have moved by now, or people walk elsewhere than they did."""
+    """True where the camera may have moved by now, or people walk elsewhere than they did."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or not made_against(reference, last) or not last.identifiable:
         return True
@@ -226,7 +226,7 @@ def _may_have_moved(
 def _is_explained(
     session: Session, reference: SiteReferenceRecord, moves: tuple[SuspectedMove, ...]
 ) -> bool:
-    """Whether a person has said what the newest change was: put back by now, or none at all."""
+    """True where a person has said what the newest change was: put back by now, or none at all."""
     changed_s = reference.changed_s
     assert changed_s is not None
     for move in moves:

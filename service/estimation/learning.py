@@ -52,7 +52,7 @@ class ReferencePeriod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedReference:
-    """What a reference has come to; `paths` are None where too few people walk."""
+    """A reference as learned; `paths` are None where too few people walk."""
 
     site: SpeedReference
     paths: LearnedPaths | None
@@ -97,7 +97,7 @@ def load_reference_period(
 
 
 def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
-    """What is usual at the site; None where too few of the tracks walk."""
+    """The walkers and paths that are usual at the site; None where too few of the tracks walk."""
     observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)

@@ -15,7 +15,7 @@ _Made = TypeVar("_Made")
 
 
 class PartialFailures:
-    """What of a camera's estimate could not be made; `reasons` say so."""
+    """The parts of a camera's estimate that could not be made; `reasons` say so."""
 
     def __init__(self, camera_id: str) -> None:
         self._camera_id = camera_id

@@ -19,7 +19,7 @@ _Track = tuple[int, datetime]
 
 
 class Unpacked:
-    """What was unpacked so far; to be forgotten with the refresh."""
+    """A cache of unpacked tracks; to be forgotten with the refresh."""
 
     def __init__(self) -> None:
         self._feet: dict[_Track, Trajectory] = {}

@@ -31,7 +31,7 @@ class StepWatch:
         self._known: dict[str, tuple[float, float]] = {}
 
     def fits(self, session: Session, camera_id: str, model_step_s: float) -> bool:
-        """Whether a model of a step suits a camera's tracks, by what they were 10 minutes ago.
+        """True where a model of a step suits a camera's tracks, by what they were 10 minutes ago.
 
         What does not suit is asked anew.
         """

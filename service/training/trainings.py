@@ -28,11 +28,6 @@ from service.store.tracks import tracks
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
-_KEPT_AS = {
-    TrainingState.SUCCEEDED: Activity.TRAINING_SUCCEEDED,
-    TrainingState.FAILED: Activity.TRAINING_FAILED,
-    TrainingState.CANCELLED: Activity.TRAINING_CANCELLED,
-}
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -194,7 +189,7 @@ def camera_step_s(session: Session, camera_id: str) -> float:
 
 
 def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
-    """Whether a training is to go on: neither cancelled, deleted nor taken over."""
+    """True while a training is to go on: neither cancelled, deleted nor taken over."""
     record = trainings.find(session, attempt.training_id)
     return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
 
@@ -280,7 +275,7 @@ def finish(
     record.finished_at = datetime.now(UTC)
     note(
         session,
-        _KEPT_AS[state],
+        Activity(f"training.{state}"),
         by=None,
         camera_id=record.camera_id,
         subject_id=record.id,

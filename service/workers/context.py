@@ -1,4 +1,4 @@
-"""What every job in a worker process is given."""
+"""The context of every job in a worker process."""
 
 import threading
 from bisect import bisect_right

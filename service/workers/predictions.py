@@ -1,4 +1,4 @@
-"""What a camera's model says of its tracks, which is shown beside the estimate."""
+"""Predictions of a camera's model for its tracks, shown beside the estimate."""
 
 import logging
 

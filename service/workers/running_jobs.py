@@ -39,7 +39,7 @@ class RunningJobs:
                 del self._jobs[id(job)]
 
     def of_kind(self, *kinds: str) -> int:
-        """How many jobs of some kinds are running."""
+        """The number of running jobs of some kinds."""
         with self._lock:
             return sum(job.kind in kinds for job in self._jobs.values())
 

@@ -104,7 +104,7 @@ def _train(context: JobContext, attempt: TrainingAttempt) -> Trained:
 
 
 def may_go_on(context: JobContext) -> bool:
-    """Whether a training is in nobody's way: an estimate that waits for a worker goes first."""
+    """True where a training is in nobody's way: an estimate that waits for a worker goes first."""
     if context.settings.trainings != "idle":
         return True
     with context.store.read() as session:

@@ -1,4 +1,4 @@
-"""How much memory and processor time a process takes: freed memory goes back, jobs yield."""
+"""Memory and processor time of a process: freed memory goes back, jobs yield."""
 
 import ctypes
 import logging

@@ -1,4 +1,4 @@
-"""Which workers live, by signs of life that no clock can set back."""
+"""The workers that live, by signs of life that no clock can set back."""
 
 import hashlib
 import socket
@@ -43,7 +43,7 @@ def register_worker(session: Session, name: str, pid: int) -> None:
 
 
 def take_setback(session: Session) -> timedelta:
-    """How far the clock was set back at least since any worker was last heard of; told once.
+    """The least time by which the clock was set back since a worker was last heard of; told once.
 
     None of them saw that happen: each was ended before, or is only just being started.
     """

@@ -11,15 +11,17 @@ import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 from models.durations import HOUR_S
+from service.alerts.arrival_models import compute_arrival_model, load_arrivals, save_arrival_model
 from service.alerts.staleness import StaleWatch
 from service.data_dir import ROUNDS
+from service.store import cameras
 from service.store.database.store import Lock
 from service.workers import engine
 from service.workers.context import JobContext
 from service.workers.running_jobs import UPKEEP
-from service.workers.upkeep.arrival_models import run_arrival_models
 from service.workers.upkeep.clock import ClockWatch
 from service.workers.upkeep.reconciliation import run_reconcile, run_sweep
 from service.workers.upkeep.retention import run_retention
@@ -117,3 +119,26 @@ def _hourly(context: JobContext, now_s: float) -> list[Periodic]:
         Periodic("retention", HOUR_S, lambda: run_retention(context), hourly_s, steps=True),
         Periodic("finished_jobs", HOUR_S, engine.forget_finished, hourly_s),
     ]
+
+
+def run_arrival_models(context: JobContext) -> None:
+    """Learn every camera's arrival model anew, before retention: its hours are counted whole."""
+    with context.store.read() as session:
+        ids = cameras.ids(session)
+    learned = 0
+    for camera_id in ids:
+        with context.running.job(UPKEEP, "rhythms", camera_id):
+            learned += _learn(context, camera_id)
+    log.info("rhythms_learned", extra={"cameras": learned})
+
+
+def _learn(context: JobContext, camera_id: str) -> bool:
+    now = datetime.now(UTC)
+    with context.store.read() as session:
+        arrivals = load_arrivals(session, camera_id, now)
+    if arrivals is None:
+        return False
+    model, counts = compute_arrival_model(arrivals, context.settings, now)
+    with context.store.write(camera_id) as session:
+        save_arrival_model(session, camera_id, model, counts, now)
+    return model is not None

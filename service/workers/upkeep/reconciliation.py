@@ -103,7 +103,7 @@ def _reconcile_alerts(context: JobContext, stale: StaleWatch, session: Session) 
 
 
 def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:
-    """Whether there are tracks that no estimate job, or not the model in use, has looked at."""
+    """True where there are tracks that no estimate job, or not the model in use, has looked at."""
     newest_pk = tracks.newest_pk(session, camera.id)
     if newest_pk is None:
         return False

@@ -23,7 +23,7 @@ from service.store.packing import pack
 from service.store.tables.tracks import TrackRecord
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
-from service.workers.upkeep.arrival_models import run_arrival_models
+from service.workers.upkeep.periodic import run_arrival_models
 from tests.conftest import track
 from tests.service.bench import PRIOR
 
