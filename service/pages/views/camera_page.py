@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from models.geometry.misplacement import Misplacement, misplacements
 from models.tracks.trajectory import Trajectory
 from service.alerts.alerts import list_alerts
-from service.alerts.data_gaps import Silence, data_gap_of
+from service.alerts.data_gaps import DataGap, data_gap_of
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
@@ -55,7 +55,7 @@ class CameraPage:
     now: datetime
     camera: CameraView
     pose: PoseView
-    silence: Silence | None
+    silence: DataGap | None
     newest_track_s: float | None
     tracks: tuple[Trajectory, ...]
     misplaced: tuple[Misplacement, ...]
