@@ -18,8 +18,7 @@ SERVICE_ROOMS = [
     {"formats", "store"},
     {"job_queue"},
     {"access"},
-    {"notifications"},
-    {"windows"},
+    {"estimate_queue", "references", "notifications"},
     {"alerts", "training"},
     {"cameras", "estimation"},
     {"operations", "workers"},
@@ -32,7 +31,7 @@ SERVICE_ROOMS = [
 MODEL_ROOMS = [
     {"errors", "reasons", "machine_code"},
     {"compiled"},
-    {"serialization", "quantiles"},
+    {"serialization", "quantiles", "durations"},
     {"geometry"},
     {"tracks"},
     {"simulation"},

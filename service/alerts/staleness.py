@@ -1,4 +1,4 @@
-"""Whether each camera's estimate is being made; where it is not, its alert `stale`."""
+"""The alert `stale` of cameras whose estimate is not being made."""
 
 import time
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class StaleWatch:
 
 
 def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:
-    """Why a camera's estimate is not what it should be; None where it is."""
+    """The reason why a camera's estimate is not what it should be; None where it is."""
     failed = camera.estimate_tries >= settings.stale_failures
     # While it is being looked at, it is not due: the last try may be the one that succeeds.
     if failed and camera.estimate_error is not None and camera.estimate_due_at is not None:

@@ -23,7 +23,7 @@ from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
 from service.workers.processes.listener import listen
 from service.workers.processes.local_workers import local_workers
-from service.workers.processes.memory import settle_allocator
+from service.workers.processes.resources import settle_allocator
 
 if TYPE_CHECKING:
     from fastapi import FastAPI

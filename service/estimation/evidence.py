@@ -1,4 +1,4 @@
-"""What an estimate is made of, read in one transaction."""
+"""The input of an estimate, read in one transaction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +17,8 @@ from service.alerts.alerts import fired_by_estimate
 from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
+from service.estimation.people import Unpacked, until_so_many
+from service.references import made_against, window_of
 from service.settings import Settings
 from service.store import (
     alerts,
@@ -35,9 +37,6 @@ from service.store.references import SiteReferenceRecord
 from service.store.serialization import intrinsics_of, pose_of_prior
 from service.store.stored_tracks import StoredTrack
 from service.store.trainings import ModelRecord
-from service.windows.people import until_so_many
-from service.windows.references import made_against, window_of
-from service.windows.unpacked import Unpacked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +93,7 @@ class Evidence:
 def load_evidence(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> Evidence | None:
-    """What there is to judge a camera by; None where there is nothing, or nothing new.
+    """The tracks to judge a camera by, and what else; None where there is nothing, or nothing new.
 
     Tracks that were `unpacked` already are not unpacked again.
     """
@@ -157,7 +156,7 @@ def load_evidence(
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:
-    """How fast people are assumed to walk where a camera looks."""
+    """The assumed walking speed where a camera looks."""
     return WalkConfig(
         speed_mean_mps=camera.walking_speed_mean_mps, speed_sd_mps=camera.walking_speed_sd_mps
     )
@@ -169,7 +168,7 @@ def _is_news(
     model: ModelRecord | None,
     records: Sequence[StoredTrack],
 ) -> bool:
-    """Whether the last estimate was of other tracks, another model or another reference."""
+    """True where the last estimate was of other tracks, another model or another reference."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or last.reference_id != reference.id:
         return True

@@ -21,15 +21,13 @@ from service.enums import Activity, AlertKind, AlertSource, Severity
 from service.estimation.anchoring import keep_anchor
 from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
+from service.estimation.people import Unpacked, until_so_many
 from service.reasons import some
+from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
 from service.store import cameras, maintenance, references, windows
 from service.store.flow_maps import FlowMapRecord
 from service.store.serialization import intrinsics_of, pose_of_prior
-from service.windows.attendance import attendance_of
-from service.windows.people import until_so_many
-from service.windows.references import wanted_tracks
-from service.windows.unpacked import Unpacked
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -53,7 +51,7 @@ class ReferencePeriod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedReference:
-    """What a reference has come to; `paths` are None where too few people walk."""
+    """A reference as learned; `paths` are None where too few people walk."""
 
     site: SpeedReference
     paths: LearnedPaths | None
@@ -98,7 +96,7 @@ def load_reference_period(
 
 
 def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
-    """What is usual at the site; None where too few of the tracks walk."""
+    """The walkers and paths that are usual at the site; None where too few of the tracks walk."""
     observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)

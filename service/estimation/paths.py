@@ -1,4 +1,4 @@
-"""Where people walk before a camera, and the chart of its drift, as they are stored."""
+"""The paths before a camera, and the chart of its drift, as they are stored."""
 
 from dataclasses import dataclass
 

@@ -92,7 +92,7 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
 
 
 def is_silenced(record: AlertRecord, now: datetime) -> bool:
-    """Whether an alert is to be quiet."""
+    """True where an alert is to be quiet."""
     return record.silenced_until is not None and record.silenced_until > now
 
 

@@ -15,22 +15,17 @@ from models.tracks.trajectory import choose_step_s
 from service.access.activity import note
 from service.enums import Activity, EventType, TrainingState
 from service.errors import ConflictError, NotFoundError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store import cameras, events, tracks, trainings
 from service.store.cameras import PriorPoseRecord
 from service.store.serialization import intrinsics_of, pose_of_prior, trajectory_of
 from service.store.trainings import ModelRecord, TrainingRecord
-from service.windows.requests import request_estimate
 
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
-_KEPT_AS = {
-    TrainingState.SUCCEEDED: Activity.TRAINING_SUCCEEDED,
-    TrainingState.FAILED: Activity.TRAINING_FAILED,
-    TrainingState.CANCELLED: Activity.TRAINING_CANCELLED,
-}
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -192,7 +187,7 @@ def camera_step_s(session: Session, camera_id: str) -> float:
 
 
 def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
-    """Whether a training is to go on: neither cancelled, deleted nor taken over."""
+    """True while a training is to go on: neither cancelled, deleted nor taken over."""
     record = trainings.find(session, attempt.training_id)
     return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
 
@@ -278,7 +273,7 @@ def finish(
     record.finished_at = datetime.now(UTC)
     note(
         session,
-        _KEPT_AS[state],
+        Activity(f"training.{state}"),
         by=None,
         camera_id=record.camera_id,
         subject_id=record.id,

@@ -18,7 +18,7 @@ from service.job_queue import JobQueue
 from service.reasons import as_said
 from service.store import events, references, trainings
 from service.store.engines.store import Store
-from service.training.trainings import begin_training, publish_model
+from service.training import begin_training, publish_model
 from tests.conftest import track
 
 PRIOR = CameraPose(

@@ -15,7 +15,7 @@ from service.errors import OverloadedError
 from service.settings import Settings
 from service.store.engines.store import Store
 from service.workers.processes import exits
-from service.workers.processes.workforce import WORKERS, note_trouble, worker_name
+from service.workers.processes.workers import WORKERS, note_trouble, worker_name
 
 log = logging.getLogger("surefoot.serve")
 
@@ -42,7 +42,7 @@ def local_workers(settings: Settings, give_up: Callable[[], None]) -> Iterator["
 
 
 def pause_s(deaths: int) -> float:
-    """How long to wait before a worker is started again that died so often in a row."""
+    """The pause before a worker is started again that died so often in a row."""
     return float(min(2.0 ** min(deaths - 1, 20), _LONGEST_PAUSE_S))
 
 
@@ -150,7 +150,7 @@ class _Pulse:
 
     @property
     def silent_s(self) -> float:
-        """How long the last sign was ago."""
+        """The time since the last sign."""
         return time.monotonic() - self._last_s
 
     def _feel(self, pipe: IO[bytes]) -> None:

@@ -1,17 +1,68 @@
-"""References: when one begins, which of a camera's tracks it is of, and which come after it."""
+"""References: when one begins, which tracks are of it or after it, and when somebody was there."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
 from service.enums import Answer, Origin
 from service.settings import Settings
-from service.store import cameras, estimates, references, tracks
+from service.store import cameras, estimates, maintenance, references, tracks
 from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
 from service.store.references import SiteReferenceRecord
 from service.store.windows import WindowBounds
-from service.windows.attendance import Attendance, attendance_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attendance:
+    """The times, from and to, in which somebody was or will be at a camera, by its windows.
+
+    `judged_from_s` is when the last of them ended, or will, that has begun; what the camera saw
+    before does not say how it stands after it. `announced` has when each window began, and when it
+    was last told of or changed.
+    """
+
+    spans: tuple[tuple[float, float], ...]
+    judged_from_s: float | None
+    announced: tuple[tuple[float, datetime], ...]
+
+    def announced_late(self, known_at: datetime, known_to_s: float) -> bool:
+        """True where a window was told of after a time that reaches into what was known then."""
+        return any(from_s <= known_to_s and at > known_at for from_s, at in self.announced)
+
+    def free_since_s(self, now: datetime) -> float | None:
+        """The time at which somebody last left the camera; None where nobody was there."""
+        left = [to_s for _, to_s in self.spans if to_s <= now.timestamp()]
+        return left[-1] if left else None
+
+    def under_way(self, now: datetime) -> bool:
+        """True while somebody is at the camera."""
+        return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
+
+
+def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
+    """The times in which somebody was at a camera."""
+    return attendance_by(maintenance.of_camera(session, camera_id), now)
+
+
+def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:
+    """The same by windows in the order of their beginnings; overlapping ones are one time."""
+    spans: list[tuple[float, float]] = []
+    for record in records:
+        from_s, to_s = record.from_at.timestamp(), record.until.timestamp()
+        if spans and from_s <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(spans[-1][1], to_s))
+        else:
+            spans.append((from_s, to_s))
+    begun = [to_s for from_s, to_s in spans if from_s <= now.timestamp()]
+    return Attendance(
+        spans=tuple(spans),
+        judged_from_s=begun[-1] if begun else None,
+        announced=tuple((record.from_at.timestamp(), record.updated_at) for record in records),
+    )
 
 
 def begin_reference(
@@ -103,13 +154,13 @@ def forget_streak(session: Session, camera_id: str) -> None:
         last.drift_streak, last.drifted, last.drift_since = 0, [], None
 
 
-def is_outdated(estimate: EstimateRecord, bounds: WindowBounds) -> bool:
-    """Whether none of the tracks of an estimate could be in a window: it is of before."""
-    return _is_before(estimate.to_s, bounds)
+def is_before(to_s: float, bounds: WindowBounds) -> bool:
+    """True where tracks that ended by a time are of before a window: none could be in it."""
+    return to_s < max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
 
 
 def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
-    """Whether an estimate was made against a reference, not while that was being learned."""
+    """True where an estimate was made against a reference, not while that was being learned."""
     if reference.ready_at is None or estimate.reference_id != reference.id:
         return False
     if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
@@ -117,25 +168,13 @@ def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bo
     return estimate.created_at >= reference.ready_at
 
 
-def is_overtaken(
-    session: Session, settings: Settings, reference: SiteReferenceRecord, to_s: float
-) -> bool:
-    """Whether tracks, the last of which ended then, are of before: a person answered meanwhile."""
-    bounds = window_of(session, reference, settings)
-    return _is_before(to_s, bounds)
-
-
-def _is_before(to_s: float, bounds: WindowBounds) -> bool:
-    return to_s < max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
-
-
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
-    """How many tracks a reference is learned of: no more than are kept."""
+    """The number of tracks a reference is learned of: no more than are kept."""
     return min(reference.wanted, settings.keep_tracks)
 
 
 def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: int) -> int:
-    """How many of the wanted tracks a reference has, by how many were counted if it is learning."""
+    """The number of wanted tracks that a reference has; as many as were counted while it learns."""
     if reference.ready_at is not None:
         return reference.tracks
     return min(counted, wanted_tracks(reference, settings))

@@ -1,4 +1,4 @@
-"""How our processes behave: their files are private, and an end by signal cleans up."""
+"""Private files of our processes, and an end by signal that cleans up."""
 
 import os
 import signal

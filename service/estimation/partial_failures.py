@@ -1,4 +1,4 @@
-"""What may fail beside the served estimate: each failure is logged and said, and stops nobody."""
+"""Failures beside the served estimate: each is logged and said, and stops nobody."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -14,17 +14,17 @@ log = logging.getLogger("surefoot.recalibration")
 _Made = TypeVar("_Made")
 
 
-class Lacks:
-    """What of a camera's estimate could not be made; `said` has it as reasons."""
+class PartialFailures:
+    """The parts of a camera's estimate that could not be made; `reasons` say so."""
 
     def __init__(self, camera_id: str) -> None:
         self._camera_id = camera_id
-        self.said: list[Reason] = []
+        self.reasons: list[Reason] = []
 
-    def unless_failed(self, what: str, make: Callable[[], _Made]) -> _Made | None:
-        """What is made; None if it failed. `what` is of the log's event, `flow_map` say."""
+    def unless_failed(self, part: str, make: Callable[[], _Made]) -> _Made | None:
+        """Something made; None if it failed. `part` names it in the log, `flow_map` say."""
         found: list[Lack] = []
-        made = unless_failed(found, what, make)
+        made = unless_failed(found, part, make)
         self.take(found)
         return made
 
@@ -39,8 +39,8 @@ class Lacks:
                 log.error(f"{lack.part}_failed", exc_info=lack.error, extra=fields)
                 self.add(lack.part, repr(lack.error))
 
-    def add(self, what: str, why: str) -> None:
+    def add(self, part: str, why: str) -> None:
         """Say that something is missing, and why."""
-        reason = Reason(code=ServiceCode.WITHOUT_PART, values={"part": what, "why": why})
-        if reason not in self.said:
-            self.said.append(reason)
+        reason = Reason(code=ServiceCode.WITHOUT_PART, values={"part": part, "why": why})
+        if reason not in self.reasons:
+            self.reasons.append(reason)

@@ -1,15 +1,24 @@
-"""Which workers live, by signs of life that no clock can set back."""
+"""The workers that live, by signs of life that no clock can set back."""
 
 import hashlib
 import socket
 import time
 from datetime import timedelta
+from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
 from service.store import workers
 from service.store.engines.dialects import now_in
+
+
+class WorkKind(StrEnum):
+    """Trainings, or all but trainings; as `surefoot worker --only` says it."""
+
+    ESTIMATE = "estimate"
+    TRAIN = "train"
+
 
 WORKERS = "workers/"  # what is written about
 _FORGET_LOST = timedelta(days=7)
@@ -34,7 +43,7 @@ def register_worker(session: Session, name: str, pid: int) -> None:
 
 
 def take_setback(session: Session) -> timedelta:
-    """How far the clock was set back at least since any worker was last heard of; told once.
+    """The least time by which the clock was set back since a worker was last heard of; told once.
 
     None of them saw that happen: each was ended before, or is only just being started.
     """

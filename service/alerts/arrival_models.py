@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from sqlalchemy.orm import Session
 
+from models.durations import DAY_S, HOUR_S
 from models.monitoring.arrivals import Rhythm, delay_of, learn_rhythm
 from service.enums import AlertKind, Outcome
 from service.settings import Settings
 from service.store import alerts, cameras, rhythms, tracks
 
 _PAST_DAYS = 28
-_HOUR_S = 3600
 _NOT_AGAIN_WITHIN = timedelta(minutes=50)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraRhythm:
+class ArrivalModel:
     """A camera's rhythm, and how late its tracks come at the most, in seconds."""
 
     rhythm: Rhythm
@@ -40,7 +40,7 @@ class HourCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrivals:
-    """What a rhythm is learned of: when tracks were stored and had ended, and earlier counts.
+    """The data of an arrival model: when tracks were stored and had ended, and earlier counts.
 
     `outages` are times, from and to, in which nothing was seen though people came.
     """
@@ -52,7 +52,7 @@ class Arrivals:
 
 
 def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals | None:
-    """What to learn a camera's rhythm of; None where it was learned within the hour."""
+    """The data of a camera's arrival model; None where it was learned within the hour."""
     kept = rhythms.find(session, camera_id)
     if cameras.find(session, camera_id) is None:
         return None
@@ -72,9 +72,9 @@ def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals |
     )
 
 
-def compute_rhythm(
+def compute_arrival_model(
     arrivals: Arrivals, settings: Settings, now: datetime
-) -> tuple[CameraRhythm | None, HourCounts]:
+) -> tuple[ArrivalModel | None, HourCounts]:
     """The rhythm and the counts of its hours; no rhythm where too few days have been seen."""
     known = _counted(arrivals, now)
     counts = known.tracks
@@ -85,44 +85,44 @@ def compute_rhythm(
     seen = np.array([counts.get(hour, 0) for hour in range(first, last)], dtype=float)
     watched = np.ones(len(seen), dtype=bool)
     for from_s, to_s in arrivals.outages:
-        begin, end = (math.floor(at_s / _HOUR_S) - first for at_s in (from_s, to_s))
+        begin, end = (math.floor(at_s / HOUR_S) - first for at_s in (from_s, to_s))
         watched[max(begin, 0) : max(end + 1, 0)] = False
     if watched.sum() < 24 * settings.rhythm_days:
         return None, known
     cells = cells_of(first, len(seen), settings.zone)
     rhythm = learn_rhythm(seen, cells, watched, first, np.sort(np.array(arrivals.ended_s)))
     delay_s = delay_of(np.array(list(known.latest_s.values())))
-    return CameraRhythm(rhythm=rhythm, delay_s=delay_s), known
+    return ArrivalModel(rhythm=rhythm, delay_s=delay_s), known
 
 
 def _counted(arrivals: Arrivals, now: datetime) -> HourCounts:
-    """What was counted before and what is stored now: an hour had the most that it ever had.
+    """Earlier counts and those of what is stored now: an hour had the most that it ever had.
 
     Tracks come late and are deleted early.
     """
     now_s = now.timestamp()
-    oldest = math.floor(now_s / _HOUR_S) - _PAST_DAYS * 24 + 1
+    oldest = math.floor(now_s / HOUR_S) - _PAST_DAYS * 24 + 1
     counts = {hour: n for hour, n in arrivals.known.tracks.items() if hour >= oldest}
     ended_s, received_s = np.array(arrivals.ended_s), np.array(arrivals.received_s)
     # What was recorded long ago and posted now came late by years; nobody waits for that.
-    recent = ended_s >= oldest * _HOUR_S
+    recent = ended_s >= oldest * HOUR_S
     ended_s, received_s = ended_s[recent], received_s[recent]
-    hours, numbers = np.unique((ended_s // _HOUR_S).astype(int), return_counts=True)
+    hours, numbers = np.unique((ended_s // HOUR_S).astype(int), return_counts=True)
     for hour, number in zip(hours.tolist(), numbers.tolist(), strict=True):
-        if oldest <= hour <= now_s / _HOUR_S + 24:
+        if oldest <= hour <= now_s / HOUR_S + 24:
             counts[hour] = max(counts.get(hour, 0), number)
     latest_s = {day: lag for day, lag in arrivals.known.latest_s.items() if 24 * day >= oldest}
-    received_days = (received_s // 86_400).astype(int)
+    received_days = (received_s // DAY_S).astype(int)
     for day in np.unique(received_days).tolist():
         lag_s = float((received_s - ended_s)[received_days == day].max())
         latest_s[day] = max(latest_s.get(day, -math.inf), lag_s)
     return HourCounts(tracks=counts, latest_s=latest_s)
 
 
-def save_rhythm(
+def save_arrival_model(
     session: Session,
     camera_id: str,
-    learned: CameraRhythm | None,
+    learned: ArrivalModel | None,
     counts: HourCounts,
     now: datetime,
 ) -> None:
@@ -132,30 +132,30 @@ def save_rhythm(
         rhythms.put(session, camera_id, profile, asdict(counts), now)
 
 
-def rhythm_of(session: Session, camera_id: str) -> CameraRhythm | None:
+def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
     """The rhythm of a camera; None where too little of it is known."""
     profile = rhythms.profile(session, camera_id)
     return None if profile is None else unpacked(profile)
 
 
-def unpacked(profile: dict[str, Any]) -> CameraRhythm:
+def unpacked(profile: dict[str, Any]) -> ArrivalModel:
     """A rhythm as it was stored."""
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
-    return CameraRhythm(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
+    return ArrivalModel(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
 
 
 def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:
-    """Which hour of a week's profile hours in a row are, by the cameras' own clock (count,)."""
+    """The cells of a week's profile for hours in a row, by the cameras' own clock (count,)."""
     return np.array([_cell(first_hour + n, zone) for n in range(count)], dtype=int)
 
 
 @lru_cache(maxsize=4096)
 def _cell(hour: int, zone: tzinfo) -> int:
-    local = datetime.fromtimestamp(hour * _HOUR_S, UTC).astimezone(zone)
+    local = datetime.fromtimestamp(hour * HOUR_S, UTC).astimezone(zone)
     return local.hour + (24 if local.weekday() >= 5 else 0)
 
 
-def _packed(learned: CameraRhythm) -> dict[str, Any]:
+def _packed(learned: ArrivalModel) -> dict[str, Any]:
     return {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from service.store import workers
 from service.store.engines.store import Store
-from service.workers.in_hand import InHand
 from service.workers.processes.local_workers import pause_s
-from service.workers.processes.workforce import Watch, heartbeat, note_trouble, register_worker
+from service.workers.processes.workers import Watch, heartbeat, note_trouble, register_worker
+from service.workers.running_jobs import RunningJobs
 
 LOST_S = 0.2
 
@@ -82,11 +82,11 @@ def test_who_dies_again_and_again_is_started_ever_more_rarely(deaths, seconds):
 def test_a_task_beyond_its_limit_is_overdue(monkeypatch):
     clock = iter([0.0, 0.0, 60.0, 60.1])
     standing = SimpleNamespace(monotonic=lambda: next(clock))
-    monkeypatch.setattr("service.workers.in_hand.time", standing)
-    in_hand = InHand(limits_s={"estimate": 60.0})
-    with in_hand.task("train", "a"), in_hand.task("estimate", "corner"):
-        assert in_hand.overdue() is None
-        assert in_hand.overdue().about == ("corner",)
-        assert in_hand.of_kind("train") == 1
+    monkeypatch.setattr("service.workers.running_jobs.time", standing)
+    running = RunningJobs(limits_s={"estimate": 60.0})
+    with running.job("train", "a"), running.job("estimate", "corner"):
+        assert running.overdue() is None
+        assert running.overdue().about == ("corner",)
+        assert running.of_kind("train") == 1
     monkeypatch.undo()
-    assert in_hand.overdue() is None
+    assert running.overdue() is None

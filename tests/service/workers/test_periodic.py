@@ -5,10 +5,9 @@ import threading
 import pytest
 
 from service.workers.context import JobContext
-from service.workers.in_hand import UPKEEP, InHand
-from service.workers.upkeep import rounds
-from service.workers.upkeep.limits import BITE, Limit
-from service.workers.upkeep.retention import run_retention
+from service.workers.running_jobs import UPKEEP, RunningJobs
+from service.workers.upkeep import periodic
+from service.workers.upkeep.retention import BITE, Limit, run_retention
 from tests.service.bench import Bench
 
 
@@ -18,7 +17,7 @@ def context(bench: Bench) -> JobContext:
         settings=bench.settings,
         store=bench.store,
         queue=bench.queue,
-        in_hand=InHand(limits_s={UPKEEP: 60.0}),
+        running=RunningJobs(limits_s={UPKEEP: 60.0}),
     )
 
 
@@ -31,17 +30,17 @@ def test_sweeps_go_on_while_the_hourly_work_takes_long(
         begun.set()
         context.stopping.wait(30)
 
-    monkeypatch.setattr(rounds, "_FIRST_HOURLY_S", 0.0)
-    monkeypatch.setattr(rounds, "run_retention", retain)
-    monkeypatch.setattr(rounds, "run_sweep", lambda _: swept.release())
-    rounds.start_rounds(context)
+    monkeypatch.setattr(periodic, "_FIRST_HOURLY_S", 0.0)
+    monkeypatch.setattr(periodic, "run_retention", retain)
+    monkeypatch.setattr(periodic, "run_sweep", lambda _: swept.release())
+    periodic.start_periodic_work(context)
     try:
         assert begun.wait(20)
         while swept.acquire(blocking=False):
             pass  # those before it began
         assert swept.acquire(timeout=20), "no sweep while the retention goes on"
         assert swept.acquire(timeout=20)
-        assert not context.in_hand.overdue()
+        assert not context.running.overdue()
     finally:
         context.stopping.set()
 
@@ -53,15 +52,15 @@ def test_each_bite_of_the_retention_has_the_limit_to_itself(
     seen: list[int] = []
 
     def bite(_: object) -> int:
-        task = next(iter(context.in_hand._tasks.values()))
+        task = next(iter(context.running._jobs.values()))
         assert (task.kind, task.about) == (UPKEEP, ("much",))
         seen.append(id(task))
         return BITE if len(seen) < 3 else 0
 
     monkeypatch.setattr(
-        "service.workers.upkeep.limits.limits_of_all",
+        "service.workers.upkeep.retention.limits_of_all",
         lambda _: [Limit(name="much", bite=bite)],
     )
     run_retention(context)
     assert len(seen) == 3
-    assert not context.in_hand.of_kind(UPKEEP)
+    assert not context.running.of_kind(UPKEEP)

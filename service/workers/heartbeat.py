@@ -18,7 +18,7 @@ log = logging.getLogger("surefoot.worker")
 BEAT_S = 2.0
 
 
-def start_pulse(context: JobContext, *, tells: bool) -> None:
+def start_heartbeat(context: JobContext, *, tells: bool) -> None:
     """Beat until the process ends; to stdout if `serve` listens there."""
     threading.Thread(target=_beat, args=(context, tells), name="pulse", daemon=True).start()
 
@@ -26,9 +26,9 @@ def start_pulse(context: JobContext, *, tells: bool) -> None:
 def _beat(context: JobContext, tells: bool) -> None:
     wait = threading.Event()
     while True:
-        task = context.in_hand.overdue()
+        task = context.running.overdue()
         if task is not None:
-            limit_s = context.in_hand.limits_s[task.kind]
+            limit_s = context.running.limits_s[task.kind]
             fields = {"job": task.kind, "arguments": task.about, "limit_s": limit_s}
             log.error("job_hangs", extra=fields)
             logging.shutdown()

@@ -1,25 +1,25 @@
-"""When flow maps may grow in this worker: not soon after a failure, nor at estimates' expense."""
+"""Limits on the growth of flow maps: not soon after a failure, nor at estimates' expense."""
 
 import time
 
+from models.durations import HOUR_S
 from service.reasons import Reasons
 
-_REST_S = 3600.0
 _SHARE = 0.1  # of a worker's time, where estimates wait for it
 
 
-class GrowthRests:
-    """Which cameras' maps rest, until when, and why."""
+class GrowthCooldown:
+    """Cameras whose maps do not grow for a while, and why."""
 
     def __init__(self) -> None:
         self._rests: dict[str, tuple[float, Reasons]] = {}
 
     def begin(self, camera_id: str, why: Reasons) -> None:
         """Leave a camera's map as it is for an hour."""
-        self._rests[camera_id] = (time.monotonic() + _REST_S, why)
+        self._rests[camera_id] = (time.monotonic() + HOUR_S, why)
 
-    def lacks_of(self, camera_id: str) -> Reasons:
-        """Why a camera's map rests; nothing where it does not."""
+    def failures_of(self, camera_id: str) -> Reasons:
+        """The failures for which a camera's map cools down; none where it does not."""
         until_s, why = self._rests.get(camera_id, (0.0, ()))
         if time.monotonic() < until_s:
             return why
@@ -27,8 +27,8 @@ class GrowthRests:
         return ()
 
 
-class GrowthTurns:
-    """How much of its time a worker has spent on growth: of hundreds of maps some are always due.
+class GrowthBudget:
+    """The time that a worker may spend on growth: of hundreds of maps some are always due.
 
     Where estimates wait, no more than a tenth of it: a map that grows an hour later is no worse.
     """
@@ -38,7 +38,7 @@ class GrowthTurns:
 
     @property
     def spent(self) -> bool:
-        """Whether so much of the time was spent that estimates go first."""
+        """True where so much of the time was spent that estimates go first."""
         return time.monotonic() < self._free_s
 
     def spend(self, seconds: float) -> None:

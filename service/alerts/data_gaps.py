@@ -1,4 +1,4 @@
-"""Whether people still come before a camera: how long it has been silent, and if that is usual."""
+"""Data gaps: how long a camera has been silent, and whether that is usual."""
 
 import math
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.durations import HOUR_S
 from models.monitoring.arrivals import (
     SilenceRule,
     SilenceVerdict,
@@ -15,18 +16,17 @@ from models.monitoring.arrivals import (
 )
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, open_alert
-from service.alerts.arrival_rates import CameraRhythm, cells_of, rhythm_of
+from service.alerts.arrival_models import ArrivalModel, arrival_model_of, cells_of
 from service.enums import AlertKind, AlertSource, Outcome, Severity
 from service.reasons import Reasons, ServiceCode
+from service.references import attendance_of
 from service.settings import Settings
 from service.store import alerts, tracks
-from service.windows.attendance import attendance_of
 
-_HOUR_S = 3600.0
-_LOOK_BACK_S = 3 * _HOUR_S  # the level of the day is told by these hours before a silence
-_LONGEST_S = 28 * 24 * _HOUR_S
+_LOOK_BACK_S = 3 * HOUR_S  # the level of the day is told by these hours before a silence
+_LONGEST_S = 28 * 24 * HOUR_S
 _GAPS = 3.0  # so many usual gaps in a row are no usual one
-_STATE_BY_S = 6 * _HOUR_S  # a pose that nobody has confirmed for longer is not ok, however quiet
+_STATE_BY_S = 6 * HOUR_S  # a pose that nobody has confirmed for longer is not ok, however quiet
 _SEVERITIES = {
     SilenceVerdict.USUAL: None,
     SilenceVerdict.IMPROBABLE: Severity.WARNING,
@@ -35,8 +35,8 @@ _SEVERITIES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Silence:
-    """How long a camera has been silent, whether that is `no_data`, and why.
+class DataGap:
+    """The time since a camera's newest track, whether that is `no_data`, and why.
 
     `severity` is that of the alert that it deserves; None where silence is usual by now.
     """
@@ -47,33 +47,33 @@ class Silence:
     severity: Severity | None
 
 
-def silence_of(
+def data_gap_of(
     session: Session, settings: Settings, camera_id: str, now: datetime
-) -> Silence | None:
+) -> DataGap | None:
     """The silence of a camera; None where it has never seen anybody, or just has."""
     last_s = tracks.newest_end_s(session, camera_id)
     if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
         return None
-    known = rhythm_of(session, camera_id)
+    known = arrival_model_of(session, camera_id)
     if known is None:
         return _by_the_limit(session, settings, camera_id, last_s, now)
-    return _by_rhythm(session, settings, camera_id, known, last_s, now)
+    return _by_arrivals(session, settings, camera_id, known, last_s, now)
 
 
 def is_no_data(
-    settings: Settings, known: CameraRhythm | None, last_s: float | None, now: datetime
+    settings: Settings, known: ArrivalModel | None, last_s: float | None, now: datetime
 ) -> bool:
-    """Whether a camera whose newest track ended then has been silent for too long to be ok."""
+    """True where a camera whose newest track ended then has been silent for too long to be ok."""
     if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
         return False
-    limit_s = settings.no_data_after_h * _HOUR_S
+    limit_s = settings.no_data_after_h * HOUR_S
     if known is None:
         return now.timestamp() - last_s > limit_s
     gap_s = max(_GAPS * known.rhythm.usual_gap_s, settings.no_data_min_s)
     return now.timestamp() - known.delay_s - last_s > min(gap_s, _STATE_BY_S, limit_s)
 
 
-def watch_presence(
+def watch_data_gap(
     session: Session, settings: Settings, camera_id: str, now: datetime
 ) -> str | None:
     """Open or end the alert about a silent camera; says what it did."""
@@ -85,7 +85,7 @@ def watch_presence(
                 session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note="tracks come again"
             )
             return "tracks come again"
-    silence = silence_of(session, settings, camera_id, now)
+    silence = data_gap_of(session, settings, camera_id, now)
     if silence is None or silence.severity is None:
         return None
     if firing is not None and silence.severity in (firing.severity, Severity.WARNING):
@@ -106,16 +106,16 @@ def watch_presence(
 
 def _by_the_limit(
     session: Session, settings: Settings, camera_id: str, last_s: float, now: datetime
-) -> Silence:
+) -> DataGap:
     """By the fixed limit alone: too little is known of the camera."""
-    limit_s = settings.no_data_after_h * _HOUR_S
+    limit_s = settings.no_data_after_h * HOUR_S
     silent_s = now.timestamp() - last_s
     severity = None
     if silent_s > limit_s:  # at night, hundreds of cameras need no closer look
         # What was recorded long ago and posted just now is old, but not a camera that fell silent.
         begun_s = max(_received_s(session, camera_id), _answered_s(session, camera_id, now))
         severity = Severity.WARNING if now.timestamp() - begun_s > limit_s else None
-    return Silence(
+    return DataGap(
         last_s=last_s,
         no_data=is_no_data(settings, None, last_s, now),
         reasons=(
@@ -128,18 +128,18 @@ def _by_the_limit(
     )
 
 
-def _by_rhythm(
+def _by_arrivals(
     session: Session,
     settings: Settings,
     camera_id: str,
-    known: CameraRhythm,
+    known: ArrivalModel,
     last_s: float,
     now: datetime,
-) -> Silence:
+) -> DataGap:
     now_s, rhythm = now.timestamp(), known.rhythm
     # Tracks of later may be on their way.
     until_s = now_s - known.delay_s
-    limit_s = settings.no_data_after_h * _HOUR_S
+    limit_s = settings.no_data_after_h * HOUR_S
     from_s = max(last_s, until_s - _LONGEST_S)
     missed, verdict = _expected(settings, known, from_s, until_s), SilenceVerdict.USUAL
     if is_missed(rhythm, missed):  # as above
@@ -162,7 +162,7 @@ def _by_rhythm(
         code, values["missed_tracks"] = ServiceCode.SILENT_UNUSUAL, missed
     if known.delay_s > settings.no_data_min_s:
         values["late_s"] = known.delay_s
-    return Silence(
+    return DataGap(
         last_s=last_s,
         no_data=is_no_data(settings, known, last_s, now),
         reasons=(Reason(code=code, values=values),),
@@ -170,15 +170,15 @@ def _by_rhythm(
     )
 
 
-def _expected(settings: Settings, known: CameraRhythm, from_s: float, to_s: float) -> float:
-    first = math.floor(from_s / _HOUR_S)
-    hours = max(math.floor(to_s / _HOUR_S) - first + 1, 0)
+def _expected(settings: Settings, known: ArrivalModel, from_s: float, to_s: float) -> float:
+    first = math.floor(from_s / HOUR_S)
+    hours = max(math.floor(to_s / HOUR_S) - first + 1, 0)
     cells = cells_of(first, hours, settings.zone)
     return expected_tracks(known.rhythm, cells, first, from_s, to_s)
 
 
 def _answered_s(session: Session, camera_id: str, now: datetime) -> float:
-    """Until when a silence has been explained: by maintenance, or by who ended its alert."""
+    """The time until which a silence is explained: by maintenance, or by who ended its alert."""
     attended_s = attendance_of(session, camera_id, now).judged_from_s or 0.0
     last = alerts.newest(session, camera_id, AlertKind.NO_DATA)
     if last is None or last.resolved_at is None:

@@ -1,7 +1,8 @@
-"""How much memory a process holds, and keeping its allocator from holding what is free."""
+"""Memory and processor time of a process: freed memory goes back, jobs yield."""
 
 import ctypes
 import logging
+import os
 from pathlib import Path
 
 log = logging.getLogger("surefoot.worker")
@@ -41,3 +42,14 @@ def resident_mb() -> float:
     except (OSError, IndexError, ValueError):
         return 0.0
     return pages * _PAGE_MB
+
+
+log = logging.getLogger("surefoot.worker")
+
+
+def yield_to_others(nice: int) -> None:
+    """Set this process's niceness, where the system lets it; who started it may be nicer."""
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, nice)
+    except OSError as error:
+        log.info("niceness_kept", extra={"wanted": nice, "why": str(error)})

@@ -1,25 +1,25 @@
 """Turns that go round."""
 
 from service.alerts.staleness import StaleWatch
-from service.workers.rota import Rota
+from service.workers.context import RoundRobin
 from service.workers.upkeep import reconciliation
-from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.reconciliation import run_reconcile
 from tests.conftest import CAMERA
 
 
 def test_all_have_their_turns_though_some_come_and_go():
-    rota = Rota()
-    assert rota.take(["a", "b", "c", "d", "e"], 2) == ["a", "b"]
-    assert rota.take(["a", "b", "c", "d", "e"], 2) == ["c", "d"]
-    assert rota.take(["a", "b", "c", "e"], 2) == ["e", "a"]  # d is gone
-    assert rota.take(["a", "aa", "b", "c", "e"], 2) == ["aa", "b"]  # aa is new
+    turns = RoundRobin()
+    assert turns.take(["a", "b", "c", "d", "e"], 2) == ["a", "b"]
+    assert turns.take(["a", "b", "c", "d", "e"], 2) == ["c", "d"]
+    assert turns.take(["a", "b", "c", "e"], 2) == ["e", "a"]  # d is gone
+    assert turns.take(["a", "aa", "b", "c", "e"], 2) == ["aa", "b"]  # aa is new
 
 
 def test_where_they_are_few_each_round_is_of_all_of_them_once():
-    rota = Rota()
-    assert rota.take(["a", "b"], 5) == ["a", "b"]
-    assert rota.take(["a", "b"], 5) == ["a", "b"]
-    assert rota.take([], 5) == []
+    turns = RoundRobin()
+    assert turns.take(["a", "b"], 5) == ["a", "b"]
+    assert turns.take(["a", "b"], 5) == ["a", "b"]
+    assert turns.take([], 5) == []
 
 
 def test_of_many_cameras_ten_are_reconciled_a_second(post_room, monkeypatch):
