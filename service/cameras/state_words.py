@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from service.alerts.data_gaps import data_gap_of
 from service.cameras.standing import Standing
 from service.enums import PoseState

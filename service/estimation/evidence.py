@@ -12,7 +12,7 @@ from models.geometry.pose import CameraPose
 from models.monitoring.verdict import DriftLimits
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from service.alerts.alerts import fired_by_estimate
 from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of

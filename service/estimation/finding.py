@@ -30,8 +30,8 @@ from models.regression.averaging import (
     TrackPredictions,
     averaged_estimate,
 )
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate
-from models.walking.reference.assumed import FEWEST_WALKERS
 from models.walking.serialization import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, KeptPose, SeenTrack

@@ -127,7 +127,7 @@ def save_reference(
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
-    record.doubts = some(site.doubt)
+    record.doubts = some(site.implausible)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
     note(session, Activity.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
@@ -143,15 +143,15 @@ def save_reference(
         )
     )
     keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
-    if site.doubt is not None:
+    if site.implausible is not None:
         open_alert(
             session,
             settings,
             camera_id,
-            _DOUBT_KINDS[site.doubt.code],
+            _DOUBT_KINDS[site.implausible.code],
             Severity.WARNING,
             drift={},
             changed_at=None,
-            reasons=(site.doubt,),
+            reasons=(site.implausible,),
             source=AlertSource.REFERENCE,
         )

@@ -139,7 +139,7 @@ class Life:
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
                     values = {"tilt_rad": 0.1, "roll_rad": 0.0}
                     doubt = Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
-                    doubted = replace(some_site(), doubt=doubt)
+                    doubted = replace(some_site(), implausible=doubt)
                     learned = LearnedReference(site=doubted, paths=None)
                 save_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:

@@ -11,10 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.geometry.rotation import Array
-
-_ASSUMED_WEIGHT = 6.0  # held-out ratios that the guess before any are seen counts for
-_LARGEST_RATIO = 9.0
-_FOLDS = 4
+from models.walking.config import ASSUMED_INFLATION_WEIGHT, INFLATION_FOLDS, LARGEST_RATIO
 
 Tracks = npt.NDArray[np.int64]
 
@@ -33,14 +30,14 @@ def variance_inflation(
         assumed: the ratio before any are seen.
     """
     ratios = []
-    for fold in range(_FOLDS):
+    for fold in range(INFLATION_FOLDS):
         odd = np.arange(tracks.size) * 2 ** (fold + 1) // tracks.size % 2 == 1
         parts = (tracks[~odd], tracks[odd])
         for train, test in (parts, parts[::-1]):
             if min(train.size, test.size) >= 2:
-                ratios.append(min(error_ratio(train, test), _LARGEST_RATIO))
-    guess = assumed * _ASSUMED_WEIGHT
-    return max(1.0, (sum(ratios) + guess) / (len(ratios) + _ASSUMED_WEIGHT))
+                ratios.append(min(error_ratio(train, test), LARGEST_RATIO))
+    guess = assumed * ASSUMED_INFLATION_WEIGHT
+    return max(1.0, (sum(ratios) + guess) / (len(ratios) + ASSUMED_INFLATION_WEIGHT))
 
 
 def squared_ratio(error: Array, covariance: Array) -> float:

@@ -6,17 +6,18 @@ from numpy.testing import assert_allclose
 
 from models.geometry.rotation import Array
 from models.tracks.observations import Rows
-from models.walking.mixed_model import (
-    Spread,
+from models.walking.mixed.model import (
+    VarianceComponents,
     Weights,
     composite_log_likelihoods,
     curvature,
-    relearn,
+    em_step,
     reweigh,
     track_curvatures,
 )
+from tests.models.walking.given import Given
 
-SPREAD = Spread(
+COMPONENTS = VarianceComponents(
     between_sd=0.2,
     trend_sd=0.1,
     within_sd=0.1,
@@ -42,8 +43,8 @@ def even_weights(rows: Rows) -> Weights:
         row=np.ones(len(rows)),
         track=np.ones(rows.owners),
         inlier=np.ones(len(rows)),
-        own=np.zeros((rows.owners, 2)),
-        own_covariance=np.zeros((rows.owners, 2, 2)),
+        effects=np.zeros((rows.owners, 2)),
+        effect_covariance=np.zeros((rows.owners, 2, 2)),
     )
 
 
@@ -54,8 +55,8 @@ def covariance_of(rows: Rows, owner: int) -> Array:
     """
     when = rows.when[rows.owner_idx == owner]
     apart = np.abs(np.arange(when.size)[:, None] - np.arange(when.size))
-    deviations = SPREAD.within_sd**2 * SPREAD.correlation**apart
-    return SPREAD.between_sd**2 + SPREAD.trend_sd**2 * np.outer(when, when) + deviations
+    deviations = COMPONENTS.within_sd**2 * COMPONENTS.correlation**apart
+    return COMPONENTS.between_sd**2 + COMPONENTS.trend_sd**2 * np.outer(when, when) + deviations
 
 
 def test_curvature_is_that_of_the_covariance_written_out():
@@ -70,10 +71,10 @@ def test_curvature_is_that_of_the_covariance_written_out():
         )
         matrix += jacobian[own].T @ solved[:, :4]
         gradient += jacobian[own].T @ solved[:, 4]
-    said = curvature(jacobian, residual, even_weights(rows), rows, SPREAD)
+    said = curvature(jacobian, residual, even_weights(rows), rows, COMPONENTS)
     assert_allclose(said.matrix, matrix, rtol=1e-9)
     assert_allclose(said.gradient, gradient, rtol=1e-9)
-    each = track_curvatures(jacobian, residual, even_weights(rows), rows, SPREAD)
+    each = track_curvatures(jacobian, residual, even_weights(rows), rows, COMPONENTS)
     assert_allclose(each.matrix.sum(axis=0), matrix, rtol=1e-9)
     assert_allclose(each.gradient.sum(axis=0), gradient, rtol=1e-9)
 
@@ -83,20 +84,22 @@ def test_someone_who_stands_counts_for_nothing_whatever_noise_makes_of_it():
     value = np.concatenate([np.full(10, 0.3), np.full(10, -2.5)])
     value[14] = 0.0  # one step of the standing one looks like a walk
     residual = value - 0.3
-    weights = reweigh(residual, value, np.ones(20, dtype=bool), rows, SPREAD)
+    weights = reweigh(residual, Given(value, np.ones(20, dtype=bool), rows), COMPONENTS)
     assert weights.inlier[:10].min() > 0.99
     assert weights.inlier[[*range(10, 14), *range(15, 20)]].max() < 0.001
     one = slice(14, 15)
-    alone = reweigh(residual[one], value[one], np.ones(1, dtype=bool), rows_of([1]), SPREAD)
+    alone = reweigh(
+        residual[one], Given(value[one], np.ones(1, dtype=bool), rows_of([1])), COMPONENTS
+    )
     assert 1 - weights.inlier[14] > 4 * (1 - alone.inlier[0])
 
 
 def test_a_runner_weighs_less_than_a_walker():
     rows = rows_of([8, 8])
     residual = np.concatenate([np.full(8, 0.1), np.full(8, 0.9)])
-    weights = reweigh(residual, residual + 0.3, np.ones(16, dtype=bool), rows, SPREAD)
+    weights = reweigh(residual, Given(residual + 0.3, np.ones(16, dtype=bool), rows), COMPONENTS)
     assert weights.track[1] < 0.4 * weights.track[0]
-    assert_allclose(weights.own[:, 0], [0.1, 0.9], atol=0.05)
+    assert_allclose(weights.effects[:, 0], [0.1, 0.9], atol=0.05)
 
 
 def test_the_spread_of_a_simulated_crowd_is_learned():
@@ -113,25 +116,25 @@ def test_the_spread_of_a_simulated_crowd_is_learned():
     value = residual + 0.3
     value[standing[rows.owner_idx]] = rng.normal(-2.5, 0.5, int(standing.sum()) * 12)
     residual = value - 0.3
-    spread, valid = SPREAD, np.ones(len(rows), dtype=bool)
+    components, valid = COMPONENTS, np.ones(len(rows), dtype=bool)
     for _ in range(12):
-        weights = reweigh(residual, value, valid, rows, spread)
-        spread = relearn(residual, value, valid, rows, weights, spread)
+        weights = reweigh(residual, Given(value, valid, rows), components)
+        components = em_step(residual, Given(value, valid, rows), weights, components)
     # Student-t of 4 degrees of freedom stands for a normal with about 0.84 of its deviation.
-    assert spread.between_sd == pytest.approx(0.84 * 0.2, rel=0.15)
-    assert spread.within_sd == pytest.approx(0.84 * 0.08, rel=0.15)
-    assert spread.outlier_share == pytest.approx(0.15, abs=0.03)
-    assert spread.outlier_mean == pytest.approx(-2.5, abs=0.15)
+    assert components.between_sd == pytest.approx(0.84 * 0.2, rel=0.15)
+    assert components.within_sd == pytest.approx(0.84 * 0.08, rel=0.15)
+    assert components.outlier_share == pytest.approx(0.15, abs=0.03)
+    assert components.outlier_mean == pytest.approx(-2.5, abs=0.15)
 
 
 def test_a_long_track_does_not_outvote_short_ones():
     rows = rows_of([40, 4])
     residual = np.full(44, 0.1)
     long, short = composite_log_likelihoods(
-        residual, residual, np.ones(44, dtype=bool), rows, SPREAD
+        residual, Given(residual, np.ones(44, dtype=bool), rows), COMPONENTS
     )
     assert long == pytest.approx(short)
     above = np.concatenate([np.zeros(40, dtype=bool), np.ones(4, dtype=bool)])
-    assert composite_log_likelihoods(residual, residual, above, rows, SPREAD)[0] == pytest.approx(
-        -32.0
-    )
+    assert composite_log_likelihoods(residual, Given(residual, above, rows), COMPONENTS)[
+        0
+    ] == pytest.approx(-32.0)

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from models.pose import estimate_pose, learn_site, observe
 from models.quantiles import Z90
 from models.simulation.pose_offset import Knock, knock_trajectory
-from models.tracks.head_foot import observe_uprights
+from models.tracks.head_foot import observe_heads
 from models.tracks.trajectory import by_end
-from models.walking.heads.estimate import VerticalEstimate, joined, vertical_estimate
-from models.walking.heads.reference import learn_verticals
+from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
+from models.walking.heads.reference import learn_heads
 from models.walking.serialization import reference_from_bytes, reference_to_bytes
 from studies.simulation.heads import HeadConfig, with_box_heads, with_heads
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
@@ -24,11 +24,11 @@ LEANING = HeadConfig(forward_rad=math.radians(3), bias_rad=math.radians(1.5))
 
 
 def headed(seed, *views, config=LEANING):
-    """Uprights of simulated people, as many as each pose sees."""
+    """HeadFootPairs of simulated people, as many as each pose sees."""
     rng = np.random.default_rng(seed)
     found = tracks_of(seed, *views, boxes=True)
     return [
-        observe_uprights(with_heads(tracks, LENS, pose, config, rng), LENS)
+        observe_heads(with_heads(tracks, LENS, pose, config, rng), LENS)
         for tracks, (pose, _) in zip(found, views, strict=True)
     ]
 
@@ -36,7 +36,7 @@ def headed(seed, *views, config=LEANING):
 def columns(seed, *views):
     """The same with heads right above the feet in the picture."""
     found = tracks_of(seed, *views, boxes=True)
-    return [observe_uprights(with_box_heads(tracks), LENS) for tracks in found]
+    return [observe_heads(with_box_heads(tracks), LENS) for tracks in found]
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def seen():
 
 @pytest.fixture(scope="module")
 def reference(seen):
-    return learn_verticals(seen[0], AT)
+    return learn_heads(seen[0], AT)
 
 
 def test_a_reference_knows_how_people_and_their_detector_lean(reference):
@@ -55,7 +55,7 @@ def test_a_reference_knows_how_people_and_their_detector_lean(reference):
     bias, forward = np.degrees(reference.habit.mean)
     assert bias == pytest.approx(1.5, abs=0.4)
     assert forward == pytest.approx(3.0, abs=0.6)
-    assert np.degrees(reference.spread.between_sd) == pytest.approx(1.0, abs=0.4)
+    assert np.degrees(reference.components.between_sd) == pytest.approx(1.0, abs=0.4)
     assert 1 <= reference.variance_inflation < 3
     assert reference.tracks == pytest.approx(120, abs=3)
 
@@ -63,7 +63,7 @@ def test_a_reference_knows_how_people_and_their_detector_lean(reference):
 def test_upright_people_without_noise_tell_the_pose_itself():
     ideal = HeadConfig(jitter=0.0, person_sd_rad=0.0)
     known, after = headed(2, (PRIOR, 40), (KNOCKED, 20), config=ideal)
-    found = vertical_estimate(after, learn_verticals(known, AT))
+    found = head_estimate(after, learn_heads(known, AT))
     assert_allclose(np.degrees(found.values), np.degrees(MOVED), atol=0.02)
 
 
@@ -71,7 +71,7 @@ def test_knocks_are_told_and_intervals_cover_them():
     errors = []
     for seed in range(5):
         known, after = headed(seed, (PRIOR, 100), (KNOCKED, 50))
-        found = vertical_estimate(after, learn_verticals(known, AT))
+        found = head_estimate(after, learn_heads(known, AT))
         assert found.identifiable
         errors.append((found.values - MOVED) / np.sqrt(np.diag(found.covariance)))
         assert np.abs(np.degrees(found.values - MOVED)).max() < 1.2
@@ -80,43 +80,43 @@ def test_knocks_are_told_and_intervals_cover_them():
 
 def test_heads_right_above_feet_are_noticed_and_not_used():
     known, after = columns(3, (PRIOR, 120), (KNOCKED, 40))
-    reference = learn_verticals(known, AT)
+    reference = learn_heads(known, AT)
     assert reference.column_share == pytest.approx(1.0, abs=0.05)
     assert not reference.leaning
-    assert vertical_estimate(after, reference) is None
+    assert head_estimate(after, reference) is None
 
 
 def test_a_tracker_that_begins_to_make_its_heads_up_is_noticed_in_the_window(reference):
     (after,) = columns(1, (KNOCKED, 60))
-    found = vertical_estimate(after, reference)
+    found = head_estimate(after, reference)
     assert not found.identifiable
     assert found.column_share > 0.4 or found.values[0] < math.radians(3)
 
 
 def test_few_heads_tell_nothing(reference, seen):
-    assert learn_verticals(seen[0].of_tracks(np.arange(11)), AT) is None
-    assert learn_verticals(None, AT) is None
-    assert vertical_estimate(seen[1].of_tracks(np.arange(4)), reference) is None
-    assert vertical_estimate(None, reference) is None
-    assert vertical_estimate(seen[1], None) is None
+    assert learn_heads(seen[0].of_tracks(np.arange(11)), AT) is None
+    assert learn_heads(None, AT) is None
+    assert head_estimate(seen[1].of_tracks(np.arange(4)), reference) is None
+    assert head_estimate(None, reference) is None
+    assert head_estimate(seen[1], None) is None
 
 
 def test_what_was_learned_is_stored_with_the_site_and_sites_without_it_are_read(reference):
     known = [replace(track, top_v=None) for track in tracks_of(4, (PRIOR, 60))[0]]
     site = learn_site(observe(by_end(known), LENS, PRIOR), LENS, PRIOR, chart=False)
     bare = site.speed_reference
-    assert bare.verticals is None
-    assert reference_from_bytes(reference_to_bytes(bare)).verticals is None
-    read = reference_from_bytes(reference_to_bytes(replace(bare, verticals=reference))).verticals
+    assert bare.heads is None
+    assert reference_from_bytes(reference_to_bytes(bare)).heads is None
+    read = reference_from_bytes(reference_to_bytes(replace(bare, heads=reference))).heads
     assert_allclose(read.habit.mean, reference.habit.mean)
     assert read.leaning == reference.leaning
-    assert reference_to_bytes(replace(bare, verticals=read)) == reference_to_bytes(
-        replace(bare, verticals=reference)
+    assert reference_to_bytes(replace(bare, heads=read)) == reference_to_bytes(
+        replace(bare, heads=reference)
     )
 
 
 def told(values_deg, sd_deg):
-    return VerticalEstimate(
+    return HeadEstimate(
         values=np.radians(values_deg),
         covariance=np.diag(np.radians(sd_deg) ** 2),
         column_share=0.0,
@@ -154,9 +154,9 @@ def test_the_served_pose_wins_by_heads_and_loses_nothing_by_made_up_ones():
     feet = served(lambda tracks, pose: tracks)
     heads = served(lambda tracks, pose: with_heads(tracks, LENS, pose, LEANING, rng))
     made_up = served(lambda tracks, pose: with_box_heads(tracks))
-    assert feet.joint.verticals is made_up.joint.verticals is None
+    assert feet.joint.heads is made_up.joint.heads is None
     assert_allclose(made_up.fused.values, feet.fused.values)
-    assert heads.joint.verticals is not None
+    assert heads.joint.heads is not None
     assert np.abs(np.degrees(heads.fused.values[:2] - MOVED)).max() < 0.6
     # Of strangers only their uprightness is believed.
     values, covariance = heads.joint.beside_strangers()

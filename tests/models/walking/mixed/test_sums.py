@@ -7,8 +7,8 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from models.tracks.observations import Rows
-from models.walking.mixed_model import Weights, curvature, track_curvatures
-from tests.models.walking.loops.test_weights import SPREAD
+from models.walking.mixed.model import Weights, curvature, track_curvatures
+from tests.models.walking.mixed.test_weights import COMPONENTS
 
 OWNER_IDX = np.repeat([0, 1, 3], [5, 1, 8])
 LINKED = np.array([0, 1, 1, 1, 1, 0, 0, 1, 1, 0, 1, 1, 1, 1], dtype=bool)
@@ -24,8 +24,8 @@ WEIGHTS = Weights(
     row=RNG.uniform(0.1, 1.2, 14),
     track=RNG.uniform(0.3, 1.2, 4),
     inlier=np.ones(14),
-    own=np.zeros((4, 2)),
-    own_covariance=np.zeros((4, 2, 2)),
+    effects=np.zeros((4, 2)),
+    effect_covariance=np.zeros((4, 2, 2)),
 )
 JACOBIAN, RESIDUAL = RNG.normal(size=(14, 3)), RNG.normal(size=14)
 
@@ -36,12 +36,12 @@ def covariance_of(owner):
     run = np.cumsum(~LINKED)[here]
     order = np.arange(run.size)
     lag = np.abs(order[:, None] - order)
-    together = np.where(run[:, None] == run, SPREAD.correlation**lag, 0.0)
+    together = np.where(run[:, None] == run, COMPONENTS.correlation**lag, 0.0)
     root = np.sqrt(WEIGHTS.row[here])
-    deviation = SPREAD.within_sd**2 * together / np.outer(root, root)
+    deviation = COMPONENTS.within_sd**2 * together / np.outer(root, root)
     when = ROWS.when[here]
-    level = SPREAD.between_sd**2 / WEIGHTS.track[owner]
-    return deviation + level + SPREAD.trend_sd**2 * np.outer(when, when)
+    level = COMPONENTS.between_sd**2 / WEIGHTS.track[owner]
+    return deviation + level + COMPONENTS.trend_sd**2 * np.outer(when, when)
 
 
 def misfit(move, owner):
@@ -51,8 +51,8 @@ def misfit(move, owner):
 
 
 def test_the_sums_are_slopes_and_bends_of_the_likelihood():
-    total = curvature(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, SPREAD)
-    each = track_curvatures(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, SPREAD)
+    total = curvature(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, COMPONENTS)
+    each = track_curvatures(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, COMPONENTS)
     for owner in (0, 1, 3):
         jacobian = JACOBIAN[owner == OWNER_IDX]
         bend = jacobian.T @ np.linalg.solve(covariance_of(owner), jacobian)
@@ -66,17 +66,17 @@ def test_the_sums_are_slopes_and_bends_of_the_likelihood():
 
 
 def test_a_track_without_rows_or_of_rows_without_weight_says_nothing():
-    each = track_curvatures(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, SPREAD)
+    each = track_curvatures(JACOBIAN, RESIDUAL, WEIGHTS, ROWS, COMPONENTS)
     assert_allclose(each.matrix[2], 0)
     assert_allclose(each.gradient[2], 0)
     still = Weights(
         row=np.where(OWNER_IDX == 3, 0.0, WEIGHTS.row),
         track=WEIGHTS.track,
         inlier=WEIGHTS.inlier,
-        own=WEIGHTS.own,
-        own_covariance=WEIGHTS.own_covariance,
+        effects=WEIGHTS.effects,
+        effect_covariance=WEIGHTS.effect_covariance,
     )
-    total = curvature(JACOBIAN, RESIDUAL, still, ROWS, SPREAD)
+    total = curvature(JACOBIAN, RESIDUAL, still, ROWS, COMPONENTS)
     assert_allclose(total.matrix, each.matrix[:2].sum(axis=0), rtol=1e-10)
     assert_allclose(total.gradient, each.gradient[:2].sum(axis=0), rtol=1e-10)
 
@@ -93,10 +93,10 @@ def test_no_rows_are_no_sums():
         row=np.empty(0),
         track=np.ones(2),
         inlier=np.empty(0),
-        own=np.zeros((2, 2)),
-        own_covariance=np.zeros((2, 2, 2)),
+        effects=np.zeros((2, 2)),
+        effect_covariance=np.zeros((2, 2, 2)),
     )
-    total = curvature(np.empty((0, 3)), np.empty(0), weights, rows, SPREAD)
+    total = curvature(np.empty((0, 3)), np.empty(0), weights, rows, COMPONENTS)
     assert_allclose(total.matrix, np.zeros((3, 3)))
-    each = track_curvatures(np.empty((0, 3)), np.empty(0), weights, rows, SPREAD)
+    each = track_curvatures(np.empty((0, 3)), np.empty(0), weights, rows, COMPONENTS)
     assert_allclose(each.gradient, np.zeros((2, 3)))

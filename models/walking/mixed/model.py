@@ -1,11 +1,11 @@
 """A robust linear mixed model of logarithms, fitted by iterated re-weighting (IRLS) and EM.
 
 Row j of track i, at a time w after the track's middle, is y_ij = x_ij' beta + a_i + b_i w_ij +
-e_ij: the site's field, the track's own level and trend, and a deviation. a_i is Student-t between
-tracks, b_i Gaussian, e_ij Student-t within a track and a first-order autoregression. Rows that
-belong to something else (standing, sitting, a tracker's mistake) are outliers: a broad Gaussian of
-y itself, of which each track has a share of its own. Given the weights of rows and tracks it is a
-Gaussian mixed model, whose a_i and b_i are integrated out.
+e_ij: the site's field, the track's random level and trend, and a deviation. a_i is Student-t
+between tracks, b_i Gaussian, e_ij Student-t within a track and a first-order autoregression. Rows
+that belong to something else (standing, sitting, a tracker's mistake) are outliers: a broad
+Gaussian of y itself, of which each track has a share of its own. Given the weights of rows and
+tracks it is a Gaussian mixed model, whose a_i and b_i are integrated out.
 
 Source: Laird and Ware 1982 for the mixed model and its EM; Lange, Little and Taylor 1989 for the
 Student-t's weights, (nu + 1) / (nu + u^2), at 4 degrees of freedom; the outliers are the mixture of
@@ -15,32 +15,49 @@ tracks' own shares, and a correlation by moments.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from models.geometry.rotation import Array, Mask
 from models.serialization import stored_as
 from models.tracks.observations import Rows
-from models.walking.loops.sums import moments_of_tracks, whitened
-from models.walking.loops.weights import (
-    FREEDOM,
-    log_likelihoods_apart,
-    weights_of_tracks,
-)
+from models.walking import config
+from models.walking.config import FREEDOM
+from models.walking.mixed.sums import moments_of_tracks, whitened
+from models.walking.mixed.weights import log_likelihoods_apart, weights_of_tracks
 
 # The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
 # average, say 1. Source: Lange, Little and Taylor 1989.
 FISHER = (FREEDOM + 3) / (FREEDOM + 1)
-_MOST_ROUNDS = 40
+
+
+class Values(Protocol):
+    """Measured `value` (M,), which of them are `valid` (M,), and whose `rows` they are."""
+
+    @property
+    def value(self) -> Array: ...  # noqa: D102
+    @property
+    def valid(self) -> Mask: ...  # noqa: D102
+    @property
+    def rows(self) -> Rows: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class Normal:
+    """A normal distribution: mean (P,) and covariance (P, P)."""
+
+    mean: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VarianceComponents:
     """How logarithms scatter at a site.
 
     `between_sd` of the levels of tracks, `trend_sd` of their trends in 10 s, `within_sd` of
-    deviations, `correlation` from one row to the next; the outliers' share, and their mean and
-    spread (of the value, not the residual).
+    deviations, `correlation` from one row to the next; the outliers' share, and the mean and
+    standard deviation of their values, which are no residuals.
     """
 
     between_sd: float
@@ -52,14 +69,10 @@ class Spread:
     outlier_sd: float = stored_as("other_sd")
 
     @property
-    def of_tracks(self) -> tuple[float, float, float, float]:
+    def of_inliers(self) -> tuple[float, float, float, float]:
         """Standard deviations between tracks, of trends, within tracks, and the correlation."""
-        return (
-            float(self.between_sd),
-            float(self.trend_sd),
-            float(self.within_sd),
-            float(self.correlation),
-        )
+        sds = float(self.between_sd), float(self.trend_sd), float(self.within_sd)
+        return *sds, float(self.correlation)
 
     @property
     def of_outliers(self) -> tuple[float, float, float]:
@@ -74,49 +87,39 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What re-weighting found: rows (M,) and tracks (N,).
+    """Weights of rows (M,) and tracks (N,) by re-weighting.
 
-    `inlier` (M,) is the probability of a row to be no outlier; `own` (N, 2) level and trend of
-    each track with their covariance `own_covariance` (N, 2, 2).
+    `inlier` (M,) is the probability of a row to be no outlier; `effects` (N, 2) are the random
+    level and trend of each track with their covariance `effect_covariance` (N, 2, 2).
     """
 
     row: Array
     track: Array
     inlier: Array
-    own: Array
-    own_covariance: Array
+    effects: Array
+    effect_covariance: Array
 
     def deviation(self, residual: Array, rows: Rows) -> Array:
-        """Residuals (M,) without their track's own level and trend."""
-        own = self.own[rows.owner_idx]
-        return np.asarray(residual - own[:, 0] - own[:, 1] * rows.when)
+        """Residuals (M,) without their track's level and trend."""
+        effects = self.effects[rows.owner_idx]
+        return np.asarray(residual - effects[:, 0] - effects[:, 1] * rows.when)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curvature:
     """Half the second and the first derivatives of a misfit: matrix (P, P), gradient (P,).
 
-    The tracks' own levels and trends are integrated out.
+    The tracks' levels and trends are integrated out.
     """
 
     matrix: Array
     gradient: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Normal:
-    """A normal distribution: mean (P,) and covariance (P, P)."""
-
-    mean: Array
-    covariance: Array
-
-
 def regress(
     features: Array,
-    value: Array,
-    valid: Mask,
-    rows: Rows,
-    spread: Spread,
+    values: Values,
+    components: VarianceComponents,
     prior: Normal,
     begin: Array,
     settled: Callable[[Array], bool],
@@ -127,10 +130,10 @@ def regress(
     settled. The covariance is by the weights.
     """
     mean, precision = begin, np.linalg.inv(prior.covariance)
-    for _ in range(_MOST_ROUNDS):
-        residual = value - features @ mean
-        weights = reweigh(residual, value, valid, rows, spread)
-        sums = curvature(-features, residual, weights, rows, spread)
+    for _ in range(config.MOST_ROUNDS):
+        residual = values.value - features @ mean
+        weights = reweigh(residual, values, components)
+        sums = curvature(-features, residual, weights, values.rows, components)
         covariance = np.linalg.inv(sums.matrix + precision)
         move = -covariance @ (sums.gradient + precision @ (mean - prior.mean))
         mean = mean + move
@@ -140,44 +143,50 @@ def regress(
 
 
 def reweigh(
-    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread, rounds: int = 3
+    residual: Array,
+    values: Values,
+    components: VarianceComponents,
+    rounds: int = config.WEIGHT_ROUNDS,
 ) -> Weights:
     """Weights at given residuals (M,); rows that are not valid count for nothing."""
-    row, track, inlier, own, own_covariance = weights_of_tracks(
+    rows = values.rows
+    row, track, inlier, effects, covariance = weights_of_tracks(
         residual,
-        value,
-        valid,
+        values.value,
+        values.valid,
         rows.owner_idx,
         rows.when,
         rows.owners,
-        spread.of_tracks,
-        spread.of_outliers,
+        components.of_inliers,
+        components.of_outliers,
         rounds,
     )
-    return Weights(row=row, track=track, inlier=inlier, own=own, own_covariance=own_covariance)
+    return Weights(
+        row=row, track=track, inlier=inlier, effects=effects, effect_covariance=covariance
+    )  # fmt: skip
 
 
 def curvature(
-    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, components: VarianceComponents
 ) -> Curvature:
     """Gauss-Newton sums over all tracks for residuals (M,) with derivatives (M, P)."""
-    white, lost = _whitened(jacobian, residual, weights, rows, spread)
+    white, lost = _whitened(jacobian, residual, weights, rows, components)
     lost = lost.reshape(-1, white.shape[1])
     moment = white.T @ white - lost.T @ lost
     return Curvature(matrix=moment[:-1, :-1], gradient=moment[:-1, -1])
 
 
 def track_curvatures(
-    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, components: VarianceComponents
 ) -> Curvature:
     """The same for each track by itself: matrix (N, P, P), gradient (N, P); for a small P."""
-    white, lost = _whitened(jacobian, residual, weights, rows, spread)
+    white, lost = _whitened(jacobian, residual, weights, rows, components)
     moment = moments_of_tracks(white, lost, rows.owner_idx)
     return Curvature(matrix=moment[:, :-1, :-1], gradient=moment[:, :-1, -1])
 
 
 def _whitened(
-    jacobian: Array, residual: Array, weights: Weights, rows: Rows, spread: Spread
+    jacobian: Array, residual: Array, weights: Weights, rows: Rows, components: VarianceComponents
 ) -> tuple[Array, Array]:
     return whitened(
         np.ascontiguousarray(jacobian),
@@ -187,66 +196,75 @@ def _whitened(
         rows.owner_idx,
         rows.linked,
         rows.when,
-        spread.of_tracks,
+        components.of_inliers,
     )
 
 
 def composite_log_likelihoods(
-    residual: Array, value: Array, valid: Mask, rows: Rows, spread: Spread
+    residual: Array, values: Values, components: VarianceComponents
 ) -> Array:
     """The composite log likelihood (N,) of each track, by its rows apart; long ones are as short.
 
     For comparing candidates far apart; a row above the horizon counts as all but impossible.
     Source: Varin, Reid and Firth 2011, an independence likelihood; its weights are ours.
     """
+    rows = values.rows
     return log_likelihoods_apart(
-        residual, value, valid, rows.owner_idx, rows.owners, spread.total_sd, spread.of_outliers
+        residual,
+        values.value,
+        values.valid,
+        rows.owner_idx,
+        rows.owners,
+        components.total_sd,
+        components.of_outliers,
     )
 
 
-def hierarchical_log_likelihood(
-    residual: Array, weights: Weights, rows: Rows, spread: Spread
+def h_log_likelihood(
+    residual: Array, weights: Weights, rows: Rows, components: VarianceComponents
 ) -> float:
-    """The h-likelihood (Lee and Nelder 1996), but for what the spread alone decides."""
+    """The h-likelihood (Lee and Nelder 1996), but for what the components alone decide."""
     half = (FREEDOM + 1) / 2
-    scaled = weights.deviation(residual, rows) / spread.within_sd
+    scaled = weights.deviation(residual, rows) / components.within_sd
     within = (weights.inlier * np.log1p(scaled**2 / FREEDOM)).sum()
     # Correlated rows count as fewer.
-    within *= (1 - spread.correlation) / (1 + spread.correlation)
-    level, trend = weights.own.T
-    between = np.log1p((level / spread.between_sd) ** 2 / FREEDOM).sum()
-    return float(-half * (within + between) - 0.5 * ((trend / spread.trend_sd) ** 2).sum())
+    within *= (1 - components.correlation) / (1 + components.correlation)
+    level, trend = weights.effects.T
+    between = np.log1p((level / components.between_sd) ** 2 / FREEDOM).sum()
+    return float(-half * (within + between) - 0.5 * ((trend / components.trend_sd) ** 2).sum())
 
 
-def relearn(
-    residual: Array, value: Array, valid: Mask, rows: Rows, weights: Weights, spread: Spread
-) -> Spread:
-    """The spread that explains residuals best, given the weights: a step of EM."""
+def em_step(
+    residual: Array, values: Values, weights: Weights, components: VarianceComponents
+) -> VarianceComponents:
+    """The components that explain residuals best, given the weights."""
+    value, valid, rows = values.value, values.valid, values.rows
     inlier_rows = np.bincount(rows.owner_idx, weights.inlier, rows.owners)
     seen = inlier_rows > 1.5
     if seen.sum() < 3:
-        return spread
-    own = weights.own[seen] ** 2 + np.diagonal(weights.own_covariance[seen], axis1=1, axis2=2)
-    between, trend = weights.track[seen] * own[:, 0], own[:, 1]
+        return components
+    variance = np.diagonal(weights.effect_covariance[seen], axis1=1, axis2=2)
+    squared = weights.effects[seen] ** 2 + variance
+    between, trend = weights.track[seen] * squared[:, 0], squared[:, 1]
     deviation = weights.deviation(residual, rows)
     inlier = float(weights.inlier[valid].sum())
     freedom = max(0.3, 1 - float(seen.sum()) / max(inlier, 1.0))
     within = float((weights.row * deviation**2)[valid].sum()) / max(inlier, 1.0) / freedom
     correlation = _correlation(deviation, weights.row, valid, rows, inlier / float(seen.sum()))
-    outlier_mean, outlier_sd = spread.outlier_mean, spread.outlier_sd
+    outlier_mean, outlier_sd = components.outlier_mean, components.outlier_sd
     outlier = (1 - weights.inlier)[valid]
     if outlier.sum() > 20:
         outlier_mean = float((outlier * value[valid]).sum() / outlier.sum())
         outlier_square = (outlier * (value[valid] - outlier_mean) ** 2).sum() / outlier.sum()
         outlier_sd = float(np.sqrt(outlier_square))
-    return Spread(
-        between_sd=float(np.clip(np.sqrt(between.mean()), 0.02, 0.5)),
-        trend_sd=float(np.clip(np.sqrt(trend.mean()), 0.005, 0.3)),
-        within_sd=float(np.clip(np.sqrt(within), 0.01, 0.5)),
+    return VarianceComponents(
+        between_sd=float(np.clip(np.sqrt(between.mean()), *config.BETWEEN_SD)),
+        trend_sd=float(np.clip(np.sqrt(trend.mean()), *config.TREND_SD)),
+        within_sd=float(np.clip(np.sqrt(within), *config.WITHIN_SD)),
         correlation=correlation,
-        outlier_share=float(np.clip((1 - weights.inlier)[valid].mean(), 0.02, 0.8)),
-        outlier_mean=float(np.clip(outlier_mean, -3.0, 1.0)),
-        outlier_sd=float(np.clip(outlier_sd, 0.3, 1.5)),
+        outlier_share=float(np.clip((1 - weights.inlier)[valid].mean(), *config.OUTLIER_SHARE)),
+        outlier_mean=float(np.clip(outlier_mean, *config.OUTLIER_MEAN)),
+        outlier_sd=float(np.clip(outlier_sd, *config.OUTLIER_SD)),
     )
 
 
@@ -261,4 +279,5 @@ def _correlation(
         return 0.0
     raw = float(product / power)
     # Taking a track's own mean off makes its rows look less alike than they are.
-    return float(np.clip(raw + 0.5 * (1 + 3 * raw) / max(usual_length, 2.0), 0.0, 0.8))
+    longer = raw + 0.5 * (1 + 3 * raw) / max(usual_length, 2.0)
+    return float(np.clip(longer, 0.0, config.MOST_CORRELATION))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from models.walking.loops.bumps import exponents_at, features_of
+from models.walking.field import exponents_at, features_of
 
 GRID = np.array([[0.0, 0.0], [0.0, 6.0], [6.0, 0.0], [6.0, 6.0]])
 

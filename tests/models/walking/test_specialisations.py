@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+import models.tracks
+import models.walking
 from models.pose.change_point import find_change
 from models.simulation.walkers import WalkConfig
-from models.tracks import loops as track_loops
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
-from models.walking import loops
 from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
 from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
@@ -29,8 +29,8 @@ def test_learning_an_estimate_and_a_change_ask_for_one_kind_of_arrays():
     compiled = {}
     names = [
         module.name
-        for package in (track_loops, loops)
-        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
+        for package in (models.tracks, models.walking)
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     ]
     for name in names:
         for key, function in vars(importlib.import_module(name)).items():

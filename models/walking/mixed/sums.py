@@ -1,6 +1,6 @@
 """Rows of unit variance, and what the tracks' own levels and trends take of their sums.
 
-The rows of a track stand together. The model is that of `hierarchy`.
+The rows of a track stand together. The model is that of `mixed_model`.
 """
 
 import math
@@ -21,7 +21,7 @@ def whitened(
     owner_idx: npt.NDArray[np.int64],
     linked: Mask,
     when: Array,
-    spread: tuple[float, float, float, float],
+    components: tuple[float, float, float, float],
 ) -> tuple[Array, Array]:
     """Rows of unit variance (M, P + 1), and what is lost of their moments (N, 2, P + 1).
 
@@ -39,9 +39,9 @@ def whitened(
         owner_idx: the track of each row (M,).
         linked: which rows follow the one before them (M,).
         when: since the middle of a row's track (M,), in 10 s.
-        spread: standard deviations between tracks, of trends, within tracks; the correlation.
+        components: standard deviations between tracks, of trends, within tracks; the correlation.
     """
-    between_sd, trend_sd, within_sd, rho = spread
+    between_sd, trend_sd, within_sd, rho = components
     count, width = columns.shape
     fresh_sd = math.sqrt(1 - rho**2) * within_sd
     white, lost = np.empty((count, width + 1)), np.zeros((track.size, 2, width + 1))

@@ -1,6 +1,6 @@
 """Student-t and outlier weights of rows and tracks, and densities of rows, track by track.
 
-The rows of a track stand together. The model is that of `hierarchy`.
+The rows of a track stand together. The model is that of `mixed_model`.
 """
 
 import math
@@ -10,13 +10,15 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array, Mask
+from models.walking.config import (
+    ABOVE_HORIZON,
+    FREEDOM,
+    INDEPENDENT_ROWS,
+    OUTLIER_PRIOR_ROWS,
+    OUTLIER_ROUNDS,
+)
 
-FREEDOM = 4.0  # of both Student-t
-_SHARE_WEIGHT = 2.0  # rows that the site's share counts for in a track's own
-_SHARE_ROUNDS = 4
 _LEAST_ODDS, _MOST_ODDS = math.exp(-30.0), math.exp(30.0)
-_INDEPENDENT_ROWS = 4  # a long track says no more than so many about which start is the best
-_ABOVE_HORIZON = -8.0  # the log density of a row that is all but impossible
 _FAR_FROM_1 = 1e100
 
 
@@ -28,11 +30,11 @@ def weights_of_tracks(
     owner_idx: npt.NDArray[np.int64],
     when: Array,
     owners: int,
-    spread: tuple[float, float, float, float],
+    components: tuple[float, float, float, float],
     outliers: tuple[float, float, float],
     rounds: int,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Weights of rows (M,) and of tracks (N,), of rows to be inliers, and own levels and trends.
+    """Weights of rows (M,) and of tracks (N,), of rows to be inliers, and random levels and trends.
 
     Args:
         residual: of each row (M,).
@@ -41,7 +43,7 @@ def weights_of_tracks(
         owner_idx: the track of each (M,).
         when: since the middle of its track (M,), in 10 s.
         owners: how many tracks there are, with and without rows.
-        spread: standard deviations between tracks, of trends, within tracks; the correlation.
+        components: standard deviations between tracks, of trends, within tracks; the correlation.
         outliers: their share, mean and standard deviation.
         rounds: of re-weighting.
 
@@ -49,13 +51,13 @@ def weights_of_tracks(
         Rows' weights (M,), tracks' weights (N,), probabilities to be an inlier (M,), levels and
         trends (N, 2) and their covariances (N, 2, 2).
     """
-    between_sd, trend_sd, within_sd, correlation = spread
+    between_sd, trend_sd, within_sd, correlation = components
     total_sd = math.sqrt(between_sd**2 + within_sd**2)
     scales = _scales_of(total_sd, outliers)
     # Correlated rows count as fewer.
     precision = (1 - correlation) / (1 + correlation) / within_sd**2
     row, inlier = np.zeros(residual.size), np.zeros(residual.size)
-    track, own, covariance = np.ones(owners), np.zeros((owners, 2)), np.zeros((owners, 2, 2))
+    track, effects, covariance = np.ones(owners), np.zeros((owners, 2)), np.zeros((owners, 2, 2))
     bounds = _bounds_of(owner_idx, owners)
     for owner in range(owners):
         first, last = bounds[owner]
@@ -81,12 +83,12 @@ def weights_of_tracks(
             covariance[owner] /= determinant
             level = (square * level_sum - mixed * trend_sum) / determinant
             trend = (one * trend_sum - mixed * level_sum) / determinant
-            own[owner, 0], own[owner, 1] = level, trend
+            effects[owner, 0], effects[owner, 1] = level, trend
             track[owner] = (FREEDOM + 1) / (FREEDOM + (level / between_sd) ** 2)
             for j in range(first, last):
                 deviation = (residual[j] - level - trend * when[j]) / within_sd
                 row[j] = inlier[j] * (FREEDOM + 1) / (FREEDOM + deviation * deviation)
-    return row, track, inlier, own, covariance
+    return row, track, inlier, effects, covariance
 
 
 @compiled
@@ -108,7 +110,7 @@ def log_likelihoods_apart(
         total, product = 0.0, 1.0  # a logarithm of many rows' densities, not one of each
         for j in range(first, last):
             if not valid[j]:
-                total += _ABOVE_HORIZON
+                total += ABOVE_HORIZON
                 continue
             usual, unusual = _densities(residual[j], value[j], scales)
             product *= (1 - share) * usual + share * unusual
@@ -117,7 +119,7 @@ def log_likelihoods_apart(
                 product = 1.0
         number = last - first
         total += math.log(product)
-        found[owner] = total / max(number, 1) * min(number, _INDEPENDENT_ROWS)
+        found[owner] = total / max(number, 1) * min(number, INDEPENDENT_ROWS)
     return found
 
 
@@ -130,21 +132,21 @@ def _find_inliers(odds: Array, valid: Mask, usual_share: float, inlier: Array) -
     """
     number = valid.sum()
     share = usual_share
-    for _ in range(_SHARE_ROUNDS):
+    for _ in range(OUTLIER_ROUNDS):
         left = float(number)
         for j in range(odds.size):
             if valid[j]:
                 outlier = share * odds[j]
                 inlier[j] = 1 - outlier / (outlier + 1 - share)
                 left -= inlier[j]
-        share = (_SHARE_WEIGHT * usual_share + left) / (_SHARE_WEIGHT + number)
+        share = (OUTLIER_PRIOR_ROWS * usual_share + left) / (OUTLIER_PRIOR_ROWS + number)
 
 
 @compiled
 def _scales_of(
     total_sd: float, outliers: tuple[float, float, float]
 ) -> tuple[float, float, float, float, float]:
-    """What densities are asked by: reciprocals, since a division takes as long as a root."""
+    """Reciprocals for densities, since a division takes as long as a root."""
     _, mean, sd = outliers
     return (
         1 / (total_sd * math.sqrt(FREEDOM)),
@@ -160,8 +162,8 @@ def _densities(
     residual: float, value: float, scales: tuple[float, float, float, float, float]
 ) -> tuple[float, float]:
     """Of an inlier, Student-t of 4 degrees of freedom; of an outlier, normal."""
-    per_scale, highest, mean, per_spread, highest_outlier = scales
-    scaled, apart = residual * per_scale, (value - mean) * per_spread
+    per_scale, highest, mean, per_sd, highest_outlier = scales
+    scaled, apart = residual * per_scale, (value - mean) * per_sd
     wide = 1 + scaled * scaled
     usual = highest / (wide * wide * math.sqrt(wide))
     return usual, highest_outlier * math.exp(-apart * apart)
