@@ -29,7 +29,7 @@ SERVICE_ROOMS = [
     {"cli"},
 ]
 MODEL_ROOMS = [
-    {"errors", "reasons", "machine_code"},
+    {"errors", "reasons"},
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},

@@ -46,13 +46,13 @@ print(stats.cache_path)
 def ask(tmp_path):
     package = tmp_path / "models"
     package.mkdir()
-    for name in ("__init__.py", "compiled.py", "machine_code.py"):
+    for name in ("__init__.py", "compiled.py"):
         shutil.copy(Path(models.__path__[0]) / name, package)
     (package / "outer.py").write_text(OUTER)
 
-    def ask(environment=None, **numbers):
+    def ask(environment=None, first="", **numbers):
         (package / "inner.py").write_text(INNER.format(**numbers))
-        command = [sys.executable, "-c", ASK]
+        command = [sys.executable, "-c", f"{first}\n{ASK}"]
         told = subprocess.run(
             command,
             cwd=tmp_path,
@@ -83,8 +83,31 @@ def test_no_code_is_kept_among_sources(ask, tmp_path):
         assert not ask.place.is_relative_to(tmp_path)
         assert not list(tmp_path.rglob("*.nb?"))
     finally:
-        for made in (*ask.place.glob("inner.*"), *ask.place.glob("outer.*")):
-            made.unlink()
+        shutil.rmtree(ask.place.parent)
+
+
+def test_code_of_former_sources_is_removed_beside_new_code(ask, tmp_path):
+    old, new, other = (tmp_path / "code" / name for name in ("surefoot-old", "surefoot-new", "x"))
+    for folder in (old, new, other):
+        folder.mkdir(parents=True)
+    for folder in (old, other):
+        os.utime(folder, (0, 0))
+    ask(factor=2, limit=5)
+    assert not old.exists()
+    assert new.exists()
+    assert other.exists()
+
+
+def test_where_nothing_can_be_written_each_process_compiles_for_itself(ask, tmp_path):
+    (tmp_path / "file").touch()
+    nowhere = {"HOME": "/dev/null", "NUMBA_CACHE_DIR": str(tmp_path / "file")}
+    assert (
+        ask(
+            {**os.environ, **nowhere}, "import sys; sys.prefix = sys.base_prefix", factor=2, limit=5
+        )[0]
+        == 11
+    )
+    assert not list(tmp_path.rglob("*.nb?"))
 
 
 def test_what_divides_by_nothing_goes_on_as_numpy_does():
