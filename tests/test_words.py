@@ -47,7 +47,6 @@ OTHERS = {
     ("api/poses.py", "pose"): "a tag of the API's description",
     ("api/sources.py", "tracks"): "a tag of the API's description",
     ("api/tracks.py", "tracks"): "a tag and a field of the API's description",
-    ("api/alerts_schemas.py", "drift"): "the name of a field",
     ("api/metrics.py", "firing"): "part of a metric's name",
     ("api/metrics.py", "pending"): "the name of a field",
     ("api/metrics.py", "silenced"): "part of a metric's name",

@@ -65,19 +65,18 @@ def open_alert(
     if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
+    change: MessageType | None = MessageType.ALERT_OPENED
     if record is not None:
         if source == AlertSource.REFERENCE:
             return record
-        change: MessageType | None = None
-        if record.severity != severity or record.source != source:
-            change = MessageType.ALERT_UPDATED
+        regarded = (record.severity, record.source)
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
             _keep_activity(session, record, AlertActivity.ESCALATED, None)
         record.drift, record.severity, record.updated_at = drift, severity, now
         record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
+        change = None if regarded == (severity, source) else MessageType.ALERT_UPDATED
     else:
-        change = MessageType.ALERT_OPENED
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
