@@ -10,7 +10,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import learn_site, observe
-from models.reasons import TracksCode
+from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_to_bytes
@@ -143,14 +143,18 @@ def save_reference(
     )
     keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.doubt is not None:
-        open_alert(
-            session,
-            settings,
-            camera_id,
-            _DOUBT_KINDS[site.doubt.code],
-            Severity.WARNING,
-            drift={},
-            changed_at=None,
-            reasons=(site.doubt,),
-            source=AlertSource.REFERENCE,
-        )
+        _warn(session, settings, camera_id, site.doubt)
+
+
+def _warn(session: Session, settings: Settings, camera_id: str, doubt: Reason) -> None:
+    open_alert(
+        session,
+        settings,
+        camera_id,
+        _DOUBT_KINDS[doubt.code],
+        Severity.WARNING,
+        drift={},
+        changed_at=None,
+        reasons=(doubt,),
+        source=AlertSource.REFERENCE,
+    )
