@@ -65,34 +65,29 @@ def open_alert(
     if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
+    if record is not None and source == AlertSource.REFERENCE:
+        return record
+    change: MessageType | None = MessageType.ALERT_OPENED
     if record is not None:
-        if source == AlertSource.REFERENCE:
-            return record
-        change: MessageType | None = None
-        if record.severity != severity or record.source != source:
-            change = MessageType.ALERT_UPDATED
+        changed = (record.severity, record.source) != (severity, source)
+        change = MessageType.ALERT_UPDATED if changed else None
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
             _keep_activity(session, record, AlertActivity.ESCALATED, None)
-        record.drift, record.severity, record.updated_at = drift, severity, now
-        record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
     else:
-        change = MessageType.ALERT_OPENED
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
             track_source=tracks.newest_source(session, camera_id),
             kind=kind,
             state=AlertState.FIRING,
-            source=source,
-            severity=severity,
-            reasons=reasons,
-            drift=drift,
             notified=False,
             opened_at=now,
             changed_at=changed_at,
-            updated_at=now,
         )
+    record.severity, record.source = severity, source
+    record.drift, record.reasons, record.updated_at = drift, reasons, now
+    if change == MessageType.ALERT_OPENED:
         session.add(record)
         session.flush()
         _keep_activity(session, record, AlertActivity.OPENED, None)

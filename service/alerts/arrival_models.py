@@ -21,7 +21,7 @@ _NOT_AGAIN_WITHIN = timedelta(minutes=50)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrivalModel:
-    """A camera's rhythm, and how late its tracks come at the most, in seconds."""
+    """Arrivals of a usual week, and how late its tracks come at the most, in seconds."""
 
     rhythm: Rhythm
     delay_s: float
@@ -75,7 +75,7 @@ def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals |
 def compute_arrival_model(
     arrivals: Arrivals, settings: Settings, now: datetime
 ) -> tuple[ArrivalModel | None, HourCounts]:
-    """The rhythm and the counts of its hours; no rhythm where too few days have been seen."""
+    """The arrival model and the counts of its hours; no model where too few days have been seen."""
     known = _counted(arrivals, now)
     counts = known.tracks
     # Hours are whole between the first that was counted and the newest track.
@@ -126,20 +126,20 @@ def save_arrival_model(
     counts: HourCounts,
     now: datetime,
 ) -> None:
-    """Store a rhythm, unless its camera is gone."""
+    """Store an arrival model, unless its camera is gone."""
     if cameras.find(session, camera_id) is not None:
         profile = None if learned is None else _packed(learned)
         rhythms.put(session, camera_id, profile, asdict(counts), now)
 
 
 def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
-    """The rhythm of a camera; None where too little of it is known."""
+    """The arrival model of a camera; None where too little of it is known."""
     profile = rhythms.profile(session, camera_id)
     return None if profile is None else unpacked(profile)
 
 
 def unpacked(profile: dict[str, Any]) -> ArrivalModel:
-    """A rhythm as it was stored."""
+    """An arrival model as it was stored."""
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
     return ArrivalModel(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
 

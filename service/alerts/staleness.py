@@ -51,31 +51,12 @@ class StaleWatch:
         for camera in cameras.failing(session, besides=firing | long):
             waits_s = waits.get(camera.id, 0.0)
             reason = _why_stale(camera, settings, waits_s)
-            if reason is None and camera.id in firing:
-                if camera.estimate_failing_since is None:
-                    end_alert(
-                        session,
-                        camera.id,
-                        AlertKind.STALE,
-                        Outcome.CLEARED,
-                        note="it is looked at again",
-                    )
+            if reason is None:
+                if camera.id in firing and camera.estimate_failing_since is None:
+                    _end(session, camera)
                     found[camera.id] = "ended"
-            elif reason is not None and camera.id not in firing and not _answered(session, camera):
-                since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(
-                    seconds=waits_s
-                )
-                open_alert(
-                    session,
-                    settings,
-                    camera.id,
-                    AlertKind.STALE,
-                    Severity.CRITICAL,
-                    {},
-                    since,
-                    reasons=(reason,),
-                    source=AlertSource.UPKEEP,
-                )
+            elif camera.id not in firing and not _answered(session, camera):
+                _open(session, settings, camera, reason, waits_s)
                 found[camera.id] = AlertActivity.OPENED
         return found
 
@@ -100,6 +81,28 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reas
         waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
         return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
     return None
+
+
+def _open(
+    session: Session, settings: Settings, camera: CameraRecord, reason: Reason, waits_s: float
+) -> None:
+    since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(seconds=waits_s)
+    open_alert(
+        session,
+        settings,
+        camera.id,
+        AlertKind.STALE,
+        Severity.CRITICAL,
+        drift={},
+        changed_at=since,
+        reasons=(reason,),
+        source=AlertSource.UPKEEP,
+    )
+
+
+def _end(session: Session, camera: CameraRecord) -> None:
+    note = "it is looked at again"
+    end_alert(session, camera.id, AlertKind.STALE, Outcome.CLEARED, note)
 
 
 def _answered(session: Session, camera: CameraRecord) -> bool:

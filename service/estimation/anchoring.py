@@ -9,10 +9,10 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart_serialization import chart_from_bytes
+from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.creep import SHARE
 from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import (
     CameraSite,
     Creep,
@@ -23,7 +23,6 @@ from models.pose import (
 )
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
-from service.estimation.paths import LearnedPaths
 from service.estimation.people import Unpacked
 from service.references import window_of
 from service.settings import Settings
@@ -34,6 +33,24 @@ from service.store.serialization import intrinsics_of, pose_of_prior
 from service.store.windows import WindowBounds
 
 _MOST_A_DAY = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedPaths:
+    """A flow map and the drift chart that goes with it, as bytes."""
+
+    flow: bytes
+    chart: bytes | None
+
+
+def paths_of(site: CameraSite) -> LearnedPaths | None:
+    """The map and the chart of a site; None where too few walking groups walk."""
+    if site.flow is None:
+        return None
+    return LearnedPaths(
+        flow=flow_to_bytes(site.flow),
+        chart=None if site.chart is None else chart_to_bytes(site.chart),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

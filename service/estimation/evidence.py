@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,6 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
 from service.alerts.alerts import fired_by_estimate
-from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
 from service.estimation.people import Unpacked, until_so_many
@@ -113,17 +113,13 @@ def load_evidence(
         unpacked,
         newest=True,
     )
-    records = gathered.records
-    model = trainings.newest_model(session, camera_id)
+    records, model = gathered.records, trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
-    answered_at = alerts.answered_at(session, camera_id)
     kept = flow_maps.find(session, reference.id)
     last = flow_maps.last_pose(session, reference.id)
-    predictions: Sequence[PredictionRecord] = []
-    if model is not None:
-        pks = [record.id for record in records]
-        predictions = stored_predictions.predictions(session, model.id, pks)
+    answered_at = alerts.answered_at(session, camera_id)
+    seen = [_seen(record, answered_at, intrinsics, unpacked) for record in records]
     return Evidence(
         camera_id=camera_id,
         reference_id=reference.id,
@@ -134,25 +130,37 @@ def load_evidence(
         intrinsics=intrinsics,
         prior=prior,
         walk=walk_of(camera),
-        tracks=tuple(
-            SeenTrack(
-                pk=record.id,
-                unanswered=answered_at is None or record.received_at > answered_at,
-                started_s=record.started_s,
-                ended_s=record.ended_s,
-                trajectory=unpacked.seen(record, intrinsics),
-            )
-            for record in records
-        ),
+        tracks=tuple(seen),
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
         limits=drift_limits(settings),
-        drifting=bool(fired_by_estimate(session, camera_id) & {AlertKind.DRIFT, AlertKind.CLOCK}),
+        drifting=bool(fired_by_estimate(session, camera_id)),
         model_id=None if model is None else model.id,
-        predictions=tuple(predictions),
+        predictions=_predictions(session, model, records),
         before=gathered.before,
         last=None if last is None else KeptPose(basis=last.basis, data=last.data),
     )
+
+
+def _seen(
+    record: StoredTrack, answered_at: datetime | None, intrinsics: Intrinsics, unpacked: Unpacked
+) -> SeenTrack:
+    return SeenTrack(
+        pk=record.id,
+        unanswered=answered_at is None or record.received_at > answered_at,
+        started_s=record.started_s,
+        ended_s=record.ended_s,
+        trajectory=unpacked.seen(record, intrinsics),
+    )
+
+
+def _predictions(
+    session: Session, model: ModelRecord | None, records: Sequence[StoredTrack]
+) -> tuple[PredictionRecord, ...]:
+    if model is None:
+        return ()
+    pks = [record.id for record in records]
+    return tuple(stored_predictions.predictions(session, model.id, pks))
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

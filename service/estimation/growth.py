@@ -22,8 +22,7 @@ from models.pose.change_point import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.alerts.suspected_moves import SuspectedMove, suspected_moves
-from service.estimation.anchoring import Anchor, anchor_of, keep_anchor
-from service.estimation.paths import LearnedPaths, paths_of
+from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
 from service.estimation.people import Unpacked
 from service.references import (
     Attendance,

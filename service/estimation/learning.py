@@ -10,7 +10,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import learn_site, observe
-from models.reasons import TracksCode
+from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_to_bytes
@@ -18,9 +18,8 @@ from models.walking.speed_reference import SpeedReference
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
-from service.estimation.anchoring import keep_anchor
+from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
 from service.estimation.evidence import walk_of
-from service.estimation.paths import LearnedPaths, paths_of
 from service.estimation.people import Unpacked, until_so_many
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
@@ -144,14 +143,18 @@ def save_reference(
     )
     keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.implausible is not None:
-        open_alert(
-            session,
-            settings,
-            camera_id,
-            _DOUBT_KINDS[site.implausible.code],
-            Severity.WARNING,
-            drift={},
-            changed_at=None,
-            reasons=(site.implausible,),
-            source=AlertSource.REFERENCE,
-        )
+        _warn(session, settings, camera_id, site.implausible)
+
+
+def _warn(session: Session, settings: Settings, camera_id: str, doubt: Reason) -> None:
+    open_alert(
+        session,
+        settings,
+        camera_id,
+        _DOUBT_KINDS[doubt.code],
+        Severity.WARNING,
+        drift={},
+        changed_at=None,
+        reasons=(doubt,),
+        source=AlertSource.REFERENCE,
+    )

@@ -30,14 +30,16 @@ class PartialFailures:
 
     def take(self, found: Sequence[Lack]) -> None:
         """Log and say what failed."""
-        for lack in found:
+        for failure in found:
             fields = {"camera_id": self._camera_id}
-            if isinstance(lack.error, CheckpointError):
-                log.warning(f"{lack.part}_unreadable", extra=fields | {"why": str(lack.error)})
-                self.add(lack.part, "cannot be read")
+            if isinstance(failure.error, CheckpointError):
+                log.warning(
+                    f"{failure.part}_unreadable", extra=fields | {"why": str(failure.error)}
+                )
+                self.add(failure.part, "cannot be read")
             else:
-                log.error(f"{lack.part}_failed", exc_info=lack.error, extra=fields)
-                self.add(lack.part, repr(lack.error))
+                log.error(f"{failure.part}_failed", exc_info=failure.error, extra=fields)
+                self.add(failure.part, repr(failure.error))
 
     def add(self, part: str, why: str) -> None:
         """Say that something is missing, and why."""

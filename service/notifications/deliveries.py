@@ -36,14 +36,6 @@ class Attempt:
     message: Message
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refresh:
-    """All that fires, for an Alertmanager, which forgets what it is not told again."""
-
-    webhook_id: str
-    message: Message
-
-
 def begin_run(session: Session, webhook_id: str) -> None:
     """Take the mark "a job waits" off a webhook: what is queued from now on queues its own."""
     webhook = webhooks.find(session, webhook_id)
@@ -104,19 +96,18 @@ def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome
         _finish(delivery, DeliveryState.FAILED, now)
 
 
-def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Refresh | None:
-    """All that fires, if an Alertmanager is to be told again now."""
+def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Message | None:
+    """All that fires, if an Alertmanager, which forgets, is to be told again now."""
     now = datetime.now(UTC)
     webhook = webhooks.find(session, webhook_id)
     if webhook is None or not _is_open(webhook, now) or not _needs_refresh(settings, webhook, now):
         return None
-    message = all_firing(session, settings, webhook, now)
-    return None if message is None else Refresh(webhook_id=webhook_id, message=message)
+    return all_firing(session, settings, webhook, now)
 
 
-def save_refresh(session: Session, settings: Settings, refresh: Refresh, out: Outcome) -> None:
+def save_refresh(session: Session, settings: Settings, webhook_id: str, out: Outcome) -> None:
     """Write down when an Alertmanager was told; it has no row of its own in the log."""
-    webhook = webhooks.find(session, refresh.webhook_id)
+    webhook = webhooks.find(session, webhook_id)
     if webhook is None:
         return
     now = datetime.now(UTC)

@@ -14,7 +14,7 @@ from service.workers.running_jobs import RunningJobs
 
 
 class RoundRobin:
-    """Goes round and round; who was added meanwhile has its turn like all others."""
+    """Turns that go round; who was added meanwhile has its turn like all others."""
 
     def __init__(self) -> None:
         self._last = ""

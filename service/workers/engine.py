@@ -111,7 +111,7 @@ def forget_finished() -> int:
 
 
 def stop(within_s: float) -> threading.Thread:
-    """Take no new job, and end when those in hand have ended, or after so long."""
+    """Take no new job, and end when running ones have ended, or after so long."""
     thread = threading.Thread(
         target=DBOS.destroy,
         kwargs={"workflow_completion_timeout_sec": round(within_s)},

@@ -20,7 +20,7 @@ BEAT_S = 2.0
 
 def start_heartbeat(context: JobContext, *, tells: bool) -> None:
     """Beat until the process ends; to stdout if `serve` listens there."""
-    threading.Thread(target=_beat, args=(context, tells), name="pulse", daemon=True).start()
+    threading.Thread(target=_beat, args=(context, tells), name="heartbeat", daemon=True).start()
 
 
 def _beat(context: JobContext, tells: bool) -> None:
