@@ -1,1 +1,1 @@
-"""Who is behind the tracks: the pieces of one walk are put together."""
+"""Tracks of pedestrians, and what is read of them: each walk once, whatever pieces it came in."""

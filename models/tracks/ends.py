@@ -1,4 +1,4 @@
-"""Where tracks begin and end on the ground, how fast they go there, and how unsure that is."""
+"""The ends of tracks on the ground: places with their covariance, and velocities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,18 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.compiled import compiled
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.geometry.upright import statures
-from models.tracks.end_points import points_at_ends
+from models.tracks import config
 from models.tracks.trajectory import Points, Trajectory, points_of
-
-_SPAN_S = 1.5  # longer than a stride
-_MOST_POINTS = 8  # of an end: more of them say the same again
-_NOISE_PX = 1.0
-_NOISE_M = 0.035  # across the line of sight: a foot is the edge of a box of somebody who strides
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +45,7 @@ def ends_of(
 
 
 def _ends(points: Points, last: bool, intrinsics: Intrinsics, pose: CameraPose) -> Ends:
-    chosen, owner = points_at_ends(points.time_s, points.bounds, last, _SPAN_S, _MOST_POINTS)
+    chosen, owner = points_at_ends(points.time_s, points.bounds, last)
     at = points.bounds[1:] - 1 if last else points.bounds[:-1]
     count, end_s, uv = at.size, points.time_s[at], points.uv[chosen]
     since_s = points.time_s[chosen] - end_s[owner]
@@ -82,7 +78,7 @@ def _noise(uv: Array, intrinsics: Intrinsics, pose: CameraPose) -> tuple[Array, 
     by_pixel = np.stack([ground[:, 1] - ground[:, 0], ground[:, 2] - ground[:, 0]], axis=2)
     # A metre across the line of sight is as many pixels as the least that one moves a place.
     metres = np.maximum(np.linalg.svd(np.nan_to_num(by_pixel), compute_uv=False)[:, 1], 1e-9)
-    sd_px = np.hypot(_NOISE_PX, _NOISE_M / metres)
+    sd_px = np.hypot(config.FOOT_NOISE_PX, config.FOOT_NOISE_M / metres)
     covariance = by_pixel @ np.swapaxes(by_pixel, 1, 2) * sd_px[:, None, None] ** 2
     return covariance, np.asarray(seen.all(axis=1))
 
@@ -110,3 +106,36 @@ def _log_tall(
 def _sums(owner: npt.NDArray[np.int64], values: Array, count: int) -> Array:
     columns = [np.bincount(owner, values[:, axis], count) for axis in range(values.shape[1])]
     return np.stack(columns, axis=1)
+
+
+@compiled
+def points_at_ends(
+    time_s: Array, bounds: npt.NDArray[np.int64], last: bool
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Some points (K,) within a time of an end of each track, in time order, and the tracks (K,).
+
+    The end's own point is among them.
+    """
+    chosen = np.empty(config.END_POINTS * (bounds.size - 1), dtype=np.int64)
+    owner = np.empty(chosen.size, dtype=np.int64)
+    found = 0
+    for track in range(bounds.size - 1):
+        first, final = bounds[track], bounds[track + 1] - 1
+        usual_s = (time_s[final] - time_s[first]) / max(final - first, 1)
+        reach_s = max(config.END_SPAN_S, config.END_USUAL_GAPS * usual_s)
+        low, high = first, final
+        if last:
+            low = final
+            while low > first and time_s[low - 1] >= time_s[final] - reach_s:
+                low -= 1
+        else:
+            high = first
+            while high < final and time_s[high + 1] <= time_s[first] + reach_s:
+                high += 1
+        stride = -(-(high - low + 1) // config.END_POINTS)
+        number = (high - low) // stride + 1
+        begin = high - (number - 1) * stride if last else low
+        for place in range(number):
+            chosen[found], owner[found] = begin + place * stride, track
+            found += 1
+    return chosen[:found], owner[:found]

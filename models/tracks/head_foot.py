@@ -1,4 +1,4 @@
-"""What is read of heads: rays to a foot and to the head above it, and whose they are.
+"""Head-foot pairs of tracks: rays to a foot and to the head above it, and whose they are.
 
 Nothing here depends on the pose.
 """
@@ -12,11 +12,8 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.geometry.upright import uncut
+from models.tracks.config import HEAD_POINTS, SHORTEST_HEAD_PX, STEP_S
 from models.tracks.trajectory import Trajectory
-
-STEP_S = 1.5  # a stride and more: who sways with their steps stands upright on average
-_SHORTEST_PX = 8.0  # from foot to head: of less, half a pixel is more than people lean
-_FEWEST_POINTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +59,7 @@ class HeadFootPairs:
 
 
 def observe_heads(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> HeadFootPairs:
-    """The pairs of trajectories, one for each 1.5 s in which a head was seen twice.
+    """The head-foot pairs of trajectories, one for each 1.5 s in which a head was seen twice.
 
     Points whose foot or head is outside the image or cut by its border, or whose head is below the
     foot or less than 8 pixels from it, are left out.
@@ -93,21 +90,21 @@ def _of_one(trajectory: Trajectory, intrinsics: Intrinsics) -> Array:
     known = np.asarray(np.isfinite(heads).all(axis=1) & intrinsics.shows_foot(feet))
     up = np.where(known[:, None], feet - heads, 0.0)
     known = known & uncut(intrinsics, np.nan_to_num(heads)) & (up[:, 1] > 0)
-    known = known & (np.hypot(up[:, 0], up[:, 1]) >= _SHORTEST_PX)
+    known = known & (np.hypot(up[:, 0], up[:, 1]) >= SHORTEST_HEAD_PX)
     feet, heads = feet[known], heads[known]
     rays, valid = intrinsics.rays(
         np.stack([feet, heads, np.stack([feet[:, 0], heads[:, 1]], axis=1)], axis=1)
     )
     whole = np.asarray(valid.all(axis=1))
     rays = rays[whole]
-    if len(rays) < _FEWEST_POINTS:
+    if len(rays) < HEAD_POINTS:
         return np.empty((0, 5, 3))
     time_s = trajectory.time_s[known][whole]
     place = ((time_s - time_s[0]) / STEP_S).astype(np.int64)
     firsts = np.flatnonzero(np.diff(place, prepend=-1))
     number = np.diff(np.append(firsts, place.size))
     mean = np.add.reduceat(rays, firsts, axis=0) / number[:, None, None]
-    mean = mean[number >= _FEWEST_POINTS] if (number >= _FEWEST_POINTS).any() else mean
+    mean = mean[number >= HEAD_POINTS] if (number >= HEAD_POINTS).any() else mean
     before = mean[np.maximum(np.arange(len(mean)) - 1, 0), :1]
     after = mean[np.minimum(np.arange(len(mean)) + 1, len(mean) - 1), :1]
     return np.concatenate([mean, before, after], axis=1)

@@ -1,9 +1,9 @@
-"""Which tracks are pieces of one walk: a tracker that loses people gives them new names.
+"""Links between pieces of one walk: a tracker that loses people gives them new names.
 
 Tracklet association (Huang, Wu and Nevatia 2008) on the ground: a piece follows another where it
 begins shortly after the other's end, at the place where that one was bound for, as fast and as
-tall. What is allowed is told in the walkers' own speed and in pixels of noise, so that it holds at
-a pose that is some way off, too.
+tall. Limits are in the walkers' own speed and in pixels of noise, so that they hold at a pose
+that is some way off, too.
 """
 
 from collections.abc import Sequence
@@ -15,21 +15,10 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
+from models.tracks import config
 from models.tracks.components import first_of_component
 from models.tracks.ends import Ends, ends_of
 from models.tracks.trajectory import Trajectory
-
-LONGEST_GAP_S = 3.5
-_WANDER = 0.18  # of the pace: how much of it is not foretold, along and aside
-_SLOWEST_MPS = 0.3  # a usual pace where most stand
-_LEAST_PACE = 0.3  # of the usual pace: those who stand shift, too
-_PACE_SD = 0.3  # of the log of a pace, between two looks at one walk
-_TALL_SD = 0.08  # of the log of a stature, likewise
-_FREEDOM = 4.0  # of a Student-t: some stop, turn or are seen badly
-_FARTHEST = 30.0  # of a chi square of 5 or 6, with tails like these
-_CLEAR = 4.0  # twice the log of how much likelier a pair is than the next best of either piece
-_STRANGERS = 10.0  # and than any two that happen to follow one another: doors bring people together
-_ROOM_S = 5.0  # at the usual pace: two are at least as far apart by chance
 
 
 def link_pieces(
@@ -54,13 +43,13 @@ def link_pieces(
     if not earlier.size:
         return before
     apart, misfit = _misfit(heads, tails, earlier, later)
-    near = (apart <= _FARTHEST) & (misfit < 0)
+    near = (apart <= config.FARTHEST) & (misfit < 0)
     rank = np.argsort(misfit[near], kind="stable")
     earlier, later, misfit = earlier[near][rank], later[near][rank], misfit[near][rank]
     free = np.ones(rank.size, dtype=bool)
     for pair in range(rank.size):
         rivals = free & ((earlier == earlier[pair]) | (later == later[pair]))
-        if free[pair] and (rivals & (misfit < misfit[pair] + _CLEAR)).sum() == 1:
+        if free[pair] and (rivals & (misfit < misfit[pair] + config.CLEAR)).sum() == 1:
             before[later[pair]] = earlier[pair]
             free &= ~rivals
     return before
@@ -69,7 +58,7 @@ def link_pieces(
 def count_walks(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> int:
-    """How many walks tracks are of: each of them less those that go on another."""
+    """The number of walks that tracks are of: all of them less those that go on another."""
     return int((link_pieces(trajectories, intrinsics, pose) < 0).sum())
 
 
@@ -84,7 +73,7 @@ def _pairs(heads: Ends, tails: Ends) -> tuple[npt.NDArray[np.int64], npt.NDArray
     order = np.argsort(heads.time_s, kind="stable")
     starts = heads.time_s[order]
     first = np.searchsorted(starts, tails.time_s, side="right")
-    behind = np.searchsorted(starts, tails.time_s + LONGEST_GAP_S, side="right")
+    behind = np.searchsorted(starts, tails.time_s + config.PIECE_GAP_S, side="right")
     number = np.where(tails.valid, behind - first, 0)
     earlier = np.repeat(np.arange(number.size), number)
     place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
@@ -94,10 +83,7 @@ def _pairs(heads: Ends, tails: Ends) -> tuple[npt.NDArray[np.int64], npt.NDArray
 
 
 def _misfit(
-    heads: Ends,
-    tails: Ends,
-    earlier: npt.NDArray[np.int64],
-    later: npt.NDArray[np.int64],
+    heads: Ends, tails: Ends, earlier: npt.NDArray[np.int64], later: npt.NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Chi squares (P,) of pairs, and twice the log of how much likelier strangers are than each.
 
@@ -108,8 +94,8 @@ def _misfit(
     ahead, behind = tails.velocity[earlier], heads.velocity[later]
     paces = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
     usual = float(np.median(np.linalg.norm(tails.velocity[tails.valid], axis=1)))
-    usual = max(usual, _SLOWEST_MPS)
-    wander = _WANDER * np.maximum((paces[0] + paces[1]) / 2, _LEAST_PACE * usual)
+    usual = max(usual, config.SLOWEST_MPS)
+    wander = config.WANDER * np.maximum((paces[0] + paces[1]) / 2, config.LEAST_PACE * usual)
     # Of a line through evenly spread points, noise of neighbours being alike.
     jitter = sum(
         end.noise[those] * (2 / np.maximum(end.span_s[those], 0.1) ** 2)[:, None, None]
@@ -126,14 +112,14 @@ def _misfit(
     apart = (
         _square(off, of_place)
         + _square(turn, of_turn)
-        + ((walked[1] - walked[0]) / _PACE_SD) ** 2
-        + np.where(np.isfinite(tall), (np.nan_to_num(tall) / _TALL_SD) ** 2, 0.0)
+        + ((walked[1] - walked[0]) / config.PACE_SD) ** 2
+        + np.where(np.isfinite(tall), (np.nan_to_num(tall) / config.TALL_SD) ** 2, 0.0)
     )
-    misfit = (_FREEDOM + 4) * np.log1p(apart / _FREEDOM)
+    misfit = (config.LINK_FREEDOM + 4) * np.log1p(apart / config.LINK_FREEDOM)
     misfit = misfit + np.log(np.linalg.det(of_place) * np.linalg.det(of_turn))
-    room = _spread(off, _ROOM_S * usual) + _spread(turn, usual)
+    room = _spread(off, config.STRANGERS_S * usual) + _spread(turn, usual)
     rivals = max(earlier.size / heads.time_s.size, 1.0)
-    return apart, misfit - room + 2 * np.log(_STRANGERS * rivals)
+    return apart, misfit - room + 2 * np.log(config.STRANGERS * rivals)
 
 
 def _round(sd: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What the joint estimator reads of tracks, as values: steps of walkers, tops of their boxes.
+"""Observations of tracks as values: steps of walkers, tops of their boxes, heads.
 
 Nothing here depends on the pose.
 """
@@ -15,7 +15,7 @@ from models.tracks.head_foot import HeadFootPairs
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rows:
-    """Whose each of M rows is; the rows of a track stand together, in time order.
+    """Owners of M rows; the rows of a track stand together, in time order.
 
     `owner_idx` (M,) is the track, `linked` (M,) says that a row follows the one before it without
     a gap, `time_s` (M,) is when it was and `when` (M,) how long after the middle of its track's
@@ -62,7 +62,7 @@ class Tops:
 class Observations:
     """All that is read of a set of tracks, and when each of them ended (tracks,).
 
-    `heads` are of heads; None where nobody looked for any.
+    `heads` are None where nobody looked for any.
     """
 
     steps: Steps
@@ -73,7 +73,7 @@ class Observations:
 
     @property
     def walkers(self) -> int:
-        """How many tracks have at least one step."""
+        """The number of tracks with at least one step."""
         return int(np.unique(self.steps.rows.owner_idx).size)
 
 

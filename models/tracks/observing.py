@@ -18,11 +18,6 @@ from models.tracks.loops.ways import steps_of_runs
 from models.tracks.observations import Observations, Rows, Steps, Tops
 from models.tracks.trajectory import Trajectory, points_of, points_where
 
-STEP_S = 1.5  # longer than a stride, shorter than a change of mind
-_KERNEL_S = 0.7  # half the width of the smoothing around a node
-_LONGEST_GAP_S = 1.1
-_FEWEST_POINTS = 3
-
 
 def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Observations:
     """Steps and box tops of trajectories.
@@ -36,10 +31,8 @@ def observe(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Obser
     high = jumped(points.time_s, points.uv, points.bounds, float(intrinsics.height))
     points = points_where(points, ~(short | high))
     inside = intrinsics.shows_foot(points.uv)
-    runs = runs_of_tracks(points.time_s, inside, points.bounds, _LONGEST_GAP_S, _FEWEST_POINTS)
-    firsts, nodes_s, feet, tops = nodes_of_runs(
-        points.time_s, points.uv, points.top_v, runs, STEP_S, _KERNEL_S
-    )
+    runs = runs_of_tracks(points.time_s, inside, points.bounds)
+    firsts, nodes_s, feet, tops = nodes_of_runs(points.time_s, points.uv, points.top_v, runs)
     rays, valid = intrinsics.rays(feet)
     run = np.repeat(np.arange(len(runs)), np.diff(firsts))
     owner_idx = runs[run, 0]

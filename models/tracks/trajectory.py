@@ -64,7 +64,7 @@ class Trajectory:
 
     @property
     def long_enough(self) -> bool:
-        """Whether it is taken at all: at least 5 points over at least 2 s."""
+        """True if it is taken at all: at least 5 points over at least 2 s."""
         enough_s = TRACK_MIN_DURATION_S - 1e-6
         return self.time_s.size >= TRACK_MIN_POINTS and self.duration_s >= enough_s
 

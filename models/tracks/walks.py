@@ -1,4 +1,4 @@
-"""What is read of tracks, each walk once: the pieces of one are put together first."""
+"""Observations of tracks, each walk once: the pieces of one are put together first."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,18 +9,17 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
+from models.tracks.config import MANY_PIECES
 from models.tracks.head_foot import observe_heads
 from models.tracks.linking import link_pieces, walks_of
 from models.tracks.observations import Observations
 from models.tracks.observing import observe as observe_each
 from models.tracks.trajectory import Trajectory, end_to_end
 
-_MANY = 0.1  # of the tracks: so many pieces are worth a word
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walks:
-    """What is read of N tracks, by the order that they were given in.
+    """Observations of N tracks, by the order that they were given in.
 
     `walk_idx` (N,) is the track that each counts with, the last piece of its walk: the steps, boxes
     and heads of a walk in several pieces are that one's, and the others have none.
@@ -31,14 +30,14 @@ class Walks:
 
     @property
     def pieces(self) -> int:
-        """How many tracks are another's walk: they do not count by themselves."""
+        """The number of tracks that are another's walk: they do not count by themselves."""
         return int((self.walk_idx != np.arange(self.walk_idx.size)).sum())
 
     @property
     def reason(self) -> Reason | None:
-        """What is to be said of a tracker that cuts walks; None where it cuts few or none."""
+        """A reason that names a tracker which cuts walks; None where it cuts few or none."""
         tracks = self.walk_idx.size
-        if not tracks or self.pieces < _MANY * tracks:
+        if not tracks or self.pieces < MANY_PIECES * tracks:
             return None
         values = {"tracks": float(tracks), "pieces": float(self.pieces)}
         return Reason(code=TracksCode.PIECES, values=values)
@@ -50,7 +49,7 @@ def observe_walks(
     pose: CameraPose,
     before: npt.NDArray[np.int64] | None = None,
 ) -> Walks:
-    """What is read of tracks, each walk once.
+    """Observe tracks, each walk once.
 
     The same tracks give the same, in whatever portions they came.
 

@@ -26,11 +26,7 @@ from models.walking import config
 from models.walking.fit import Channel, Fit, Near, fit_pose
 from models.walking.groups import count_walking_groups
 from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
-from models.walking.speed_reference import (
-    SpeedReference,
-    channels_of,
-    pose_prior,
-)
+from models.walking.speed_reference import SpeedReference, channels_of, pose_prior
 from models.walking.starts import starts
 
 
@@ -69,7 +65,7 @@ class JointEstimate:
 
     @property
     def raw_parameters(self) -> PoseParameters:
-        """What `raw` is, named; it knows no heading."""
+        """The numbers of `raw` by name; it knows no heading."""
         return PoseParameters.of_array(self.raw)
 
     @property
@@ -242,7 +238,7 @@ def _covariance_of_modes(ends: list[Fit], reference: SpeedReference) -> Array:
 
 
 def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reason | None:
-    """What is not identifiable; `alike` names two parameters that make up for one another."""
+    """A reason that names what is not identifiable; `alike` two that make up for one another."""
     missing = [name for name in PLANE_PARAMETERS if name not in identifiable]
     if not missing:
         return None

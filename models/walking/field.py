@@ -23,7 +23,7 @@ _NO_DIRECTION, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldShape:
-    """How much a field may vary: by place (over a length) and by direction, and its own level.
+    """A field's prior: how much it may vary by place (over a length), by direction, and as a whole.
 
     All are standard deviations of a logarithm.
     """
@@ -140,10 +140,8 @@ def exponents_at(
 ) -> tuple[Array, npt.NDArray[np.int64]]:
     """Logarithms (M, L) of bumps of x or y alone, and which two (K, 2) make each bump.
 
-    Args:
-        place: on the ground (M, 2), metres.
-        centres: of the bumps (K, 2), metres.
-        length_m: of the bumps.
+    A bump is one of x times one of y, and centres (K, 2) on a grid share their x and y: there are
+    fewer exponentials than bumps.
     """
     bumps = len(centres)
     pair, middles = np.empty((bumps, 2), dtype=np.int64), np.empty(2 * bumps)
@@ -172,11 +170,7 @@ def features_of(
 ) -> Array:
     """A field's features (M, P): 1, four of the direction where it has any, and K bumps.
 
-    Args:
-        falls: bumps of x or y alone (M, L).
-        pair: which two make each bump (K, 2).
-        directional: whether the field has directions.
-        direction: unit vectors (M, 2), where it has.
+    `falls` (M, L) are bumps of x or y alone, `pair` (K, 2) the two that make each bump.
     """
     first = 5 if directional else 1
     features = np.empty((len(falls), first + len(pair)))
@@ -206,17 +200,8 @@ def slopes_of(
 ) -> Array:
     """Derivatives (M, 3) of a field's mean by tilt, roll, log height.
 
-    Args:
-        east: sums of bumps times their coefficients and their centres' x (M,).
-        north: the same with y (M,).
-        total: the same with 1 (M,).
-        length_m: of the bumps.
-        place: on the ground (M, 2), metres.
-        d_place: derivatives of that (M, 2, 3).
-        coefficients: of the field (P,).
-        directional: whether the field has directions.
-        direction: unit vectors (M, 2), where it has.
-        d_direction: derivatives of those (M, 2, 3).
+    `east`, `north` and `total` (M,) are sums of bumps times their coefficients and their centres'
+    x, y and 1; `d_place` and `d_direction` (M, 2, 3) are derivatives of `place` and `direction`.
     """
     slopes = np.empty((len(place), 3))
     for j in range(len(place)):

@@ -7,9 +7,8 @@ Source: Triggs, McLauchlan, Hartley and Fitzgibbon 2000, Bundle Adjustment, for 
 weights of each round are those of `mixed_model`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -52,18 +51,14 @@ class Learned:
     usual: float
 
 
-class Measure(Protocol):
-    """Measure some tracks at a candidate (3,), with derivatives if it is `sloped`."""
-
-    def __call__(self, *, candidate: Array, sloped: bool = True) -> Measured:
-        """Logarithms of the tracks."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """One kind of evidence: how to measure it at a candidate, and what is usual at the site."""
+    """One kind of evidence: its measurements at a candidate, and what is usual at the site.
 
-    measure: Measure
+    `measure` takes a `candidate` (3,) and whether it is to be `sloped`, with derivatives, as usual.
+    """
+
+    measure: Callable[..., Measured]
     learned: Learned
 
 
@@ -85,7 +80,7 @@ class Near:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
+    """The end of Gauss-Newton: candidate (3,), covariance (3, 3) by the curvature less noise.
 
     `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao).
     `log_likelihood` compares ends of different starts: the composite one, less the prior's penalty.
@@ -235,7 +230,7 @@ def track_log_likelihoods(channels: Sequence[Channel], candidate: Array) -> Arra
 def _linear(
     channel: Channel, candidate: Array, mean: Array
 ) -> tuple[Measured, Array, Array, Weights]:
-    """What is measured at a candidate, derivatives (M, 3 + P), residuals (M,) and weights."""
+    """Measurements at a candidate, derivatives (M, 3 + P), residuals (M,) and weights."""
     measured = channel.measure(candidate=candidate)
     learned = channel.learned
     features = learned.field.features(measured)

@@ -12,6 +12,9 @@ from models.geometry.ground_flow import ground_flow
 from models.geometry.landing import landing
 from models.geometry.rotation import Array, Mask
 
+_LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
+_LEAST_RATIO = 0.01  # of a person's height to the camera's
+
 
 @compiled
 def speeds_of_steps(
@@ -22,24 +25,14 @@ def speeds_of_steps(
     rotation: Array,
     turns: Array,
     height_m: float,
-    least_step_m: float,
 ) -> tuple[Array, Array, Array, Mask, Array, Array, Array, Array]:
     """Log speeds (M,), middles (M, 2) in metres, directions (M, 2), and which are on the ground.
 
-    Args:
-        start_rays: to where steps begin (M, 3), in the camera frame.
-        end_rays: to where they end (M, 3).
-        noisy_end_rays: to where they may as well end (M, 3).
-        seconds: how long each takes (M,).
-        rotation: `camera_from_world` (3, 3).
-        turns: how a ray's direction in the world moves (T, 3, 3): for tilt and roll, or for none.
-        height_m: of the camera.
-        least_step_m: keeps the logarithm of no step at all finite.
-
-    Returns:
-        The four, derivatives of the first three (M, 3), (M, 2, 3) and (M, 2, 3) by tilt, roll, log
-        height, and how much the first of these change (M, 3) with a step that ends at its noisy
-        end. Where there are no turns, they are by log height alone.
+    After these, derivatives of the first three (M, 3), (M, 2, 3) and (M, 2, 3) by tilt, roll, log
+    height, and how much the first of these change (M, 3) with a step that ends at its noisy end.
+    `turns` say how a ray's direction in the world moves (T, 3, 3), for tilt and roll, or for none:
+    derivatives are then by log height alone. Rays (M, 3) are in the camera frame, `rotation` is
+    `camera_from_world`.
     """
     count = seconds.size
     value, valid = np.zeros(count), np.zeros(count, dtype=np.bool_)
@@ -59,7 +52,7 @@ def speeds_of_steps(
         d_place[j, 0, 2], d_place[j, 1, 2] = x * height_m, y * height_m
         if start_valid and end_valid:
             valid[j], d_value[j, 2] = True, 1.0
-            square_m2 = (length * height_m) ** 2 + least_step_m**2
+            square_m2 = (length * height_m) ** 2 + _LEAST_STEP_M**2
             value[j] = math.log(square_m2 / seconds[j] ** 2) / 2
         if not len(turns):
             continue
@@ -86,29 +79,15 @@ def speeds_of_steps(
 
 @compiled
 def heights_of_tops(
-    foot_rays: Array,
-    top_y: Array,
-    rotation: Array,
-    turns: Array,
-    height_m: float,
-    least_ratio: float,
+    foot_rays: Array, top_y: Array, rotation: Array, turns: Array, height_m: float
 ) -> tuple[Array, Array, Mask, Array, Array]:
     """Log heights of people (M,), where they stand (M, 2) in metres, and which are on the ground.
 
     A height is that of `geometry.upright.stature_ratio`: n / m camera heights, with
     m = down_z - y forward_z and n = (y forward - down) . (p, -1).
 
-    Args:
-        foot_rays: of the feet (M, 3), z = 1, in the camera frame.
-        top_y: undistorted, normalised y (M,) of the upper edges.
-        rotation: `camera_from_world` (3, 3).
-        turns: how a ray's direction in the world moves (T, 3, 3): for tilt and roll, or for none.
-        height_m: of the camera.
-        least_ratio: of a person's height to the camera's.
-
-    Returns:
-        The three, and derivatives of the first two (M, 3) and (M, 2, 3) by tilt, roll, log height;
-        where there are no turns, by log height alone.
+    After these, derivatives of the first two (M, 3) and (M, 2, 3) by tilt, roll, log height; where
+    there are no turns, by log height alone. `top_y` (M,) is undistorted, normalised y.
     """
     count = top_y.size
     value, valid = np.zeros(count), np.zeros(count, dtype=np.bool_)
@@ -122,7 +101,7 @@ def heights_of_tops(
         ratio = 1.0
         if on_ground:
             seen = (lean_x * east + lean_y * north - lean_z) / -lean_z
-            if seen > least_ratio:
+            if seen > _LEAST_RATIO:
                 ratio, valid[j] = seen, True
                 value[j] = math.log(ratio * height_m)
         place[j, 0], place[j, 1] = east * height_m, north * height_m

@@ -10,13 +10,7 @@ import numpy.typing as npt
 from models.compiled import compiled
 from models.geometry.rotation import Array
 from models.tracks.components import first_of_component
-from models.walking.config import (
-    GROUP_BIN_S,
-    GROUP_NEAR_M,
-    GROUP_SAME_WAY,
-    GROUP_SHARE,
-    GROUP_STANDING_MPS,
-)
+from models.walking import config
 from models.walking.measures import Measured
 
 
@@ -27,7 +21,7 @@ def count_walking_groups(speeds: Measured) -> int:
     than one.
     """
     assert speeds.direction is not None
-    walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(GROUP_STANDING_MPS)))
+    walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(config.GROUP_STANDING_MPS)))
     rows = speeds.rows
     labels = walking_groups_of(
         rows.time_s[walking],
@@ -40,11 +34,7 @@ def count_walking_groups(speeds: Measured) -> int:
 
 
 def walking_groups_of(
-    time_s: Array,
-    owner_idx: npt.NDArray[np.int64],
-    place: Array,
-    direction: Array,
-    owners: int,
+    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, direction: Array, owners: int
 ) -> npt.NDArray[np.int64]:
     """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
 
@@ -56,7 +46,7 @@ def walking_groups_of(
         owners: how many tracks there are; those without steps are each a walking group.
     """
     since_s = time_s - time_s.min(initial=np.inf)
-    time_bin = np.floor(since_s / GROUP_BIN_S + 1e-3).astype(np.int64)
+    time_bin = np.floor(since_s / config.GROUP_BIN_S + 1e-3).astype(np.int64)
     order = np.lexsort((owner_idx, time_bin))
     fresh = (np.diff(time_bin[order], prepend=-1) != 0) | (
         np.diff(owner_idx[order], prepend=-1) != 0
@@ -66,7 +56,9 @@ def walking_groups_of(
     pair, count = np.unique(together[:, 0] * owners + together[:, 1], return_counts=True)
     beside = np.stack(np.divmod(pair, owners), axis=1)
     lengths = np.bincount(owner_idx[first], minlength=owners)
-    return first_of_component(beside[count >= GROUP_SHARE * lengths[beside].min(axis=1)], owners)
+    return first_of_component(
+        beside[count >= config.GROUP_SHARE * lengths[beside].min(axis=1)], owners
+    )
 
 
 @compiled
@@ -78,11 +70,7 @@ def pairs_beside(
 ) -> npt.NDArray[np.int64]:
     """Pairs of tracks (K, 2), one for each time that the two are beside one another.
 
-    Args:
-        time_bin: ascending (M,).
-        owner_idx: tracks (M,), ascending within a bin.
-        place: where each was (M, 2), metres.
-        direction: unit vectors (M, 2) of where it went.
+    Bins of time are ascending (M,), and so are tracks (M,) within a bin.
     """
     found = []
     for i in range(time_bin.size):
@@ -90,7 +78,7 @@ def pairs_beside(
         while j < time_bin.size and time_bin[j] == time_bin[i]:
             apart = np.hypot(place[i, 0] - place[j, 0], place[i, 1] - place[j, 1])
             same = direction[i, 0] * direction[j, 0] + direction[i, 1] * direction[j, 1]
-            if apart < GROUP_NEAR_M and same > GROUP_SAME_WAY:
+            if apart < config.GROUP_NEAR_M and same > config.GROUP_SAME_WAY:
                 found.append((owner_idx[i], owner_idx[j]))
             j += 1
     pairs = np.empty((len(found), 2), dtype=np.int64)

@@ -17,8 +17,6 @@ from models.geometry.rotation import Array, Mask, rotation_from_angles
 from models.tracks.observations import Rows, Steps, Tops
 from models.walking.ground_loops import heights_of_tops, speeds_of_steps
 
-_LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
-_LEAST_RATIO = 0.01  # of a person's height to the camera's
 _NO_TURNS = np.empty((0, 3, 3))
 
 
@@ -65,7 +63,6 @@ def measure_speeds(
         rotation,
         turns,
         height_m,
-        _LEAST_STEP_M,
     )
     return Measured(
         value=value,
@@ -90,7 +87,7 @@ def measure_statures(
     height_m = math.exp(candidate[2])
     rotation, turns = _rotation_and_turns(candidate, heading_rad, sloped)
     value, place, valid, d_value, d_place = heights_of_tops(
-        tops.foot_rays, tops.top_y, rotation, turns, height_m, _LEAST_RATIO
+        tops.foot_rays, tops.top_y, rotation, turns, height_m
     )
     return Measured(
         value=value,

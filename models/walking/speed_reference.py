@@ -22,7 +22,7 @@ from models.walking.measures import measure_speeds, measure_statures
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedReference:
-    """How people walk and how tall they are at a site, and how the joint estimator errs there.
+    """People's usual speeds and statures at a site, and the joint estimator's errors there.
 
     `offset` (3,) is what it says of tilt, roll, log height at the prior pose beyond the truth, with
     `offset_covariance` (3, 3); its variances are to be multiplied by `pose_variance_inflation`.
@@ -48,7 +48,7 @@ class SpeedReference:
 
     @property
     def stature_m(self) -> float | None:
-        """How tall the boxes say that people are; None where boxes are not used."""
+        """The site's usual stature by boxes; None where these are not used."""
         return None if self.statures is None else float(np.exp(self.statures.usual))
 
     @property
@@ -75,8 +75,7 @@ def channels_of(
     steps, tops = observations.steps, observations.tops
     found = [
         Channel(
-            measure=partial(measure_speeds, steps, heading_rad=heading),
-            learned=reference.speeds,
+            measure=partial(measure_speeds, steps, heading_rad=heading), learned=reference.speeds
         )
     ]
     if reference.statures is not None and len(tops.rows):
@@ -98,9 +97,7 @@ def learned_at(
     """
     at = plane_parameters_of(prior)
     speeds = learn(
-        measure_speeds(observations.steps, at, prior.heading_rad),
-        blank.speeds,
-        em_rounds=rounds,
+        measure_speeds(observations.steps, at, prior.heading_rad), blank.speeds, em_rounds=rounds
     )
     statures = None
     if blank.statures is not None:

@@ -9,41 +9,31 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array, Mask
+from models.tracks import config
 
-_USUAL_GAPS = 2.5  # of a track's usual interval between points is no gap yet
-_LEAST_TOTAL, _LEAST_SPREAD = 1e-12, 1e-9
-_LEAST_WEIGHED = 2  # points that make a line
+_LEAST_TOTAL, _LEAST_VARIANCE = 1e-12, 1e-9
 
 
 @compiled
 def runs_of_tracks(
-    time_s: Array,
-    inside: Mask,
-    bounds: npt.NDArray[np.int64],
-    longest_gap_s: float,
-    fewest_points: int,
+    time_s: Array, inside: Mask, bounds: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int64]:
     """Runs (R, 3) of points inside the image without a gap: the track, the first, one beyond.
 
-    Args:
-        time_s: of all points (T,).
-        inside: which of them are in the image (T,).
-        bounds: of the tracks (N + 1,).
-        longest_gap_s: what is no longer is no gap, however dense the points are.
-        fewest_points: of a run.
+    `inside` (T,) says which points are in the image.
     """
     found = []
     for track in range(bounds.size - 1):
         first, beyond = bounds[track], bounds[track + 1]
-        gap_s = longest_gap_s
+        gap_s = config.LONGEST_GAP_S
         if beyond - first > 1:
             usual_s = float(np.median(time_s[first + 1 : beyond] - time_s[first : beyond - 1]))
-            gap_s = max(_USUAL_GAPS * usual_s, longest_gap_s)
+            gap_s = max(config.USUAL_GAPS * usual_s, config.LONGEST_GAP_S)
         begin = first
         for j in range(first + 1, beyond + 1):
             if j < beyond and inside[j] and inside[j - 1] and time_s[j] - time_s[j - 1] <= gap_s:
                 continue
-            if j - begin >= fewest_points and inside[begin]:
+            if j - begin >= config.RUN_POINTS and inside[begin]:
                 found.append((track, begin, j))
             begin = j
     runs = np.empty((len(found), 3), dtype=np.int64)
@@ -54,25 +44,15 @@ def runs_of_tracks(
 
 @compiled
 def nodes_of_runs(
-    time_s: Array,
-    uv: Array,
-    top_v: Array,
-    runs: npt.NDArray[np.int64],
-    step_s: float,
-    kernel_s: float,
+    time_s: Array, uv: Array, top_v: Array, runs: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], Array, Array, Array]:
     """The first node of each run (R + 1,), nodes' times (K,), smooth feet (K, 2) and tops (K,).
 
     A run that is shorter than a step has no nodes. A top is NaN where none is known.
 
-    Args:
-        time_s: of all points (T,).
-        uv: feet (T, 2) in pixels.
-        top_v: upper edges of boxes (T,) in pixels, NaN where none is known.
-        runs: as of `runs_of_tracks`.
-        step_s: from one node to the next.
-        kernel_s: half the width of the smoothing, wider where points are sparse.
+    The smoothing is wider where points are sparse; `runs` are those of `runs_of_tracks`.
     """
+    step_s = config.STEP_S
     firsts = np.zeros(len(runs) + 1, dtype=np.int64)
     for number in range(len(runs)):
         begin, last = runs[number, 1], runs[number, 2] - 1
@@ -88,7 +68,7 @@ def nodes_of_runs(
             continue
         duration_s = time_s[beyond - 1] - time_s[begin]
         reach_s = max(
-            kernel_s,
+            config.KERNEL_S,
             1.01 * float(np.median(time_s[begin + 1 : beyond] - time_s[begin : beyond - 1])),
         )
         boxed = 0
@@ -106,7 +86,7 @@ def nodes_of_runs(
                 u = _between(time_s, across, begin, beyond, at_s)
                 v = _between(time_s, along, begin, beyond, at_s)
             feet[node, 0], feet[node, 1] = u, v
-            if boxed >= _LEAST_WEIGHED:
+            if boxed >= config.LINE_POINTS:
                 # The box's height is smoothed, not its top: it is the same all through a stride.
                 known, height = _line(time_s, tall, near, beyond, at_s, reach_s)
                 if known:
@@ -118,7 +98,7 @@ def nodes_of_runs(
 def _line(
     time_s: Array, values: Array, first: int, beyond: int, at_s: float, reach_s: float
 ) -> tuple[bool, float]:
-    """Whether two known points are within reach, and the value of a weighted line through all."""
+    """True if two known points are within reach, and the value of a weighted line through all."""
     number, total, centre, mean = 0, 0.0, 0.0, 0.0
     for j in range(first, beyond):
         ahead = time_s[j] - at_s
@@ -132,17 +112,17 @@ def _line(
             mean += weight * values[j]
     total = max(total, _LEAST_TOTAL)
     centre, mean = centre / total, mean / total
-    spread, slope = 0.0, 0.0
+    variance, slope = 0.0, 0.0
     for j in range(first, beyond):
         ahead = time_s[j] - at_s
         if ahead >= reach_s:
             break
         weight = 1 - abs(ahead) / reach_s
         if weight > 0 and np.isfinite(values[j]):
-            spread += weight * (ahead - centre) ** 2
+            variance += weight * (ahead - centre) ** 2
             slope += weight * (ahead - centre) * values[j]
-    slope = slope / total / max(spread / total, _LEAST_SPREAD)
-    return number >= _LEAST_WEIGHED, mean - slope * centre
+    slope = slope / total / max(variance / total, _LEAST_VARIANCE)
+    return number >= config.LINE_POINTS, mean - slope * centre
 
 
 @compiled

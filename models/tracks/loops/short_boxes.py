@@ -13,30 +13,17 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array, Mask
+from models.tracks import config
 
-_FEWEST = 8  # boxes of a track
-_MOST = 60  # that a line is laid through: more of them say the same again
-_QUANTILE = 0.7  # of the boxes of a track, so many may be hidden
-_ROUNDS = 12
-_NEAREST = 0.01  # of a height: what is nearer to the line weighs no more
-_LEAST_LINE = 0.05  # of the middle height: no line is below it
-_HOLD = 1e-4  # of all weights: holds the slopes of who keeps within a hundredth of a height
-_SHORT = 0.12  # in logs: 0.2 m of a person
-_USUAL_SDS = 5.0  # of a track's own noise from box to box
 _SD_OF_MEDIAN_CHANGE = 1.4826 / np.sqrt(2)  # a change is of two boxes
 
 
 @compiled
 def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
-    """Which points (T,) have a box that is too short: what it ends at are no feet.
+    """A mask (T,) of points whose box is too short: what it ends at are no feet.
 
     None of a track with fewer than eight boxes; somebody hidden all along the way looks like a
     small person, and is taken for one.
-
-    Args:
-        uv: feet (T, 2) in pixels.
-        top_v: upper edges of boxes (T,) in pixels, NaN where none is known.
-        bounds: of the N tracks (N + 1,).
     """
     short = np.zeros(top_v.size, dtype=np.bool_)
     for track in range(bounds.size - 1):
@@ -47,7 +34,7 @@ def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
             if uv[j, 1] > top_v[j]:  # NaN is not
                 boxed[number] = j
                 number += 1
-        if number < _FEWEST:
+        if number < config.HIDDEN_FEWEST:
             continue
         boxed = boxed[:number]
         tall, across, down = np.empty(number), np.empty(number), np.empty(number)
@@ -60,7 +47,9 @@ def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
             down[k] = (top_v[boxed[k]] - top_v[boxed[0]]) / middle
         off = _off_the_line(tall, across, down)
         changes = np.abs(off[1:] - off[:-1])
-        limit = max(_SHORT, _USUAL_SDS * _SD_OF_MEDIAN_CHANGE * float(np.median(changes)))
+        limit = max(
+            config.HIDDEN_LOG, config.HIDDEN_SDS * _SD_OF_MEDIAN_CHANGE * float(np.median(changes))
+        )
         for k in range(number):
             short[boxed[k]] = off[k] < -limit
     return short
@@ -69,18 +58,21 @@ def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
 @compiled
 def _off_the_line(tall: Array, across: Array, down: Array) -> Array:
     """Logs (K,) of heights (K,) over a line in two coordinates (K,), (K,), a quantile of them."""
-    stride = -(-tall.size // _MOST)
+    stride = -(-tall.size // config.HIDDEN_MOST)
     some_tall, some_across, some_down = tall[::stride], across[::stride], down[::stride]
     mean_across, mean_down = float(np.mean(some_across)), float(np.mean(some_down))
     level, by_across, by_down = float(np.median(some_tall)), 0.0, 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(config.HIDDEN_ROUNDS):
         # Weighted sums of products: of 1, the two coordinates, the height.
         s, sa, sd, st = 0.0, 0.0, 0.0, 0.0
         saa, sad, sdd, sat, sdt = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(some_tall.size):
             a, d, t = some_across[k] - mean_across, some_down[k] - mean_down, some_tall[k]
-            over = t / max(level + by_across * a + by_down * d, _LEAST_LINE) - 1
-            weight = (_QUANTILE if over > 0 else 1 - _QUANTILE) / max(abs(over), _NEAREST)
+            line = max(level + by_across * a + by_down * d, config.HIDDEN_LEAST_LINE)
+            over = t / line - 1
+            weight = (config.HIDDEN_QUANTILE if over > 0 else 1 - config.HIDDEN_QUANTILE) / max(
+                abs(over), config.HIDDEN_NEAREST
+            )
             s += weight
             sa += weight * a
             sd += weight * d
@@ -91,8 +83,8 @@ def _off_the_line(tall: Array, across: Array, down: Array) -> Array:
             sat += weight * a * t
             sdt += weight * d * t
         # About the weighted means two equations are left.
-        aa, ad = saa - sa * sa / s + _HOLD * s, sad - sa * sd / s
-        dd = sdd - sd * sd / s + _HOLD * s
+        aa, ad = saa - sa * sa / s + config.HIDDEN_HOLD * s, sad - sa * sd / s
+        dd = sdd - sd * sd / s + config.HIDDEN_HOLD * s
         at, dt = sat - sa * st / s, sdt - sd * st / s
         determinant = aa * dd - ad * ad
         by_across = (at * dd - dt * ad) / determinant
@@ -101,5 +93,5 @@ def _off_the_line(tall: Array, across: Array, down: Array) -> Array:
     off = np.empty(tall.size)
     for k in range(tall.size):
         line = level + by_across * (across[k] - mean_across) + by_down * (down[k] - mean_down)
-        off[k] = np.log(tall[k] / max(line, _LEAST_LINE))
+        off[k] = np.log(tall[k] / max(line, config.HIDDEN_LEAST_LINE))
     return off

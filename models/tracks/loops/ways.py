@@ -8,9 +8,8 @@ import numpy.typing as npt
 from models.compiled import compiled
 from models.geometry.rotation import Array
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
+from models.tracks.config import DIRECTION_NODES, MOST_DIRECTION_NOISE
 
-_WAY_NODES = 2  # on both sides of a step: 4.5 s
-_LARGEST_DIRECTION_NOISE = 0.5
 _LEAST_CHORD = 1e-7  # of a ray: far less than a pixel
 _OF_BEND = SD_OF_MEDIAN_DEVIATION / math.sqrt(6.0)
 
@@ -21,10 +20,6 @@ def steps_of_runs(rays: Array, firsts: npt.NDArray[np.int64]) -> tuple[Array, Ar
 
     A step is from each node to the next of its run, in that node's place; those of the last nodes
     of runs are nothing.
-
-    Args:
-        rays: to nodes (K, 3), z = 1, in the camera frame.
-        firsts: the first node of each run (R + 1,).
     """
     starts, ends, noisy_ends = np.zeros(rays.shape), np.zeros(rays.shape), np.zeros(rays.shape)
     for run in range(firsts.size - 1):
@@ -41,7 +36,7 @@ def steps_of_runs(rays: Array, firsts: npt.NDArray[np.int64]) -> tuple[Array, Ar
             half = max(abs(across_x * x + across_y * y), _LEAST_CHORD) / 2
             middle_x = (rays[node + 1, 0] + rays[node, 0]) / 2
             middle_y = (rays[node + 1, 1] + rays[node, 1]) / 2
-            turn = min(noise / lever[step], _LARGEST_DIRECTION_NOISE)
+            turn = min(noise / lever[step], MOST_DIRECTION_NOISE)
             starts[node, 0], starts[node, 1] = middle_x - half * x, middle_y - half * y
             ends[node, 0], ends[node, 1] = middle_x + half * x, middle_y + half * y
             noisy_ends[node, 0] = middle_x + half * (x - turn * y)
@@ -58,8 +53,8 @@ def _ways(rays: Array) -> tuple[Array, Array]:
     """
     way, lever = np.empty((len(rays) - 1, 2)), np.empty(len(rays) - 1)
     for step in range(len(rays) - 1):
-        low = max(step + 1 - _WAY_NODES, 0)
-        high = min(step + _WAY_NODES, len(rays) - 1)
+        low = max(step + 1 - DIRECTION_NODES, 0)
+        high = min(step + DIRECTION_NODES, len(rays) - 1)
         middle = (low + high) / 2
         moment, slope_x, slope_y = 0.0, 0.0, 0.0
         for node in range(low, high + 1):

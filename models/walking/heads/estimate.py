@@ -29,7 +29,7 @@ class HeadEstimate:
     tracks: int
 
     def log_density(self, values: Array, covariance: Array) -> float:
-        """How likely these heads are by another Gaussian on tilt and roll, (2,) and (2, 2)."""
+        """The log density of these heads by another Gaussian on tilt and roll, (2,) and (2, 2)."""
         off = self.values - values
         wide = self.covariance + covariance
         squared = float(off @ np.linalg.solve(wide, off))

@@ -63,7 +63,7 @@ def learn_habit(
 def column_share(
     pairs: HeadFootPairs, at: Array, components: LeanComponents
 ) -> tuple[float, float]:
-    """How far heads follow the picture's columns at a tilt and roll (2,), give or take one sd.
+    """The share by which heads follow the picture's columns at a tilt and roll (2,), and its sd.
 
     0 is where leans are the same all over the picture, 1 where heads are right above the feet in
     it. Where columns are as upright as verticals are, or as oblique everywhere, nobody can tell,

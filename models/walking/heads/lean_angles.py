@@ -1,4 +1,4 @@
-"""How far people lean to the side at a candidate tilt and roll, with derivatives.
+"""Lean angles of people to the side at a candidate tilt and roll, with derivatives.
 
 A foot's ray f and its head's ray h span a plane through the camera, of normal n. An upright pole
 lies in a plane with the vertical g, so n' g = 0 there; else n' g is the angle by which what stands
@@ -78,7 +78,7 @@ def _normals(feet: Array, heads: Array) -> tuple[Array, Mask]:
 
 
 def _sideways(pairs: HeadFootPairs, rotation: Array, foot: Array) -> Array:
-    """How much of their ways (M,) on the ground lies to the right of the view of their feet."""
+    """The share (M,) of their walk on the ground to the right of the view of their feet."""
     start, start_falls = ground_of_rays(pairs.from_rays, rotation, beyond=0.0)
     end, end_falls = ground_of_rays(pairs.to_rays, rotation, beyond=0.0)
     way = np.where((start_falls & end_falls)[:, None], end - start, 0.0)

@@ -24,7 +24,7 @@ from models.walking.mixed.variance_inflation import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadReference:
-    """How people's heads stand over their feet at a site.
+    """The stance of people's heads over their feet at a site.
 
     `at` (2,) is the tilt and roll that it was learned at. `habit` is what is usual: the bias to the
     right, and the lean of who walks to the right (2,), in radians. `column_share` is how far the
@@ -49,7 +49,7 @@ class HeadReference:
 
     @property
     def leaning(self) -> bool:
-        """Whether heads were seen to lean as verticals do, and not as columns."""
+        """True if heads were seen to lean as verticals do, and not as columns."""
         return abs(self.column_share) + 2 * self.column_share_sd < config.COLUMN_SHARE_OF_REFERENCE
 
 

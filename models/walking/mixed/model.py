@@ -53,7 +53,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VarianceComponents:
-    """How logarithms scatter at a site.
+    """The scatter of logarithms at a site.
 
     `between_sd` of the levels of tracks, `trend_sd` of their trends in 10 s, `within_sd` of
     deviations, `correlation` from one row to the next; the outliers' share, and the mean and

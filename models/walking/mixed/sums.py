@@ -29,17 +29,10 @@ def whitened(
     have in common once the tracks' own levels and trends are integrated out: L is the inverse root
     of the precision of level and trend, times the sums of W with those.
 
-    Source: Prais and Winsten 1954, for a first-order autoregression.
+    Columns (M, P) are derivatives of the residuals (M,); `weight` (M,) is of rows, `track` (N,) of
+    tracks; a `linked` row follows the one before it.
 
-    Args:
-        columns: derivatives of the residuals (M, P).
-        residual: of each row (M,).
-        weight: of each row (M,).
-        track: the weight of each track (N,).
-        owner_idx: the track of each row (M,).
-        linked: which rows follow the one before them (M,).
-        when: since the middle of a row's track (M,), in 10 s.
-        components: standard deviations between tracks, of trends, within tracks; the correlation.
+    Source: Prais and Winsten 1954, for a first-order autoregression.
     """
     between_sd, trend_sd, within_sd, rho = components
     count, width = columns.shape

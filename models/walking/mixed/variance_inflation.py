@@ -1,4 +1,4 @@
-"""How much larger squared errors are than a curvature says, by the reference's own times.
+"""Squared errors over what a curvature says, by the reference's own times; and shrunken offsets.
 
 Ours: the mean of e' S^-1 e over the number of parameters, held out, e being what is off and S its
 covariance; an offset is shrunk by its own noise, K = P (P + S)^-1 for a plausible P, which is as
@@ -46,7 +46,7 @@ def squared_ratio(error: Array, covariance: Array) -> float:
 
 
 def shrink_offset(offset: Array, noise: Array, plausible_sd: Array) -> tuple[Array, Array]:
-    """What is kept of an offset (P,) of a covariance (P, P), and what is not known of that.
+    """An offset (P,) shrunk by its noise (P, P), and the covariance of what is left.
 
     A bias is of about the plausible size, and what the tracks leave free is not taken for one; but
     where they leave no doubt, people walk unlike those of most sites, and it is a large one.

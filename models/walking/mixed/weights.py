@@ -10,13 +10,7 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array, Mask
-from models.walking.config import (
-    ABOVE_HORIZON,
-    FREEDOM,
-    INDEPENDENT_ROWS,
-    OUTLIER_PRIOR_ROWS,
-    OUTLIER_ROUNDS,
-)
+from models.walking import config
 
 _LEAST_ODDS, _MOST_ODDS = math.exp(-30.0), math.exp(30.0)
 _FAR_FROM_1 = 1e100
@@ -36,20 +30,9 @@ def weights_of_tracks(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Weights of rows (M,) and of tracks (N,), of rows to be inliers, and random levels and trends.
 
-    Args:
-        residual: of each row (M,).
-        value: a logarithm (M,).
-        valid: which rows count (M,).
-        owner_idx: the track of each (M,).
-        when: since the middle of its track (M,), in 10 s.
-        owners: how many tracks there are, with and without rows.
-        components: standard deviations between tracks, of trends, within tracks; the correlation.
-        outliers: their share, mean and standard deviation.
-        rounds: of re-weighting.
-
-    Returns:
-        Rows' weights (M,), tracks' weights (N,), probabilities to be an inlier (M,), levels and
-        trends (N, 2) and their covariances (N, 2, 2).
+    Of M rows there are residuals, values, which are valid, owners and times since the middles of
+    their tracks in 10 s; `components` and `outliers` are those of `VarianceComponents`. Random
+    levels and trends are (N, 2), with covariances (N, 2, 2).
     """
     between_sd, trend_sd, within_sd, correlation = components
     total_sd = math.sqrt(between_sd**2 + within_sd**2)
@@ -84,10 +67,10 @@ def weights_of_tracks(
             level = (square * level_sum - mixed * trend_sum) / determinant
             trend = (one * trend_sum - mixed * level_sum) / determinant
             effects[owner, 0], effects[owner, 1] = level, trend
-            track[owner] = (FREEDOM + 1) / (FREEDOM + (level / between_sd) ** 2)
+            track[owner] = (config.FREEDOM + 1) / (config.FREEDOM + (level / between_sd) ** 2)
             for j in range(first, last):
                 deviation = (residual[j] - level - trend * when[j]) / within_sd
-                row[j] = inlier[j] * (FREEDOM + 1) / (FREEDOM + deviation * deviation)
+                row[j] = inlier[j] * (config.FREEDOM + 1) / (config.FREEDOM + deviation * deviation)
     return row, track, inlier, effects, covariance
 
 
@@ -110,7 +93,7 @@ def log_likelihoods_apart(
         total, product = 0.0, 1.0  # a logarithm of many rows' densities, not one of each
         for j in range(first, last):
             if not valid[j]:
-                total += ABOVE_HORIZON
+                total += config.ABOVE_HORIZON
                 continue
             usual, unusual = _densities(residual[j], value[j], scales)
             product *= (1 - share) * usual + share * unusual
@@ -119,7 +102,7 @@ def log_likelihoods_apart(
                 product = 1.0
         number = last - first
         total += math.log(product)
-        found[owner] = total / max(number, 1) * min(number, INDEPENDENT_ROWS)
+        found[owner] = total / max(number, 1) * min(number, config.INDEPENDENT_ROWS)
     return found
 
 
@@ -132,14 +115,16 @@ def _find_inliers(odds: Array, valid: Mask, usual_share: float, inlier: Array) -
     """
     number = valid.sum()
     share = usual_share
-    for _ in range(OUTLIER_ROUNDS):
+    for _ in range(config.OUTLIER_ROUNDS):
         left = float(number)
         for j in range(odds.size):
             if valid[j]:
                 outlier = share * odds[j]
                 inlier[j] = 1 - outlier / (outlier + 1 - share)
                 left -= inlier[j]
-        share = (OUTLIER_PRIOR_ROWS * usual_share + left) / (OUTLIER_PRIOR_ROWS + number)
+        share = (config.OUTLIER_PRIOR_ROWS * usual_share + left) / (
+            config.OUTLIER_PRIOR_ROWS + number
+        )
 
 
 @compiled
@@ -149,7 +134,7 @@ def _scales_of(
     """Reciprocals for densities, since a division takes as long as a root."""
     _, mean, sd = outliers
     return (
-        1 / (total_sd * math.sqrt(FREEDOM)),
+        1 / (total_sd * math.sqrt(config.FREEDOM)),
         0.375 / total_sd,  # the highest density of Student-t: 3/8
         mean,
         1 / (math.sqrt(2) * sd),

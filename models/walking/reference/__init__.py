@@ -1,1 +1,1 @@
-"""How people walk at a site, learned from its first tracks."""
+"""Learning a site's reference from its first tracks."""

@@ -82,7 +82,7 @@ def assumed_speed_reference(
 
 
 def _judge_boxes(tops: Measured) -> tuple[bool, str]:
-    """Whether boxes tell how tall people are, and why (not), in words."""
+    """True if boxes measure statures, and why (not), in words."""
     owners = np.unique(tops.rows.owner_idx[tops.valid])
     if owners.size < config.FEWEST_BOXED:
         return False, f"boxes of {owners.size} tracks, at least {config.FEWEST_BOXED} are needed"

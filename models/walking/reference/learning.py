@@ -20,12 +20,7 @@ from models.walking.mixed.variance_inflation import (
 )
 from models.walking.reference.assumed import assumed_speed_reference
 from models.walking.reference.plausibility import implausibility_of
-from models.walking.speed_reference import (
-    SpeedReference,
-    channels_of,
-    learned_at,
-    pose_prior,
-)
+from models.walking.speed_reference import SpeedReference, channels_of, learned_at, pose_prior
 
 
 def learn_speed_reference(

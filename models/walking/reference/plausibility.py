@@ -1,4 +1,4 @@
-"""What of a reference cannot be true: speeds, statures, or a pose too far from the prior."""
+"""Plausibility of a reference: its speeds, statures, and a free pose beside the prior."""
 
 from dataclasses import replace
 
@@ -14,12 +14,9 @@ from models.walking.speed_reference import SpeedReference
 
 
 def implausibility_of(
-    observations: Observations,
-    prior: CameraPose,
-    blank: SpeedReference,
-    reference: SpeedReference,
+    observations: Observations, prior: CameraPose, blank: SpeedReference, reference: SpeedReference
 ) -> Reason | None:
-    """What of a reference is too far off to be a bias; None where nothing is."""
+    """A reason that names what is too far off to be a bias; None where nothing is."""
     slow, fast = config.USUAL_SPEEDS_MPS
     speed_mps, stature_m = reference.walking_speed_mps, reference.stature_m
     if not slow <= speed_mps <= fast:
