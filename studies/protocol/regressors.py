@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate, without_offset
+from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate
 from models.geometry.pose import CameraPose
 from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.network import predict_windows
@@ -22,6 +22,7 @@ from studies.regressors.calibrated import (
     sampling_covariance,
 )
 from studies.regressors.calibration import learn_calibration
+from studies.regressors.site_offset import without_offset
 from studies.simulation.crowds import FlowConfig
 
 # A number of which an answer is less sure than this is not identifiable.
