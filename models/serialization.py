@@ -30,7 +30,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """What bytes hold, and in which version; a version is read by its own release and later."""
+    """Name and version of a stored format; a version is read by its own release and later."""
 
     name: str
     version: int

@@ -81,7 +81,7 @@ def protocol(
         Path | None, typer.Option(help="A page with markers to write the tables into.")
     ] = None,
 ) -> None:
-    """What is served, measured in the order of time, with faults, and over long recordings."""
+    """Measure what is served in the order of time, with faults, and over long recordings."""
     from studies.faults.catalogue import FAULTS
     from studies.served.run import run_served
     from studies.served.tasks import Table
@@ -109,7 +109,7 @@ def parts(
     output: Annotated[Path, typer.Option(help="Where figures are kept.")] = Path("parts.jsonl"),
     write: Annotated[Path | None, typer.Option(help="A page with markers for the table.")] = None,
 ) -> None:
-    """What each part of the estimator is worth: the protocol with one off at a time."""
+    """Measure what each part of the estimator is worth: the protocol with one off at a time."""
     from studies.parts.run import run_parts
 
     run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write)

@@ -1,4 +1,4 @@
-"""What tracks tell of a camera: whether it has moved, and its pose, with intervals."""
+"""Result of an estimate: whether the camera has moved, and its pose, with intervals."""
 
 import math
 from collections.abc import Sequence

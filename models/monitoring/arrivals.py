@@ -1,4 +1,4 @@
-"""How many tracks a camera usually sees when, and how improbable it is that none come for a while.
+"""Arrival model of a camera's tracks, and the probability that none come for a while.
 
 A profile over the hours of the day, weekends apart, says how many are expected. People come in
 walking groups, trains and rushes: gaps between tracks, measured in tracks expected meanwhile, would
@@ -39,7 +39,7 @@ _SURELY = 1e-3  # chance below which people should have been seen: then the fixe
 
 
 class SilenceVerdict(StrEnum):
-    """What a silence is taken for."""
+    """Verdict on a silence."""
 
     USUAL = "usual"
     IMPROBABLE = "improbable"
@@ -86,7 +86,7 @@ class Rhythm:
 
     @property
     def arrivals_per_year(self) -> float:
-        """How many walking groups come in a year: after each, a silence may begin."""
+        """Walking groups in a year: after each, a silence may begin."""
         week = 5 * sum(self.rates[:24]) + 2 * sum(self.rates[24:])
         return week / (7 * 24) * _HOURS_PER_YEAR / self.burst
 
@@ -117,7 +117,7 @@ def learn_rhythm(
 def expected_tracks(
     rhythm: Rhythm, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
 ) -> float:
-    """How many tracks are expected between two times, within the hours of `cells` (H,)."""
+    """Expected number of tracks between two times, within the hours of `cells` (H,)."""
     starts_s = HOUR_S * (first_hour + np.arange(len(cells)))
     overlap_s = np.minimum(starts_s + HOUR_S, to_s) - np.maximum(starts_s, from_s)
     rates = np.array(rhythm.rates)[cells]
@@ -165,7 +165,7 @@ def judge_silence(
     seen: float,
     expected: float,
 ) -> SilenceVerdict:
-    """Whether a silence is too improbable to be one; the numbers are `chance_of_silence`'s."""
+    """Verdict on a silence; the arguments are those of `chance_of_silence`."""
     if silent_s < rule.least_s or not is_missed(rhythm, missed):
         return SilenceVerdict.USUAL
     chance = chance_of_silence(rhythm, missed, silent_s, seen, expected)
@@ -176,12 +176,12 @@ def judge_silence(
 
 
 def is_missed(rhythm: Rhythm, missed: float) -> bool:
-    """Whether more than a few walking groups should have come: fewer may stay away any day."""
+    """True where more than a few walking groups should have come: fewer may stay away any day."""
     return missed > _FEW * rhythm.burst
 
 
 def delay_of(latest_s: Array) -> float:
-    """How late a camera's tracks usually come at the most, in seconds, with a margin.
+    """Longest usual delay of a camera's tracks, in seconds, with a margin.
 
     Days on which they came far later than on others were those of an outage that was caught up
     with, and do not count.
@@ -212,7 +212,7 @@ def _rates(counts: Array, cells: np.ndarray, known: np.ndarray) -> Array:
 
 
 def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> float:
-    """How much longer gaps are than those of people who come alone, in tracks expected meanwhile.
+    """Ratio of the longest gaps to those of people who come alone, in tracks expected meanwhile.
 
     Source: the time-rescaling theorem (Brown et al., 2002, Neural Computation 14, theorem 1).
     """

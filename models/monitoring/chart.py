@@ -71,7 +71,7 @@ KNOCKS = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftChart:
-    """What groups' scores are like while a camera stands, and what each knock makes of them.
+    """Distribution of groups' scores while a camera stands, and their response to each pose offset.
 
     Scores are bounded around `middle` (14,) by five times their `width` (14,); of these, `mean`
     (14,) and `covariance` (14, 14) are of the `walking_groups` of the reference and `responses`
@@ -92,7 +92,7 @@ class DriftChart:
     tail: float
 
     def level(self, alarms_a_run: float) -> float:
-        """What the statistic passes so many times in a run of 1000 groups of a still camera."""
+        """Level passed so many times by the statistic in 1000 groups of a still camera."""
         share = -np.expm1(-alarms_a_run)
         learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
         return max(learned, _LEAST_LEVEL - float(np.log(share))) * _unsure(
@@ -113,7 +113,7 @@ class Tested:
 
     @property
     def moved(self) -> bool:
-        """Whether it is beyond its level."""
+        """True where the statistic is beyond its level."""
         return self.statistic > self.level
 
     @property
@@ -124,7 +124,7 @@ class Tested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading(Tested):
-    """What a chart says of the newest walking groups.
+    """Chart result of the newest walking groups.
 
     `statistic` is compared with `level`: where it is below by now, the highest since the chart was
     last calm for some walking groups in a row, so that it matters not after whom somebody looks.
@@ -148,7 +148,7 @@ def read_chart(
     calm_ratio: float,
     calm_groups: int,
 ) -> Reading | None:
-    """What the chart says now; None of fewer than 16 walking groups.
+    """Chart result of now; None of fewer than 16 walking groups.
 
     Args:
         chart: of the camera.
@@ -193,7 +193,7 @@ def _last_calm(calm: npt.NDArray[np.bool_], walking_groups: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratios:
-    """How means of groups are held against knocks: weights (L, 14, K) and strengths (L, K)."""
+    """Likelihood ratios of pose offsets: weights (L, 14, K) of mean scores and strengths (L, K)."""
 
     weights: Array
     strengths: Array

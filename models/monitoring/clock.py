@@ -18,7 +18,7 @@ _GROUPS_FOR_POSE = 24
 
 
 def may_be_clock(reading: Reading) -> bool:
-    """Whether what a chart says may be of the clock, and too few have said it for a pose to tell.
+    """True where an alarm may be of the clock, after too few walking groups for the pose to decide.
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
@@ -26,7 +26,7 @@ def may_be_clock(reading: Reading) -> bool:
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
-    """What a change of scale with unchanged angles looks like; None where it is none.
+    """Reason of a change of scale with unchanged angles; None where there is none.
 
     Times that are too long by a factor make people slow, and only a higher camera makes them walk
     as before: the height grows by that factor and nothing else does. A camera that was raised

@@ -32,7 +32,7 @@ _LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Creep(Tested):
-    """What a log says: a camera's turn by now, at its likeliest.
+    """Most likely creep of a camera: its turn by now.
 
     `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
     how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
@@ -45,7 +45,7 @@ class Creep(Tested):
 
 
 def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
-    """What a log says of its newest weeks; None of too few people.
+    """Most likely creep by a log's newest weeks; None of too few people.
 
     Args:
         log: of the days.
@@ -80,7 +80,7 @@ class Ramps:
     now: float
 
     def at(self, days: Array) -> Array:
-        """How far (W, N) each is by some days (N,)."""
+        """Size (W, N) of each ramp on some days (N,)."""
         turned = np.maximum(days - self.starts[:, None], 0.0)
         turned = turned / np.maximum(self.now - self.starts, 1e-9)[:, None]
         turned[0] = 1.0
@@ -89,7 +89,7 @@ class Ramps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """What weeks say of turns (3, W) of tilt, roll, heading along ramps: their pull and its weight.
+    """Projections of weeks on ramps of turns (3, W) of tilt, roll, heading, and their weights.
 
     A turn's likeliest size is `shown / known`, with a variance of `1 / known`.
     """
@@ -100,7 +100,7 @@ class Held:
 
 
 def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
-    """What the weeks of a log say of every ramp; None of too few people."""
+    """Projections of a log's weeks on every ramp; None of too few people."""
     weeks = weeks_of(log, from_s)
     if weeks is None:
         return None

@@ -1,4 +1,4 @@
-"""What each day of people says of how a camera stands, held against its first map and speeds.
+"""Log of daily scores since a reference, held against its first map and speeds.
 
 What is kept of a day is its people's pull on tilt, roll, log height, heading and the log of times:
 their scores, weighed by how each of these would change them (the sufficient statistic of a small
@@ -25,7 +25,7 @@ _FREE_RAD = np.radians(60.0)  # one group tells everything at least so badly
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CreepLog:
-    """What days (D,) of people said of how a camera stands, against its first map and speeds.
+    """Sums of the scores of days (D,) of people, against the first map and speeds of a reference.
 
     `day_idx` counts days from the epoch, `groups` are how many came, `pulls` (D, 5) what they
     add up to. `information` (5, 5) is what a group tells, and `reference_groups` made the chart,
@@ -120,10 +120,10 @@ def noise_of(log: CreepLog, weeks: Weeks) -> Array:
 
 
 def _group_tells(log: CreepLog) -> Array:
-    """What a group tells (5, 5), nothing of it so badly that it cannot be inverted."""
+    """Information of a group (5, 5), none of it so small that it cannot be inverted."""
     return np.asarray(log.information + np.eye(NUMBERS) / _FREE_RAD**2)
 
 
 def _slopes(chart: DriftChart) -> Array:
-    """How the mean scores (14, 5) change with each number, by its smallest knocks."""
+    """Change of the mean scores (14, 5) with each parameter, by its smallest offsets."""
     return np.stack([slope_of(chart, number) for number in range(NUMBERS)], axis=1)

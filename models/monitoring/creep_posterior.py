@@ -1,4 +1,4 @@
-"""How far a camera is believed to have crept by some day: what growth takes out of its tracks.
+"""Posterior mean of a camera's creep by some day: what growth takes out of its tracks.
 
 A log is taken for that of a camera that stands, or of one that creeps along one of the ramps of
 `creep`, by half a degree a month, more or less. How much better the one explains it than the other,

@@ -1,4 +1,4 @@
-"""What a walking group says of small moves of a camera: by how they walk, and where.
+"""Scores of a walking group for small moves of a camera: by how people walk, and where.
 
 Each walking group has fourteen scores. Three are slopes of the joint estimator's likelihood along
 tilt, roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that
@@ -35,7 +35,7 @@ _PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and pace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usual:
-    """What is usual before a camera: how people walk, and where, seen from the prior pose."""
+    """Usual speeds and paths before a camera, seen from the prior pose."""
 
     prior: CameraPose
     speed_reference: SpeedReference
@@ -106,7 +106,7 @@ def _slowed(steps: Steps, stretch: float) -> Steps:
 def _bounded(
     observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
 ) -> Array:
-    """How far off paces are, and statures where boxes tell them, times what would mend it."""
+    """Weighted residuals of paces, and of statures where boxes have them, bounded."""
     heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
     speeds = measure_speeds(walkers.steps, parameters, heading)
     scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2

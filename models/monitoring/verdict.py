@@ -34,13 +34,13 @@ class Drift:
 
     @property
     def turned(self) -> bool:
-        """Whether an angle is identifiable."""
+        """True where an angle is identifiable."""
         return bool(set(ANGLES) & set(self.identifiable))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftLimits:
-    """When a drift counts: beyond so many standard deviations and beyond a floor.
+    """Limits of a drift: so many standard deviations, and a floor.
 
     And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise.
     """
@@ -72,14 +72,14 @@ class DriftVerdict:
 
     @property
     def drifting(self) -> bool:
-        """Whether the camera has moved, by now."""
+        """True while the camera counts as moved."""
         return bool(self.drifted)
 
 
 def drift_between(
     found: PoseParameters, sd: PoseParameters, identifiable: Sequence[str], prior: CameraPose
 ) -> Drift:
-    """How far an estimate is from the prior pose; x and y count as unmoved.
+    """Drift: estimate less prior pose; x and y count as unmoved.
 
     Args:
         found: what is estimated.
@@ -120,7 +120,7 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
 
 
 def asks_again(drift: Drift, limits: DriftLimits, *, drifting: bool) -> bool:
-    """Whether a verdict on a drift needs what the window says without its newest people."""
+    """True where a verdict on a drift needs the estimate without the window's newest people."""
     excess = max(_ratios(drift, limits).values(), default=0.0)
     return excess < limits.clear_ratio if drifting else excess >= 1
 

@@ -1,4 +1,4 @@
-"""What a verdict and a chart give as their reason: codes and values."""
+"""Reasons of a verdict and of a chart result: codes and values."""
 
 from datetime import UTC, datetime
 
@@ -34,7 +34,7 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
 
 
 def reason_of_reading(reading: Reading) -> Reason | None:
-    """Which way the drift chart says that a camera has moved; None where it says nothing.
+    """Direction in which the drift chart takes the camera to have moved; None where it is calm.
 
     Its `number` is a parameter of a pose, or `times` where all were too long (`sign` 1) or too
     short (-1).
@@ -53,7 +53,7 @@ def reason_of_reading(reading: Reading) -> Reason | None:
 
 
 def reason_of_creep(creep: Creep) -> Reason | None:
-    """Which way a camera has crept, how far and since when; None where it has not.
+    """Direction, size and beginning of a camera's creep; None where it has not crept.
 
     `since` is a time, as of `datetime.isoformat`.
     """

@@ -21,7 +21,7 @@ _RESAMPLES = 300
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackPredictions:
-    """What a regressor says of N tracks: heights (N,) in metres, quaternions wxyz (N, 4)."""
+    """Predictions of a regressor for N tracks: heights (N,) in metres, quaternions wxyz (N, 4)."""
 
     height_m: Array
     quaternion_wxyz: Array

@@ -1,4 +1,4 @@
-"""What a network reads of a walk."""
+"""Inputs of a network, of a walk."""
 
 import math
 

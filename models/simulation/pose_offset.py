@@ -35,7 +35,7 @@ class Knock:
 def knock_trajectory(
     trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, knocked: CameraPose
 ) -> Trajectory | None:
-    """What the camera sees of the same people after a move; the longest run inside the image.
+    """Trajectory of the same people after a move of the camera; the longest run inside the image.
 
     None where fewer than two points stay in the picture. Exact for the feet, which lie on the
     ground; the boxes' upper edges are those of upright people of the same height. Heads lean as

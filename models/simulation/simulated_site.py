@@ -24,7 +24,7 @@ _PLACES_DRAWN = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteConfig:
-    """How people walk at a site and how they are seen.
+    """Walks of people at a site, and the noise of what is seen of them.
 
     Speeds are log-normal: `between_sd` of the log between people, `within_sd` within one, with
     `correlation` between moments 1.5 s apart. `standing_share` of people stand; `aside_m` is how
@@ -160,7 +160,7 @@ def walk_changed(
 
 
 def _aside_m(lane: Lane, places: Array) -> Array:
-    """How far places (N, 2) are from a lane's middle, in metres."""
+    """Distances of places (N, 2) from a lane's middle, in metres."""
     normal = np.array([-lane.direction[1], lane.direction[0]])
     return np.asarray(np.abs((places - lane.point) @ normal))
 

@@ -49,7 +49,7 @@ def run_creep_study(
 
 
 def creep_table(cases: Sequence[CreepCase]) -> Table:
-    """How far cameras had gone when their creep was told, by number and rate."""
+    """Table of cameras' turns when their creep was detected, by number and rate."""
     table = Table(title="turned by so many deg when it was told: median, 90 %, worst; bar 1.5, 2.5")
     for name in ("deg a month", *NUMBERS):
         table.add_column(name, justify="right")

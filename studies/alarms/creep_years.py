@@ -30,7 +30,7 @@ _EVERY_DAYS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CreepPlan:
-    """How busy cameras are, of how many people their references are, and what is allowed.
+    """Plan of creeping years: traffic, people of the references, and the alarms allowed.
 
     For how many days they creep at the most, and stand.
     """
@@ -67,7 +67,7 @@ class CreepCase:
 
     @property
     def still(self) -> bool:
-        """Whether the camera stood."""
+        """True where the camera stood."""
         return not self.rate_deg
 
 

@@ -1,4 +1,4 @@
-"""What is measured of alarms: false ones of cameras that stand, tracks until those of knocks."""
+"""Results of alarms: false ones of cameras that stand, tracks until those of pose offsets."""
 
 import math
 from collections.abc import Mapping, Sequence

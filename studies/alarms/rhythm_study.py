@@ -50,7 +50,7 @@ class YearResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Year:
-    """When tracks ended, in order, and when each was stored."""
+    """Times at which tracks ended, in order, and at which each was stored."""
 
     ended_s: Array
     received_s: Array
@@ -85,7 +85,7 @@ def _study_year(rng: np.random.Generator) -> YearResult:
 
 
 def _learned(year: _Year, cells: np.ndarray, day: int) -> tuple[Rhythm, float]:
-    """What is known at a day's beginning."""
+    """Arrival model and delay that are known at a day's beginning."""
     now_s, first_day = day * _DAY_S, max(day - _PAST_DAYS, 0)
     stored = (year.received_s <= now_s) & (year.received_s > first_day * _DAY_S)
     ended_s = year.ended_s[stored]
@@ -117,7 +117,7 @@ def _false_alerts(year: _Year, cells: np.ndarray, rhythm: Rhythm, delay_s: float
 def _noticed_h(
     year: _Year, cells: np.ndarray, rhythm: Rhythm, delay_s: float, at_s: float
 ) -> float:
-    """How long nothing comes, from a time on, until that is an alert; what was seen is posted."""
+    """Hours of nothing from a time on until that is an alert; what was seen is posted."""
     last_s = year.ended_s[np.searchsorted(year.ended_s, at_s) - 1]
     for minutes in range(1, 60 * 60):
         until_s = at_s + 60 * minutes - delay_s
@@ -191,7 +191,7 @@ def _profile(kind: str, weekend: bool) -> Array:
 
 
 def _received(rng: np.random.Generator, posts: str, ended_s: Array) -> Array:
-    """When each track is stored, in order, by how they are posted."""
+    """Times at which each track is stored, in order, by how they are posted."""
     live_s = ended_s + rng.exponential(2, len(ended_s))
     if posts == "hourly":
         late_s = rng.exponential(90, _DAYS * 24 + 2)

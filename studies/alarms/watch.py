@@ -24,7 +24,7 @@ class Watch:
     level: float
 
     def apart(self, scores: GroupScores) -> Array:
-        """How far walking groups (P, 14) are from what is usual."""
+        """Differences of walking groups (P, 14) from what is usual."""
         return self.chart.bounded(scores.values) - self.chart.mean
 
     def alarms(self, apart: Array) -> list[int]:

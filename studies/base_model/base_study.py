@@ -1,4 +1,4 @@
-"""What the base model is worth: alone, beside the joint and the fused pose, and as a factor of it.
+"""Study of the base model: alone, beside the joint and the fused pose, and as a factor of it.
 
 By time, as `protocol --tables time`: the earlier people are the reference, the camera is
 moved, the later ones walk before it; or by random halves of the people. Cases of one window share

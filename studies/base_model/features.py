@@ -1,4 +1,4 @@
-"""What the base model reads of a segment of a walk: place, course, pace, as all cameras see them.
+"""Features of a segment of a walk for the base model: place, course, pace, alike for all cameras.
 
 Points of the ground are in heights of the pose that is looked from, paces in assumed walking
 speeds, noise in angles: no pixel, metre or focal length is left. Numpy only.
@@ -121,7 +121,7 @@ def _safe(below: Array) -> Array:
 
 
 def walking(features: Array) -> Mask:
-    """Which segments (B,) show people who walk: none who stand, dawdle, run or stray.
+    """Mask of segments (B,) of people who walk: none who stand, dawdle, run or stray.
 
     They go straight, and as fast as most of the brisker half, give or take.
     """

@@ -96,7 +96,7 @@ class SetNetwork(nn.Module):
     def _attend(
         self, code: Tensor, known: Tensor, reference: Tensor, mask: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """What segments (S, W, C) are told by those of the reference like them, and their paces.
+        """Attend from segments (S, W, C) to those of the reference like them, and to their paces.
 
         Paces (S, W, heads, 2) are usual log paces and their change; 0 where nobody is like them.
         """

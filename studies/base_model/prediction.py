@@ -1,4 +1,4 @@
-"""What the base model says of the tracks of a camera, beside those of its reference."""
+"""Prediction of the base model for a camera's tracks, beside those of its reference."""
 
 import numpy as np
 import torch

@@ -25,7 +25,7 @@ _POINTS = 11  # of a segment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteRange:
-    """What sites before a camera, and moves of it, are drawn from.
+    """Ranges that sites before a camera, and moves of it, are drawn from.
 
     A camera moves by up to `angle_rad` in tilt and roll and `log_height`, half of the time by
     `near_share` of it, on `panned_share` of the cameras in heading by N(0, `pan_sd_rad`), too. The

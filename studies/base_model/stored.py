@@ -47,5 +47,5 @@ def store_base_model(network: SetNetwork, path: Path, making: Mapping[str, Any])
 
 
 def making_of(path: Path) -> Path:
-    """Where it says how a file of weights was made."""
+    """Path of the record of how a file of weights was made."""
     return path.with_name("base_model.json")

@@ -50,7 +50,7 @@ MOVES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StillDay:
-    """What a chart made of people before a camera that stands.
+    """Chart of people before a camera that stands.
 
     `excess` is the highest statistic in units of the level, by a knock of the grid with
     `knock_idx`; the first alarm was after `alarm_after` tracks, None where there was none. `habits`
@@ -70,7 +70,7 @@ class StillDay:
 
 
 def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
-    """What becomes of a camera after references that begin with one person or another."""
+    """Charts of a camera after references that begin with one person or another."""
     prior, lens = scene.true_pose, scene.intrinsics
     tracks = [track.trajectory for track in first_seen(scene, scene.tracks, prior, None)]
     tracks.sort(key=lambda track: float(track.time_s[0]))
@@ -113,7 +113,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
 
 
 def _delays(ratios: Ratios, still: Array, moved: Array, level: float) -> Iterator[float]:
-    """How many walking groups a move takes at some moments, after others before a still camera."""
+    """Delays of a move at some moments, in walking groups after others before a still camera."""
     for begin in np.linspace(0, max(len(moved) - _WAIT, 0), _MOMENTS).astype(int):
         lead = still[max(begin - _LEAD, 0) : begin]
         both = np.concatenate([lead, moved[begin : begin + _WAIT]])
@@ -122,7 +122,7 @@ def _delays(ratios: Ratios, still: Array, moved: Array, level: float) -> Iterato
 
 
 def habits_of(chart: DriftChart, apart: Array) -> Array:
-    """How much blocks of 100 walking groups move (5,) among one another, beyond chance.
+    """Variances (5,) of blocks of 100 walking groups among one another, as moves, beyond chance.
 
     Source: Laird and Ware 1982, the variances of random effects by EM.
 

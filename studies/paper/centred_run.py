@@ -122,7 +122,7 @@ def averaged_of(
     plan: TrainingPlan,
     tracks: Sequence[Trajectory],
 ) -> PoseEstimate:
-    """What is said of tracks on average, of windows as long as those that were trained on.
+    """Mean prediction for tracks, of windows as long as those that were trained on.
 
     `predict` answers windows with heights (B,) in metres and unit quaternions wxyz (B, 4).
 

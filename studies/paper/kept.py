@@ -1,4 +1,4 @@
-"""What `paper` keeps: results of each part, of which code, and a manifest of them all."""
+"""Kept results of `paper`: of each part, of which code, and a manifest of them all."""
 
 import platform
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ def results_of(rows: Sequence[dict[str, Any]]) -> list[PaperResult]:
 
 
 def is_begun(out: Path, name: str) -> bool:
-    """Whether a folder has results of a part."""
+    """True where a folder has results of a part."""
     return (out / f"{name}.jsonl").exists()
 
 

@@ -1,4 +1,4 @@
-"""What every estimator of the paper's study is measured by: in the middle, and after knocks."""
+"""Measures of every estimator of the paper's study: in the middle, and after pose offsets."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence

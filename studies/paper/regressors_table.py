@@ -31,7 +31,7 @@ _ORDER = [CONSTANT, *VARIANTS, DEFAULT, SERVED]
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
-    """What is quick first; what takes a quarter of an hour for each seed last."""
+    """Cases, the quick first; what takes a quarter of an hour for each seed last."""
     left_open = [PAPERS_OWN] if PAPERS_OWN in scenes else []
     others = [scene for scene in scenes if scene not in left_open]
     rows: list[tuple[str, Sequence[str], Sequence[int]]]

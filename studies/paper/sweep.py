@@ -93,7 +93,7 @@ def _by_a_slow_clock(scene: Scene) -> Scene:
 
 
 def _said_of_the_clock(scene: Scene) -> Figures:
-    """How fast the service takes people to be, and whether it says that this cannot be."""
+    """Walking speed that the service finds, and its reasons of the clock."""
     told = (track.trajectory for track in scene.tracks)
     tracks = by_end(each for each in told if each.long_enough)
     lens, pose = scene.intrinsics, scene.true_pose

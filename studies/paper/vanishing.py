@@ -79,7 +79,7 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
 
 
 def _way_seen(scene: Scene, track: Trajectory) -> float:
-    """How far apart in the picture a track begins and ends, where a head is known; in radians."""
+    """Angle in the picture between a track's begin and end, where a head is known; in radians."""
     feet, _ = rays_of(scene.intrinsics, track)
     return math.acos(min(1.0, float(feet[0] @ feet[-1]))) if len(feet) else 0.0
 

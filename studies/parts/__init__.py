@@ -1,1 +1,1 @@
-"""What each part of the estimator is worth: the protocol with one part off at a time."""
+"""Study of each part of the estimator: the protocol with one part off at a time."""

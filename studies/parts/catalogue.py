@@ -46,7 +46,7 @@ class Part:
 
     @property
     def lines(self) -> int:
-        """How many lines would go with it."""
+        """Lines that would go with it."""
         return sum(_lines(each) for each in self.source)
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""What heads are worth: knocked cameras with and without, and with heads that nobody measured.
+"""Study of heads: offset cameras with and without, and with heads that nobody measured.
 
 Simulated street cameras, and the feet of recorded scenes (halves of people, as in the protocol)
 under simulated heads: a jitter of 3 % of the stature, a lean of each person's own, people who lean

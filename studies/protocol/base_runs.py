@@ -30,7 +30,7 @@ def base_model(learned: Learned) -> Answer:
 
 
 def base_estimate_of(case: ProtocolCase) -> PlaneEstimate:
-    """What the shipped base model says of a case.
+    """Estimate of the shipped base model in a case.
 
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks that walk.

@@ -28,7 +28,7 @@ _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnockRange:
-    """How far a knock may go either way: uniform in angles and in the log of the height."""
+    """Largest pose offset either way: uniform in angles and in the log of the height."""
 
     tilt_rad: float = 0.0
     roll_rad: float = 0.0
@@ -57,7 +57,7 @@ RANGES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProtocolCase:
-    """What the service would see: tracks at the prior pose, then tracks after a knock.
+    """Case as the service would see it: tracks at the prior pose, then tracks after a pose offset.
 
     `prior_pose` is the scene's true pose; `true_pose` where the camera is after the knock.
     """
@@ -73,7 +73,7 @@ class ProtocolCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
+    """Answer of an estimator: tilt, roll and log height (3,), their covariance (3, 3).
 
     `identifiable` names those of the three that it says the tracks determine. `heading_rad` and its
     standard deviation are what it says of the heading; None is the prior's.
@@ -234,7 +234,7 @@ def pose_of_plane_parameters(numbers: Array, prior: CameraPose) -> CameraPose:
 
 
 def _taken(tracks: Sequence[SceneTrack]) -> tuple[Trajectory, ...]:
-    """What the service takes, in the order that trackers post: as the tracks end."""
+    """Trajectories that the service takes, in the order that trackers post: as the tracks end."""
     return tuple(by_end(t.trajectory for t in tracks if t.trajectory.long_enough))
 
 

@@ -1,4 +1,4 @@
-"""How the fused pose's error falls with the number of reference tracks, and of new ones."""
+"""Curves of the fused pose's error over the number of reference tracks, and of new ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

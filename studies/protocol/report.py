@@ -1,4 +1,4 @@
-"""What the outcomes of a protocol say: by scene and estimator, and over all scenes."""
+"""Report of a protocol's outcomes: by scene and estimator, and over all scenes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

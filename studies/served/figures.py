@@ -1,4 +1,4 @@
-"""What many served outcomes come to: errors, coverage, slopes, by whatever they are grouped."""
+"""Figures of many served outcomes: errors, coverage, slopes, by whatever they are grouped."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

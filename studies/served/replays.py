@@ -37,7 +37,7 @@ _MEASURED_AFTER = 250  # tracks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayPlan:
-    """How a recording is replayed: its windows, and what an alarm goes by."""
+    """Plan of a recording's replay: its windows, and what an alarm goes by."""
 
     window: Window
     limits: DriftLimits
@@ -46,7 +46,7 @@ class ReplayPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """What was seen while a camera stood where it was.
+    """Summary of a time in which a camera stood where it was.
 
     `tracks` came, of which after `alarm_after` there was the first alarm; None where there was
     none. Shares are of the `looks`: with the map in use, with paths that are said to have changed.

@@ -65,7 +65,7 @@ def run_served(
 
 
 def _left(tasks: Sequence[Task], kept: OutcomeFile) -> list[Task]:
-    """What is not in the output yet."""
+    """Tasks that are not in the output yet."""
     found = []
     for task in tasks:
         asked = tuple(each for each in task.asked if each not in kept.found)

@@ -1,4 +1,4 @@
-"""What `protocol` asks: cases and replays of recordings, each with a name of its own."""
+"""Tasks of `protocol`: cases and replays of recordings, each with a name of its own."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """What came of one that was asked; `failure` is an error that nobody foresaw."""
+    """Result of one test; `failure` is an error that nobody foresaw."""
 
     asked: Asked
     outcome: ServedOutcome | ReplayOutcome | None
@@ -103,7 +103,7 @@ def tasks_of(
 
 
 def work(task: Task, plan: ReplayPlan) -> list[Found]:
-    """What comes of a task, each part by itself: what fails is told and stops no other."""
+    """Results of a task, each part by itself: what fails is recorded and stops no other."""
     scene = _cameras(task.folder)[task.camera]
     found = []
     sites: dict[int, CameraSite | None] = {}
@@ -128,7 +128,7 @@ def _asked(
     batch: int,
     faults: Sequence[str],
 ) -> Iterator[tuple[Asked, ...]]:
-    """What is asked of a camera in a table, in parts that share a reference."""
+    """Tests of a camera in a table, in parts that share a reference."""
     if table == Table.REPLAYS:
         if not long:
             return

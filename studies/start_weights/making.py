@@ -54,7 +54,7 @@ def store_start(network: PoseRegressor, path: Path, making: Mapping[str, Any]) -
 
 
 def making_of(path: Path) -> Path:
-    """Where it says how a file of weights was made."""
+    """Path of the record of how a file of weights was made."""
     return path.with_name("start.json")
 
 
