@@ -15,8 +15,6 @@ PLANE_PARAMETERS = PARAMETERS[:3]  # of the ground plane before the camera: spee
 ANGLES = ("tilt", "roll", "heading")
 # A parameter whose standard deviation is larger is not identifiable; in the order of WITH_HEADING.
 IDENTIFIABLE_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
-# How far an estimator is usually off on a site for good: foot points, places of other speed.
-SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,22 +48,3 @@ def identifiable_of(names: tuple[str, ...], sd: Array) -> tuple[str, ...]:
 def plane_parameters_of(pose: CameraPose) -> Array:
     """Tilt, roll (radians) and log height (3,) of a pose."""
     return array_of(pose)[:3]
-
-
-def without_offset(
-    estimate: PlaneEstimate, reference: PlaneEstimate, prior: CameraPose
-) -> PlaneEstimate:
-    """The estimate less what the estimator was off while the pose was known to be the prior.
-
-    The offset is `reference - prior`, shrunk by its own uncertainty: of a reference that knows
-    nothing nothing is taken off. What stays unknown of it is added to the covariance.
-    """
-    bias = np.diag(np.square(SITE_BIAS_SD))
-    gain = bias @ np.linalg.inv(bias + reference.covariance)
-    offset = gain @ (reference.values - plane_parameters_of(prior))
-    left = bias - gain @ bias
-    return PlaneEstimate(
-        values=estimate.values - offset,
-        covariance=estimate.covariance + (left + left.T) / 2,
-        tracks=estimate.tracks,
-    )

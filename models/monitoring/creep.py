@@ -27,6 +27,8 @@ from models.quantiles import value_below
 
 SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
 ANGLES = (0, 1, 3)  # tilt, roll and heading creep
+_A_MONTH_RAD, _MONTH_DAYS = np.radians(0.5), 30.0
+_CREEPING = 0.1  # of cameras
 _LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn with its own noise
 
 
@@ -119,3 +121,27 @@ def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
             ]
         ),
     )
+
+
+def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None) -> Array:
+    """Posterior mean (N, 4) of a camera's turn in tilt, roll, log height, heading by days (N,).
+
+    The log is that of a camera that stands, or of one that creeps along one of the ramps, by half a
+    degree a month, more or less: each weighs by its marginal likelihood and by how rare creeps are.
+    So the tracks of a camera that stands are left as they are, and not bent to the noise of its
+    first map. 0 where the log is of too few people. `from_s` as for a creep.
+
+    Source: Bayesian model averaging; the ratio of the marginal likelihoods of a Gaussian's mean.
+    """
+    turns = np.zeros((len(days), 4))
+    held = hold_to_ramps(log, from_s)
+    if held is None:
+        return turns
+    months = np.maximum(held.ramps.now - held.ramps.starts, 1.0) / _MONTH_DAYS
+    usual = (_A_MONTH_RAD * months) ** 2
+    size = usual * held.shown / (1 + usual * held.known)
+    ratio = 0.5 * (size * held.shown - np.log1p(usual * held.known))
+    odds = _CREEPING / (1 - _CREEPING) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
+    probability = odds / (1 + odds.sum())
+    turns[:, ANGLES] = ((probability * size) @ held.ramps.at(np.asarray(days))).T
+    return turns

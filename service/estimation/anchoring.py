@@ -9,10 +9,7 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.creep import SHARE
-from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import (
     CameraSite,
     Creep,

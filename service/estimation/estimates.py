@@ -10,9 +10,19 @@ from models.durations import DAY_S
 from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
 from models.monitoring.chart import CLOCK
-from models.monitoring.clock import clock_fault, may_be_clock
-from models.monitoring.verdict import Drift, DriftVerdict, judge, pose_after
-from models.monitoring.verdict_reasons import reason_of_creep, reason_of_drift, reason_of_reading
+from models.monitoring.verdict import (
+    Drift,
+    DriftVerdict,
+    judge,
+    pose_after,
+)
+from models.monitoring.verdict_reasons import (
+    clock_fault,
+    may_be_clock,
+    reason_of_creep,
+    reason_of_drift,
+    reason_of_reading,
+)
 from models.pose import drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert

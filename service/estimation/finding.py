@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from models.monitoring.chart import Reading
-from models.monitoring.chart_serialization import chart_from_bytes
 from models.monitoring.creep import SHARE
+from models.monitoring.serialization import chart_from_bytes
 from models.paths.serialization import flow_from_bytes
 from models.pose import (
     AlarmRate,

@@ -7,12 +7,12 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import moved_by, offset_between
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.simulation.poses import PoseSet
 from models.simulation.walkers import WalkConfig
 from studies.base_model.features import FEATURES, segment_features, walking
+from studies.base_model.offsets import moved_by, offset_between
 from studies.base_model.segments import Segments, segments_of_walks
 from studies.simulation.cameras import CameraRange, draw_camera
 from studies.simulation.crowds import FlowConfig

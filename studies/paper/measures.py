@@ -9,13 +9,13 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.rotation import Array
-from models.regression.averaging import PoseEstimate, pose_of
+from models.regression.averaging import PoseEstimate
 from models.regression.recipe import TrainingPlan, plan_training
 from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Windows, choose_step_s
 from studies.faults.catalogue import Fault
-from studies.paper.centred_run import averaged_of, whole_angle_deg
+from studies.paper.centred_run import averaged_of, pose_of, whole_angle_deg
 from studies.paper.part import Figures
 from studies.protocol.cases import (
     KNOCKED,

@@ -8,7 +8,6 @@ from statistics import fmean, median
 
 import numpy as np
 
-from models.geometry.plane_parameters import without_offset
 from models.tracks.scenes import load_scene
 from studies.baselines.box_heights import pose_by_box_heights
 from studies.paper.measures import KNOCKS, outcomes_of
@@ -29,6 +28,7 @@ from studies.protocol.cases import (
     Estimator,
     ProtocolCase,
 )
+from studies.protocol.regressors import without_offset
 
 _ALONE, _BESIDE = "cameratransform", "cameratransform, our reference's offset off"
 _VARIANTS = (_ALONE, _BESIDE, SERVED)

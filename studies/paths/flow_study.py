@@ -8,18 +8,21 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
 from models.errors import DegenerateGeometryError
+from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.paths.reference import candidate_of
 from models.quantiles import Z90
 from models.reasons import Reason
 from models.simulation.pose_offset import Knock
-from models.simulation.simulated_site import draw_new_lane, walk_changed
+from models.simulation.simulated_site import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations, of_tracks
+from models.tracks.trajectory import Trajectory
 from studies.paths.simulated_site import (
     LearnedSite,
     SimulatedSite,
@@ -36,6 +39,7 @@ CHANGED_TRACKS = (200, 400)
 _KNOCK_RAD = math.radians(8)
 _KNOCK_LOG_HEIGHT = 0.15
 _MOST_DRAWS = 20
+_PLACES_DRAWN = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,6 +158,67 @@ def _changed(simulated: SimulatedSite, count: int, rng: np.random.Generator) -> 
             continue
         return observe_feet(tracks, lens, prior)
     raise DegenerateGeometryError(f"new lane: none of {_MOST_DRAWS} is seen")
+
+
+def draw_new_lane(
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    lanes: Sequence[Lane],
+    config: SiteConfig,
+    rng: np.random.Generator,
+) -> Lane:
+    """A lane that people of a site take when their own is closed, off the lanes there are.
+
+    It passes the visible place that is farthest from all lanes, of a few that are drawn, and its
+    direction is midway between two of theirs.
+
+    Raises:
+        DegenerateGeometryError: the pose sees no ground within reach.
+    """
+    places = np.array(
+        [
+            lane.point
+            for _ in range(_PLACES_DRAWN)
+            for lane in draw_lanes(intrinsics, pose, config, rng)
+        ]
+    )
+    apart = np.min([_aside_m(lane, places) for lane in lanes], axis=0)
+    angles = np.sort([math.atan2(lane.direction[1], lane.direction[0]) % math.pi for lane in lanes])
+    gaps = np.diff(np.append(angles, angles[0] + math.pi))
+    angle = angles[gaps.argmax()] + gaps.max() / 2
+    return Lane(
+        point=places[apart.argmax()], direction=np.array([math.cos(angle), math.sin(angle)])
+    )
+
+
+def walk_changed(
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    lanes: Sequence[Lane],
+    new_lane: Lane,
+    config: SiteConfig,
+    count: int,
+    rng: np.random.Generator,
+) -> list[Trajectory]:
+    """Tracks as of `walk_site`, in time order, of which every other walks a new lane.
+
+    Raises:
+        DegenerateGeometryError: hardly any walk is seen from the pose.
+    """
+    kept = walk_site(intrinsics, pose, lanes, config, count - count // 2, rng)
+    new = walk_site(intrinsics, pose, [new_lane], config, count // 2, rng)
+    return [
+        replace(track, time_s=track.time_s - track.time_s[0] + BETWEEN_S * number)
+        for number, track in enumerate(
+            track for pair in zip_longest(kept, new) for track in pair if track is not None
+        )
+    ]
+
+
+def _aside_m(lane: Lane, places: Array) -> Array:
+    """Distances of places (N, 2) from a lane's middle, in metres."""
+    normal = np.array([-lane.direction[1], lane.direction[0]])
+    return np.asarray(np.abs((places - lane.point) @ normal))
 
 
 def _first(observations: Observations, count: int) -> Observations:

@@ -11,10 +11,8 @@ from models.simulation.simulated_site import (
     Lane,
     SiteConfig,
     draw_lanes,
-    draw_new_lane,
-    walk_changed,
 )
-from studies.paths.flow_study import study_site
+from studies.paths.flow_study import draw_new_lane, study_site, walk_changed
 from studies.paths.simulated_site import draw_simulated_site
 from tests.models.sites import LENS, PRIOR
 

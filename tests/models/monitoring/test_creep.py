@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.errors import CheckpointError
-from models.monitoring.creep import read_creep
+from models.monitoring.creep import posterior_mean_turns, read_creep
 from models.monitoring.creep_log import (
     DAY_S,
     NUMBERS,
@@ -18,9 +18,8 @@ from models.monitoring.creep_log import (
     noise_of,
     weeks_of,
 )
-from models.monitoring.creep_posterior import believed_turns
-from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
 from models.monitoring.group_scores import score_groups
+from models.monitoring.serialization import creep_log_from_bytes, creep_log_to_bytes
 from models.pose import begin_creep_log, learn_site, log_creep, observe, without_creep
 from models.serialization import flattened
 from models.simulation.pose_offset import Knock, knock_trajectory
@@ -114,14 +113,14 @@ def test_few_people_say_nothing_and_only_whole_days_since_a_time_count():
 def test_a_turn_is_believed_once_it_is_clear_and_a_still_camera_is_left_alone():
     log = blank(120)
     days = np.array([20_010.0, 20_060.0, 20_119.0])
-    crept = believed_turns(with_moves(log, ramp(log, 3, 1.0)), days)
+    crept = posterior_mean_turns(with_moves(log, ramp(log, 3, 1.0)), days)
     true = np.radians((days - 20_000) / MONTH_DAYS)
     assert_allclose(crept[:, 3], true, atol=math.radians(0.5))
     assert np.abs(crept[:, :3]).max() < math.radians(0.05)
     rng = np.random.default_rng(2)
-    still = np.array([believed_turns(drawn(log, rng), days) for _ in range(50)])
+    still = np.array([posterior_mean_turns(drawn(log, rng), days) for _ in range(50)])
     assert np.median(np.abs(still)) < math.radians(0.01)
-    assert not believed_turns(blank(2), days).any()
+    assert not posterior_mean_turns(blank(2), days).any()
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +168,7 @@ def test_tracks_without_their_turn_are_seen_as_from_the_prior_pose(first):
     site, known, later = first
     log = blank(120)
     log = with_moves(log, ramp(log, 3, 1.0))
-    turn = believed_turns(log, np.array([20_100.0]))[0]
+    turn = posterior_mean_turns(log, np.array([20_100.0]))[0]
     stood = replace(PRIOR, heading_rad=PRIOR.heading_rad + turn[3])
     track = replace(known[0], time_s=known[0].time_s - known[0].time_s[-1] + 20_100.0 * DAY_S)
     seen = knock_trajectory(track, LENS, PRIOR, stood)

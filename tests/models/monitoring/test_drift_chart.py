@@ -20,9 +20,9 @@ from models.monitoring.chart import (
 )
 from models.monitoring.chart import read_chart as read_chart_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
-from models.monitoring.clock import may_be_clock
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
+from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
+from models.monitoring.verdict_reasons import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import candidate_of, learn_flow
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
