@@ -36,7 +36,7 @@ class Format:
     version: int
 
 
-def pack(form: Format, values: Mapping[str, Any]) -> bytes:
+def to_bytes(form: Format, values: Mapping[str, Any]) -> bytes:
     """Arrays, numbers and texts by name as bytes: the same values, the same bytes."""
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     rest = {name: _plain(value) for name, value in values.items() if name not in arrays}
@@ -47,8 +47,8 @@ def pack(form: Format, values: Mapping[str, Any]) -> bytes:
     return gzip.compress(data, mtime=0)
 
 
-def unpack(form: Format, data: bytes) -> dict[str, Any]:
-    """The values of `pack`; arrays of one's own.
+def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
+    """The values of `to_bytes`; arrays of one's own.
 
     Raises:
         CheckpointError: the bytes are damaged, or of another format or version.

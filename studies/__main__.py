@@ -31,7 +31,7 @@ def evaluate(
         float, typer.Option(min=0.001, help="With --alarms: false ones allowed.")
     ] = 1.0,
 ) -> None:
-    """Knock the cameras of recorded scenes and measure every estimator: the protocol."""
+    """Measure every estimator on recorded scenes whose cameras are knocked: the protocol."""
     from models.errors import CalibrationError
     from studies.alarms.run import AlarmPlan, run_scene_alarms
     from studies.protocol.run import run_protocol

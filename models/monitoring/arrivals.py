@@ -50,7 +50,7 @@ class SilenceVerdict(StrEnum):
 class SilenceRule:
     """So many silences a year may be called improbable though they are none, and none shorter.
 
-    Whatever the rhythm, one longer than `limit_s` in which people should have been seen is.
+    Whatever the arrivals, one longer than `limit_s` in which people should have been seen is.
     """
 
     false_per_year: float
@@ -59,8 +59,8 @@ class SilenceRule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rhythm:
-    """A camera's rhythm.
+class ArrivalProcess:
+    """Arrival process of a camera's tracks: Poisson of walking groups, given the level of the day.
 
     `rates` are tracks expected in each of the 48 hours, `burst` the tracks that come at once,
     `shape` that of the day's level, `usual_gap_s` what 95 % of the gaps are shorter than, `days`
@@ -74,7 +74,7 @@ class Rhythm:
     days: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no rhythm.
+        """Refuse what is no arrival process.
 
         Raises:
             ValueError: a number is out of its range.
@@ -91,10 +91,10 @@ class Rhythm:
         return week / (7 * 24) * _HOURS_PER_YEAR / self.burst
 
 
-def learn_rhythm(
+def learn_arrivals(
     counts: Array, cells: np.ndarray, known: np.ndarray, first_hour: int, times_s: Array
-) -> Rhythm:
-    """The rhythm of hours in a row.
+) -> ArrivalProcess:
+    """Arrival process of hours in a row.
 
     Args:
         counts: tracks of each hour (H,).
@@ -105,7 +105,7 @@ def learn_rhythm(
     """
     rates = _rates(counts, cells, known)
     usual = np.diff(times_s)
-    return Rhythm(
+    return ArrivalProcess(
         rates=tuple(float(rate) for rate in rates),
         burst=_burst(rates[cells], known, first_hour, times_s),
         shape=_shape(counts, rates[cells], known),
@@ -115,29 +115,29 @@ def learn_rhythm(
 
 
 def expected_tracks(
-    rhythm: Rhythm, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
+    process: ArrivalProcess, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
 ) -> float:
     """Expected number of tracks between two times, within the hours of `cells` (H,)."""
     starts_s = HOUR_S * (first_hour + np.arange(len(cells)))
     overlap_s = np.minimum(starts_s + HOUR_S, to_s) - np.maximum(starts_s, from_s)
-    rates = np.array(rhythm.rates)[cells]
+    rates = np.array(process.rates)[cells]
     return float(rates @ np.clip(overlap_s, 0.0, None)) / HOUR_S
 
 
 def chance_of_silence(
-    rhythm: Rhythm, missed: float, silent_s: float, seen: float, expected: float
+    process: ArrivalProcess, missed: float, silent_s: float, seen: float, expected: float
 ) -> float:
     """The probability that a silence is as long as this one, after one more walking group.
 
     Args:
-        rhythm: of the camera.
+        process: that of the camera.
         missed: tracks expected during the silence.
         silent_s: how long it is: the longer, the more likely is the level another one by now.
         seen: tracks in the hours before it, which tell the level of the day.
         expected: tracks expected in these.
     """
-    missed, seen, expected = (number / rhythm.burst for number in (missed, seen, expected))
-    levels = ((rhythm.shape, rhythm.shape), (_QUIET_SHAPE, _QUIET_SHAPE / _QUIET_LEVEL))
+    missed, seen, expected = (number / process.burst for number in (missed, seen, expected))
+    levels = ((process.shape, process.shape), (_QUIET_SHAPE, _QUIET_SHAPE / _QUIET_LEVEL))
     # Gamma-Poisson: what was seen makes (a, b) into (a + seen, b + expected).
     logs = [
         math.log(share)
@@ -157,7 +157,7 @@ def chance_of_silence(
 
 
 def judge_silence(
-    rhythm: Rhythm,
+    process: ArrivalProcess,
     rule: SilenceRule,
     *,
     missed: float,
@@ -166,18 +166,18 @@ def judge_silence(
     expected: float,
 ) -> SilenceVerdict:
     """Verdict on a silence; the arguments are those of `chance_of_silence`."""
-    if silent_s < rule.least_s or not is_missed(rhythm, missed):
+    if silent_s < rule.least_s or not is_missed(process, missed):
         return SilenceVerdict.USUAL
-    chance = chance_of_silence(rhythm, missed, silent_s, seen, expected)
+    chance = chance_of_silence(process, missed, silent_s, seen, expected)
     if silent_s > rule.limit_s and chance < _SURELY:
         return SilenceVerdict.TOO_LONG
-    allowed = rule.false_per_year / max(rhythm.arrivals_per_year, 1.0)
+    allowed = rule.false_per_year / max(process.arrivals_per_year, 1.0)
     return SilenceVerdict.IMPROBABLE if chance < allowed else SilenceVerdict.USUAL
 
 
-def is_missed(rhythm: Rhythm, missed: float) -> bool:
+def is_missed(process: ArrivalProcess, missed: float) -> bool:
     """True where more than a few walking groups should have come: fewer may stay away any day."""
-    return missed > _FEW * rhythm.burst
+    return missed > _FEW * process.burst
 
 
 def delay_of(latest_s: Array) -> float:

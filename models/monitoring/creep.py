@@ -1,4 +1,4 @@
-"""Creep: a turn too slow for any window, told by what each day says against the first map.
+"""Creep: a turn too slow for any window, detected by the scores of each day against the first map.
 
 A map that grows takes a slow turn along with it, and no window of some days is long enough to see
 it. So the first chart of a site, with the map and the speeds of its reference, stays, and each day
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import Tested
+from models.monitoring.chart import TestStatistic
 from models.monitoring.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
 from models.quantiles import value_below
 
@@ -33,7 +33,7 @@ _LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Creep(Tested):
+class Creep(TestStatistic):
     """Most likely creep of a camera: its turn by now.
 
     `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
@@ -46,7 +46,7 @@ class Creep(Tested):
     since_day: float
 
 
-def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
+def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
     """Most likely creep by a log's newest weeks; None of too few people.
 
     Args:
@@ -54,20 +54,20 @@ def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None)
         alarms_a_year: how many false ones are allowed of the creep alone.
         from_s: since when the camera has stood as it does, but for a creep; whole days count.
     """
-    held = hold_to_ramps(log, from_s)
-    if held is None:
+    scores = ramp_scores(log, from_s)
+    if scores is None:
         return None
     chance = min(alarms_a_year / _LOOKS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
-    statistics = held.shown**2 / held.known
+    statistics = scores.score**2 / scores.information
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
     return Creep(
         statistic=float(statistics[row, way]),
         level=level,
         parameter=ANGLES[int(row)],
-        by=float(held.shown[row, way] / held.known[row, way]),
-        sd=float(held.known[row, way] ** -0.5),
-        since_day=float(held.ramps.starts[way]),
+        by=float(scores.score[row, way] / scores.information[row, way]),
+        sd=float(scores.information[row, way] ** -0.5),
+        since_day=float(scores.ramps.starts[way]),
     )
 
 
@@ -90,19 +90,19 @@ class Ramps:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Held:
-    """Projections of weeks on ramps of turns (3, W) of tilt, roll, heading, and their weights.
+class RampScores:
+    """Scores of weeks along ramps of turns (3, W) of tilt, roll, heading, and their weights.
 
-    A turn's likeliest size is `shown / known`, with a variance of `1 / known`.
+    A turn's likeliest size is `score / information`, with a variance of `1 / information`.
     """
 
     ramps: Ramps
-    shown: Array
-    known: Array
+    score: Array
+    information: Array
 
 
-def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
-    """Projections of a log's weeks on every ramp; None of too few people."""
+def ramp_scores(log: CreepLog, from_s: float | None) -> RampScores | None:
+    """Scores of a log's weeks along every ramp; None of too few people."""
     weeks = weeks_of(log, from_s)
     if weeks is None:
         return None
@@ -111,10 +111,10 @@ def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
     ways = ramps.at(weeks.middle_day)
     weighed = np.linalg.inv(noise_of(log, weeks))
     pull = (weighed @ weeks.moves.ravel()).reshape(-1, NUMBERS)
-    return Held(
+    return RampScores(
         ramps=ramps,
-        shown=np.array([ways @ pull[:, number] for number in ANGLES]),
-        known=np.array(
+        score=np.array([ways @ pull[:, number] for number in ANGLES]),
+        information=np.array(
             [
                 np.einsum("wb,bc,wc->w", ways, weighed[number::NUMBERS, number::NUMBERS], ways)
                 for number in ANGLES
@@ -134,14 +134,14 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     Source: Bayesian model averaging; the ratio of the marginal likelihoods of a Gaussian's mean.
     """
     turns = np.zeros((len(days), 4))
-    held = hold_to_ramps(log, from_s)
-    if held is None:
+    scores = ramp_scores(log, from_s)
+    if scores is None:
         return turns
-    months = np.maximum(held.ramps.now - held.ramps.starts, 1.0) / _MONTH_DAYS
+    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / _MONTH_DAYS
     usual = (_A_MONTH_RAD * months) ** 2
-    size = usual * held.shown / (1 + usual * held.known)
-    ratio = 0.5 * (size * held.shown - np.log1p(usual * held.known))
+    size = usual * scores.score / (1 + usual * scores.information)
+    ratio = 0.5 * (size * scores.score - np.log1p(usual * scores.information))
     odds = _CREEPING / (1 - _CREEPING) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
     probability = odds / (1 + odds.sum())
-    turns[:, ANGLES] = ((probability * size) @ held.ramps.at(np.asarray(days))).T
+    turns[:, ANGLES] = ((probability * size) @ scores.ramps.at(np.asarray(days))).T
     return turns

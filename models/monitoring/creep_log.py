@@ -20,7 +20,7 @@ _BLOCK_DAYS = 7  # weekends walk otherwise
 _MOST_BLOCKS = 104
 _FEWEST_GROUPS = 60
 _SLOW_DAYS = 60.0  # how long a habit of a season lasts
-_FREE_RAD = np.radians(60.0)  # one group tells everything at least so badly
+_FREE_RAD = np.radians(60.0)  # sd of any turn that one group determines, at the most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class CreepLog:
     """Sums of the scores of days (D,) of people, against the first map and speeds of a reference.
 
     `day_idx` counts days from the epoch, `groups` are how many came, `pulls` (D, 5) what they
-    add up to. `information` (5, 5) is what a group tells, and `reference_groups` made the chart,
+    add up to. `information` (5, 5) is that of a group, and `reference_groups` made the chart,
     the last of them on the day `since_day`.
     """
 
@@ -99,7 +99,7 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
     first = np.full(ago.size, np.inf)
     np.minimum.at(first, week, day_idx.astype(np.float64))
     newest = slice(0, _MOST_BLOCKS)
-    moves = np.linalg.solve(_group_tells(log), (pulls / people[:, None]).T)
+    moves = np.linalg.solve(_group_information(log), (pulls / people[:, None]).T)
     return Weeks(
         groups=np.asarray(people[newest], dtype=np.float64),
         days=np.bincount(week)[newest].astype(np.float64),
@@ -112,14 +112,14 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
 
 def noise_of(log: CreepLog, weeks: Weeks) -> Array:
     """The covariance (5 B, 5 B) of the weeks' mean moves if the camera stands."""
-    person = np.linalg.inv(_group_tells(log))
+    person = np.linalg.inv(_group_information(log))
     apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
     people = np.diag(1 / weeks.groups) + OTHER_PEOPLE / log.reference_groups
     habits = np.exp(-apart / _SLOW_DAYS) + np.diag(1 / weeks.days)
     return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS_OF_DAYS**2)))
 
 
-def _group_tells(log: CreepLog) -> Array:
+def _group_information(log: CreepLog) -> Array:
     """Information of a group (5, 5), none of it so small that it cannot be inverted."""
     return np.asarray(log.information + np.eye(NUMBERS) / _FREE_RAD**2)
 

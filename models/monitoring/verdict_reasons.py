@@ -7,7 +7,7 @@ from models.durations import DAY_S
 from models.geometry.plane_parameters import ANGLES, PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
-from models.monitoring.chart import CLOCK, Reading
+from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.creep import Creep
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
 from models.reasons import Reason, TracksCode, Value
@@ -44,21 +44,21 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
     return Reason(code=code, values=values)
 
 
-def reason_of_reading(reading: Reading) -> Reason | None:
+def reason_of_chart(chart: ChartResult) -> Reason | None:
     """Direction in which the drift chart takes the camera to have moved; None where it is calm.
 
     Its `number` is a parameter of a pose, or `times` where all were too long (`sign` 1) or too
     short (-1).
     """
-    if not reading.suspicious:
+    if not chart.suspicious:
         return None
-    parameter = "times" if reading.parameter == CLOCK else PARAMETERS[reading.parameter]
+    parameter = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
     values: dict[str, Value] = {
         "number": parameter,
-        "sign": reading.sign,
-        "parties": reading.walking_groups,
-        "statistic": reading.statistic,
-        "level": reading.level,
+        "sign": chart.sign,
+        "parties": chart.walking_groups,
+        "statistic": chart.statistic,
+        "level": chart.level,
     }
     return Reason(code=TracksCode.CHART, values=values)
 
@@ -81,12 +81,12 @@ def reason_of_creep(creep: Creep) -> Reason | None:
     return Reason(code=TracksCode.CREPT, values=values)
 
 
-def may_be_clock(reading: Reading) -> bool:
+def may_be_clock(chart: ChartResult) -> bool:
     """True where an alarm may be of the clock, after too few walking groups for the pose to decide.
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return reading.parameter in (_HEIGHT, CLOCK) and reading.walking_groups < _GROUPS_FOR_POSE
+    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < _GROUPS_FOR_POSE
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:

@@ -18,7 +18,7 @@ from models.monitoring.creep import posterior_mean_turns
 from models.monitoring.creep_log import CreepLog, add_day, begin_log
 from models.monitoring.group_scores import score_groups
 from models.pose.site import CameraSite
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 
@@ -77,7 +77,7 @@ def without_creep(
         if np.abs(turn).max() < _NOTHING_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
-        stood = Knock(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)
-        return knock_trajectory(track, intrinsics, stood, prior)
+        stood = PoseOffset(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)
+        return offset_trajectory(track, intrinsics, stood, prior)
 
     return [seen(track, turn) for track, turn in zip(tracks, turns, strict=True)]

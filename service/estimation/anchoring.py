@@ -14,9 +14,9 @@ from models.pose import (
     CameraSite,
     Creep,
     begin_creep_log,
+    creep_result,
     log_creep,
     observe,
-    read_creep,
 )
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
@@ -198,7 +198,7 @@ def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | Non
     if anchor is None or anchor.log is None:
         return None
     log = creep_log_from_bytes(anchor.log)
-    return read_creep(log, SHARE * false_alarms_per_year, anchor.from_s)
+    return creep_result(log, SHARE * false_alarms_per_year, anchor.from_s)
 
 
 def _anchor(record: AnchorRecord, bounds: WindowBounds) -> Anchor:

@@ -19,9 +19,9 @@ from models.monitoring.verdict import (
 from models.monitoring.verdict_reasons import (
     clock_fault,
     may_be_clock,
+    reason_of_chart,
     reason_of_creep,
     reason_of_drift,
-    reason_of_reading,
 )
 from models.pose import drift_of
 from models.reasons import Reason
@@ -160,7 +160,7 @@ def _judge(
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
         clock,
-        None if finding.reading is None else reason_of_reading(finding.reading),
+        None if finding.reading is None else reason_of_chart(finding.reading),
         finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
@@ -170,7 +170,7 @@ def _judge(
     state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     charted = reading if reading is not None and reading.moved else None
     if charted is not None and clock is None and charted.parameter == CLOCK:
-        clock = reason_of_reading(charted)
+        clock = reason_of_chart(charted)
     return Judgement(
         state=PoseState.DRIFTING if verdict.drifting else state,
         reasons=reasons,

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from models.monitoring.chart import Reading
+from models.monitoring.chart import ChartResult
 from models.monitoring.creep import SHARE
 from models.monitoring.serialization import chart_from_bytes
 from models.paths.serialization import flow_from_bytes
@@ -16,11 +16,11 @@ from models.pose import (
     Creep,
     Observations,
     SecondLook,
+    alarm_chart_result,
     assume_site,
     count_walks,
     estimate_pose,
     observe_walks,
-    read_alarm_chart,
 )
 from models.pose.fusion import FusedEstimate
 from models.reasons import Reason
@@ -58,7 +58,7 @@ class Finding:
     fused: FusedEstimate
     earlier: FusedEstimate | None
     averaged: PoseEstimate | None
-    reading: Reading | None
+    reading: ChartResult | None
     creep: Creep | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
@@ -164,7 +164,7 @@ def _read(
     site: CameraSite,
     first: int,
     failures: PartialFailures,
-) -> Reading | None:
+) -> ChartResult | None:
     """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
@@ -175,7 +175,7 @@ def _read(
         calm_groups=evidence.limits.people,
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
-    read = partial(read_alarm_chart, observed, site, rate, counted=unanswered, first=first)
+    read = partial(alarm_chart_result, observed, site, rate, counted=unanswered, first=first)
     return failures.unless_failed("chart", read)
 
 

@@ -115,8 +115,8 @@ def _judged(
     )
 
 
-def told(outcomes: Sequence[BaseOutcome]) -> Iterator[str]:
-    """Lines: each way's errors; windows better and worse than fused; whether agreement tells."""
+def report_lines(outcomes: Sequence[BaseOutcome]) -> Iterator[str]:
+    """Lines: each way's errors; windows better and worse than fused; the worth of agreement."""
     ways = list(dict.fromkeys(outcome.way for outcome in outcomes))
     for way in ways:
         own = [outcome for outcome in outcomes if outcome.way == way]
@@ -168,4 +168,4 @@ def main(arguments: Sequence[str]) -> None:
                 knocks = chosen.knocks.split(",")
                 outcomes += scene_outcomes(scene, int(seed), knocks, chosen.split)
             sys.stderr.write(f"{scene.scene_id} is done\n")
-    sys.stdout.write("\n".join(told(outcomes)) + "\n")
+    sys.stdout.write("\n".join(report_lines(outcomes)) + "\n")

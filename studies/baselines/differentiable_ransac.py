@@ -86,8 +86,8 @@ def hypotheses(
         drawn = _drawn_pose(world, rays, rng)
         if drawn is None:
             continue
-        rows, told = drawn
-        pose: Tensor = torch.from_numpy(told)
+        rows, values = drawn
+        pose: Tensor = torch.from_numpy(values)
         if coordinates.requires_grad:
             pose = _derived_pose(coordinates[rows], rays[rows])
         found.append(pose)

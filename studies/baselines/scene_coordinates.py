@@ -101,8 +101,8 @@ def patches_of(intrinsics: Intrinsics, images: Images, poses: PoseSet) -> PatchS
     """Pictures with the places of their patches."""
     uv = patch_pixels(intrinsics, images)
     centre = poses.centre_m
-    asked = np.broadcast_to(uv, (len(images), *uv.shape))
-    ground, valid = ground_from_pixel(intrinsics, poses.rotation, centre, asked)
+    pixels = np.broadcast_to(uv, (len(images), *uv.shape))
+    ground, valid = ground_from_pixel(intrinsics, poses.rotation, centre, pixels)
     places = np.concatenate([ground - centre[:, None, :2], np.zeros((*valid.shape, 1))], axis=-1)
     near: Mask = valid & (np.linalg.norm(np.nan_to_num(places), axis=-1) < _FARTHEST_M)
     return PatchSet(

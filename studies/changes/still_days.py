@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import KNOCKS, RUN, DriftChart, Ratios, ratios_of, slope_of, trace
+from models.monitoring.chart import OFFSET_GRID, RUN, DriftChart, Ratios, ratios_of, slope_of, trace
 from models.monitoring.group_scores import score_groups, scores_at
 from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
@@ -52,18 +52,18 @@ MOVES = {
 class StillDay:
     """Chart of people before a camera that stands.
 
-    `excess` is the highest statistic in units of the level, by a knock of the grid with
-    `knock_idx`; the first alarm was after `alarm_after` tracks, None where there was none. `habits`
-    (5,) are standard deviations of tilt, roll, log height, heading and log pace among blocks of 100
-    walking groups, beyond chance. `delays` are how many walking groups each move took at each of
-    some moments; infinite where it took more than were waited for.
+    `excess` is the highest statistic in units of the level, by an offset of the grid,
+    `offset_idx`; the first alarm was after `alarm_after` tracks, None where there was none.
+    `habits` (5,) are standard deviations of tilt, roll, log height, heading and log pace among
+    blocks of 100 walking groups, beyond chance. `delays` are how many walking groups each move
+    took at each of some moments; infinite where it took more than were waited for.
     """
 
     camera: str
     begin: int
     tracks: int
     excess: float
-    knock_idx: int
+    offset_idx: int
     alarm_after: int | None
     habits: Array
     delays: dict[str, list[float]]
@@ -105,7 +105,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
             begin=begin,
             tracks=len(rest),
             excess=float(path.statistic[highest]) / level,
-            knock_idx=int(path.knock_idx[highest]),
+            offset_idx=int(path.offset_idx[highest]),
             alarm_after=int(scores.last[over[0]]) if over.size else None,
             habits=habits_of(chart, apart),
             delays=delays,
@@ -142,14 +142,14 @@ def habits_of(chart: DriftChart, apart: Array) -> Array:
     return np.asarray(np.sqrt(variance))
 
 
-def told(days: Sequence[StillDay]) -> Iterator[str]:
+def report_lines(days: Sequence[StillDay]) -> Iterator[str]:
     """Lines: each reference; alarms among all; habits; delays."""
     for day in days:
-        knock = KNOCKS[day.knock_idx]
+        offset = OFFSET_GRID[day.offset_idx]
         habits = ", ".join(f"{each:.2f}" for each in day.habits * _PERCENT_OR_DEG)
         yield (
             f"{day.camera:20} from {day.begin:4}, {day.tracks:4} tracks: "
-            f"highest {day.excess:.2f} of the level ({_NUMBERS[knock.parameter]}), "
+            f"highest {day.excess:.2f} of the level ({_NUMBERS[offset.parameter]}), "
             f"alarm after {day.alarm_after}; habits {habits} (deg, deg, %, deg, %)"
         )
     alarms = sum(day.alarm_after is not None for day in days)
@@ -178,4 +178,4 @@ def main(arguments: Sequence[str]) -> None:
         for scene in load_recording(folder):
             days += still_days(scene, chosen.alarms_a_year)
             sys.stderr.write(f"{scene.scene_id} is done\n")
-    sys.stdout.write("\n".join(told(days)) + "\n")
+    sys.stdout.write("\n".join(report_lines(days)) + "\n")

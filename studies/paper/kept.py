@@ -48,12 +48,12 @@ def is_begun(out: Path, name: str) -> bool:
 
 def write_manifest(out: Path) -> None:
     """By what, on what and how long each part took, of all that the folder has."""
-    told = {}
+    parts = {}
     for name in PARTS:
         if not is_begun(out, name):
             continue
         kept, results = kept_results(out, name)
-        told[name] = {
+        parts[name] = {
             "heading": asdict(kept.heading),
             "cases": len(results),
             "seeds": sorted({each.case.seed for each in results}),
@@ -62,4 +62,4 @@ def write_manifest(out: Path) -> None:
             "seconds_a_case": fmean(each.seconds for each in results) if results else None,
         }
     versions = {name: version(name) for name in _VERSIONS} | {"python": platform.python_version()}
-    write_results(out / "manifest.json", versions=versions, parts=told)
+    write_results(out / "manifest.json", versions=versions, parts=parts)

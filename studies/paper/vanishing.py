@@ -116,8 +116,8 @@ def _table(results: Sequence[PaperResult]) -> str:
 def _walkers(found: Sequence[Figures], ending: str) -> str:
     """Each walker's figure, the median of the seeds."""
     names = [f"walker_{number}{ending}" for number in range(1, _WALKERS + 1)]
-    told = [[each[name] for each in found if name in each] for name in names]
-    return ", ".join(f"{median(values):.1f}" if values else "none" for values in told)
+    columns = [[each[name] for each in found if name in each] for name in names]
+    return ", ".join(f"{median(values):.1f}" if values else "none" for values in columns)
 
 
 VANISHING_POINTS = PaperPart(

@@ -19,7 +19,7 @@ from models.geometry.rotation import Array
 from models.paths.reference import candidate_of
 from models.quantiles import Z90
 from models.reasons import Reason
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
@@ -43,7 +43,7 @@ _PLACES_DRAWN = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KnockedResult:
+class OffsetResult:
     """The fused pose after a knock, from so many tracks.
 
     `errors` are of tilt, roll, heading in degrees and, last, of the log height; `covered` says
@@ -62,7 +62,7 @@ class ChangedResult:
 
     Angles to the truth and to the pose by as many tracks on the old paths, how far these were
     from the truth, and the log of the height against the truth's. `reason` is what the estimate
-    says, `registered` whether the map had a part in it, `covered` is as in `KnockedResult`.
+    says, `registered` whether the map had a part in it, `covered` is as in `OffsetResult`.
     """
 
     tracks: int
@@ -80,8 +80,8 @@ class SiteResults:
     """All of one site, and the seconds that each part took."""
 
     site: int
-    knock: Knock
-    knocked: tuple[KnockedResult, ...]
+    knock: PoseOffset
+    knocked: tuple[OffsetResult, ...]
     changed: tuple[ChangedResult, ...]
     simulated_s: float
     learned_s: float
@@ -129,12 +129,12 @@ def study_site(
 
 def _knocked(
     simulated: SimulatedSite, count: int, rng: np.random.Generator
-) -> tuple[Knock, Observations]:
+) -> tuple[PoseOffset, Observations]:
     """A knock after which the people are still seen, and what is seen of them."""
     for _ in range(_MOST_DRAWS):
         tilt, roll, pan = rng.uniform(-_KNOCK_RAD, _KNOCK_RAD, 3)
         log_height = rng.uniform(-_KNOCK_LOG_HEIGHT, _KNOCK_LOG_HEIGHT)
-        knock = Knock(
+        knock = PoseOffset(
             tilt_rad=float(tilt),
             roll_rad=float(roll),
             log_height=float(log_height),
@@ -225,10 +225,10 @@ def _first(observations: Observations, count: int) -> Observations:
     return of_tracks(observations, np.arange(min(count, observations.tracks)))
 
 
-def _judge_knock(learned: LearnedSite, truth: CameraPose, tracks: Observations) -> KnockedResult:
+def _judge_knock(learned: LearnedSite, truth: CameraPose, tracks: Observations) -> OffsetResult:
     found = learned.fused(tracks)
     errors = _errors(found.values, truth)
-    return KnockedResult(
+    return OffsetResult(
         tracks=tracks.tracks,
         errors=_printed(errors),
         covered=_covered(errors, found.covariance),

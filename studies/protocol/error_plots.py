@@ -66,8 +66,8 @@ def _draw_flow(scene: Path, path: Path) -> None:
     if learned.site.flow is None or answer.heading_rad is None:
         return
     prior = learned.case.prior_pose
-    told = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)
-    plot_flow(learned, {"new tracks by the prior pose": prior, "by the fused pose": told}, path)
+    pose = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)
+    plot_flow(learned, {"new tracks by the prior pose": prior, "by the fused pose": pose}, path)
 
 
 def _curve(pair: tuple[Path, int]) -> list[tuple[int, float, float]]:

@@ -14,7 +14,7 @@ from models.walking.reference.learning import learn_speed_reference
 from studies.protocol.cases import (
     KNOCKED,
     Answer,
-    KnockRange,
+    OffsetRange,
     draw_case,
     nothing_identifiable,
 )
@@ -24,7 +24,7 @@ _SEED = 0
 
 
 def joint(learned: Learned) -> Answer:
-    """By speeds alone: the site learned from the reference, boxes where they tell something."""
+    """By speeds alone: the site learned from the reference, boxes where they count."""
     return joint_answer(
         joint_estimate(learned.seen, learned.case.prior_pose, learned.site.speed_reference)
     )
@@ -58,14 +58,14 @@ def joint_answer(estimate: JointEstimate) -> Answer:
 
 
 def track_errors(
-    scene: Scene, seed: int, counts: list[int], knock_range: KnockRange = KNOCKED
+    scene: Scene, seed: int, counts: list[int], offset_range: OffsetRange = KNOCKED
 ) -> list[tuple[int, float, float]]:
     """For some numbers of tracks after a knock: tracks, angle error, its bound; both in degrees.
 
     The bound is Cramer and Rao's for the estimator's own likelihood: the root of the summed
     variances of tilt and roll.
     """
-    case = draw_case(scene, seed, knock_range)
+    case = draw_case(scene, seed, offset_range)
     reference = learn_speed_reference(
         observe(case.reference, case.intrinsics, case.prior_pose),
         case.prior_pose,

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import knock_trajectory
+from models.simulation.pose_offset import offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack
 
 _NIGHT_S = 4 * 3600.0  # without anybody: another day begins
@@ -73,7 +73,7 @@ def first_seen(
             break
         seen = track.trajectory
         if pose is not None:
-            moved = knock_trajectory(seen, scene.intrinsics, scene.true_pose, pose)
+            moved = offset_trajectory(seen, scene.intrinsics, scene.true_pose, pose)
             if moved is None:
                 continue
             seen = moved
