@@ -16,26 +16,26 @@ import numpy as np
 
 from models.durations import HOUR_S
 from models.geometry.rotation import Array
+from models.monitoring.config import (
+    BURST_UNKNOWN,
+    CHANGES_PER_HOUR,
+    DAY_VARIANCE,
+    DAY_WEIGHT,
+    FEW_GROUPS,
+    FEWEST_GAPS,
+    FEWEST_WEEKDAYS,
+    FEWEST_WEEKEND_DAYS,
+    IMPLAUSIBLE,
+    QUIET_LEVEL,
+    QUIET_SHAPE,
+    QUIET_SHARE,
+    SHAPES,
+    TAIL,
+    TURNS_QUIET,
+)
 
 CELLS = 48  # the hours of a weekday, then those of a day of a weekend
-_FEWEST_WEEKDAYS, _FEWEST_WEEKEND_DAYS = 5, 4  # to tell the two apart
-_TAIL = (0.9, 0.99)
-_FEWEST_GAPS = 10  # beyond a quantile, to read it
-_BURST_UNKNOWN = 3.0  # with fewer gaps than that
-# What days are taken to differ by before many are seen: variance of the level, worth so many days.
-_DAY_VARIANCE, _DAY_WEIGHT = 0.1, 5.0
-_SHAPES = (1.0, 50.0)
-# A quiet day or hour has a quarter of the people, give or take a fifth of that. Chosen, with the
-# numbers below, on the simulated years of `studies.alarms.rhythm_study` (seed 7).
-_QUIET_LEVEL, _QUIET_SHAPE = 0.25, 20.0
-_QUIET_SHARE = 0.05  # of days
-_TURNS_QUIET = 0.1  # of changes of the level
-_CHANGES_PER_HOUR = 0.05  # how often the level becomes another within a day
 _HOURS_PER_YEAR = 8766.0
-
-
-_FEW = 3.0  # walking groups
-_SURELY = 1e-3  # chance below which people should have been seen: then the fixed limit counts
 
 
 class SilenceVerdict(StrEnum):
@@ -137,7 +137,7 @@ def chance_of_silence(
         expected: tracks expected in these.
     """
     missed, seen, expected = (number / process.burst for number in (missed, seen, expected))
-    levels = ((process.shape, process.shape), (_QUIET_SHAPE, _QUIET_SHAPE / _QUIET_LEVEL))
+    levels = ((process.shape, process.shape), (QUIET_SHAPE, QUIET_SHAPE / QUIET_LEVEL))
     # Gamma-Poisson: what was seen makes (a, b) into (a + seen, b + expected).
     logs = [
         math.log(share)
@@ -145,13 +145,13 @@ def chance_of_silence(
         - math.lgamma(a)
         + a * math.log(b)
         - (a + seen) * math.log(b + expected)
-        for share, (a, b) in zip((1 - _QUIET_SHARE, _QUIET_SHARE), levels, strict=True)
+        for share, (a, b) in zip((1 - QUIET_SHARE, QUIET_SHARE), levels, strict=True)
     ]
     weights = [math.exp(value - max(logs)) for value in logs]
     same = [((b + expected) / (b + expected + missed)) ** (a + seen) for a, b in levels]
     other = [(b / (b + missed)) ** a for a, b in levels]
-    changed = 1 - (1 - _CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
-    after_change = (1 - _TURNS_QUIET) * other[0] + _TURNS_QUIET * other[1]
+    changed = 1 - (1 - CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
+    after_change = (1 - TURNS_QUIET) * other[0] + TURNS_QUIET * other[1]
     unchanged = sum(w * chance for w, chance in zip(weights, same, strict=True)) / sum(weights)
     return float((1 - changed) * unchanged + changed * after_change)
 
@@ -169,7 +169,7 @@ def judge_silence(
     if silent_s < rule.least_s or not is_missed(process, missed):
         return SilenceVerdict.USUAL
     chance = chance_of_silence(process, missed, silent_s, seen, expected)
-    if silent_s > rule.limit_s and chance < _SURELY:
+    if silent_s > rule.limit_s and chance < IMPLAUSIBLE:
         return SilenceVerdict.TOO_LONG
     allowed = rule.false_per_year / max(process.arrivals_per_year, 1.0)
     return SilenceVerdict.IMPROBABLE if chance < allowed else SilenceVerdict.USUAL
@@ -177,7 +177,7 @@ def judge_silence(
 
 def is_missed(process: ArrivalProcess, missed: float) -> bool:
     """True where more than a few walking groups should have come: fewer may stay away any day."""
-    return missed > _FEW * process.burst
+    return missed > FEW_GROUPS * process.burst
 
 
 def delay_of(latest_s: Array) -> float:
@@ -200,7 +200,7 @@ def _rates(counts: Array, cells: np.ndarray, known: np.ndarray) -> Array:
     """Tracks an hour (48,): of each hour of the day, with one more day like the hours beside it."""
     days = np.bincount(cells[known], minlength=CELLS).astype(float)
     sums = np.bincount(cells[known], weights=counts[known], minlength=CELLS)
-    apart = days[:24].max() >= _FEWEST_WEEKDAYS and days[24:].max() >= _FEWEST_WEEKEND_DAYS
+    apart = days[:24].max() >= FEWEST_WEEKDAYS and days[24:].max() >= FEWEST_WEEKEND_DAYS
     if not apart:
         days, sums = (np.tile(part[:24] + part[24:], 2) for part in (days, sums))
     rates = np.zeros(CELLS)
@@ -224,10 +224,10 @@ def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> 
     rescaled = rescaled[np.diff(unseen[np.minimum(place.astype(int), len(rates))]) == 0]
     found = [
         float(np.quantile(rescaled, share)) / -math.log(1 - share)
-        for share in _TAIL
-        if len(rescaled) * (1 - share) >= _FEWEST_GAPS
+        for share in TAIL
+        if len(rescaled) * (1 - share) >= FEWEST_GAPS
     ]
-    return max(1.0, *found) if found else _BURST_UNKNOWN
+    return max(1.0, *found) if found else BURST_UNKNOWN
 
 
 def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
@@ -240,5 +240,5 @@ def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
     seen, expected = (part.reshape(-1, 24).sum(axis=1) for part in (counts, rates))
     seen, expected = seen[expected > 0], expected[expected > 0]
     excess = (seen / expected - 1) ** 2 - 1 / expected
-    variance = (_DAY_WEIGHT * _DAY_VARIANCE + float(excess.sum())) / (_DAY_WEIGHT + len(excess))
-    return float(np.clip(1 / max(variance, 1e-6), *_SHAPES))
+    variance = (DAY_WEIGHT * DAY_VARIANCE + float(excess.sum())) / (DAY_WEIGHT + len(excess))
+    return float(np.clip(1 / max(variance, 1e-6), *SHAPES))

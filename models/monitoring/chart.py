@@ -16,26 +16,22 @@ import numpy as np
 import numpy.typing as npt
 
 from models.geometry.rotation import Array
+from models.monitoring.config import (
+    FEWEST_GROUPS,
+    HABITS,
+    LEAST_LEVEL,
+    LENGTHS,
+    OFFSET_SIZES,
+    OTHER_PEOPLE,
+    SCORE_BOUND,
+    STRONGEST,
+    SUSPICION,
+)
 from models.monitoring.group_scores import GroupScores
 from models.serialization import stored_as
 from models.walking.speed_reference import SpeedReference
 
-FEWEST = 16  # walking groups that a move is detected by
-LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
 CLOCK = 4  # beside the four of a pose: times that are too long
-# What a site's people do of themselves for hours on end, as moves of the camera, and of its clock:
-# about as those of recorded days did beyond chance (`python -m studies still-days`). Their pace
-# differed by 5 %, but 30 frames a second taken for 25, which is 18 %, must remain an alarm.
-HABITS = np.array([np.radians(0.1), np.radians(0.2), 0.01, np.radians(0.2), 0.03])
-# For days and seasons, of which too few are recorded to say: in rain and in winter they may walk
-# elsewhere, and faster.
-HABITS_OF_DAYS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
-RUN = 1000  # walking groups; levels are of so many in a row
-# The reference's noise counts for so much: whoever walks by on other days is another sample, too.
-OTHER_PEOPLE = 1.5
-_STRONGEST = 2.0  # times an offset of the grid, that it stands for
-_SUSPICION = 100.0  # times as many alarms
-_LEAST_LEVEL = 5.4  # of a run of endless normal walking groups that is wrong once in e runs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +54,9 @@ class GridOffset:
         return float(np.exp(self.size)) if self.parameter == CLOCK else 1.0
 
 
-_ANGLES = tuple(float(np.radians(angle)) for angle in (1.0, 2.5, 6.0))
-# Of each parameter, the smallest first. 0.18 is 30 frames a second taken for 25.
-_SIZES = (_ANGLES, _ANGLES, (0.05, 0.12, 0.3), _ANGLES, (0.08, 0.18))
 OFFSET_GRID = tuple(
     GridOffset(parameter=parameter, size=sign * size)
-    for parameter, sizes in enumerate(_SIZES)
+    for parameter, sizes in enumerate(OFFSET_SIZES)
     for sign in (1, -1)
     for size in sizes
 )
@@ -95,13 +88,13 @@ class DriftChart:
         """Level passed so many times by the statistic in 1000 groups of a still camera."""
         share = -np.expm1(-alarms_a_run)
         learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
-        return max(learned, _LEAST_LEVEL - float(np.log(share))) * _unsure(
+        return max(learned, LEAST_LEVEL - float(np.log(share))) * _unsure(
             self.walking_groups, len(self.mean)
         )
 
     def bounded(self, scores: Array) -> Array:
         """Scores (..., 14) in units of their width, none farther from the middle than 5."""
-        return np.clip((scores - self.middle) / self.width, -5.0, 5.0)
+        return np.clip((scores - self.middle) / self.width, -SCORE_BOUND, SCORE_BOUND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +150,7 @@ def chart_result(
         calm_ratio: of its level, below which the chart is calm.
         calm_groups: how many walking groups in a row it must be, to have calmed down.
     """
-    if len(scores.values) < FEWEST:
+    if len(scores.values) < FEWEST_GROUPS:
         return None
     most = int(LENGTHS[-1])
     newest = chart.bounded(scores.values[-most:])
@@ -176,7 +169,7 @@ def chart_result(
         sign=1 if offset.size > 0 else -1,
         walking_groups=walking_groups,
         track_idx=int(scores.last[-most:][at + 1 - walking_groups]),
-        suspicious=statistic > chart.level(_SUSPICION * alarms_a_run),
+        suspicious=statistic > chart.level(SUSPICION * alarms_a_run),
     )
 
 
@@ -210,7 +203,9 @@ class Trace:
 
 def ratios_of(chart: DriftChart) -> Ratios:
     """The weights of a chart for each number of newest walking groups."""
-    slopes = np.stack([slope_of(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
+    slopes = np.stack(
+        [slope_of(chart, parameter) for parameter in range(len(OFFSET_SIZES))], axis=1
+    )
     habits = (slopes * HABITS) @ (slopes * HABITS).T
     weights, strengths = [], []
     for length in LENGTHS:
@@ -258,13 +253,13 @@ def highest(ratios: Ratios, apart: Array) -> float:
 
 def _ratio(shown: Array, strengths: Array) -> Array:
     """Log likelihood ratios of offsets (..., K), each as strong as is likeliest in its reach."""
-    times = np.clip(shown / strengths, 1.0, _STRONGEST)
+    times = np.clip(shown / strengths, 1.0, STRONGEST)
     return np.asarray(times * shown - times**2 * strengths / 2)
 
 
 def slope_of(chart: DriftChart, parameter: int) -> Array:
     """The response (14,) to a unit of a parameter, by its smallest offsets both ways."""
-    size = _SIZES[parameter][0]
+    size = OFFSET_SIZES[parameter][0]
     on, back = (
         OFFSET_GRID.index(GridOffset(parameter=parameter, size=sign * size)) for sign in (1, -1)
     )

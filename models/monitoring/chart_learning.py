@@ -8,12 +8,20 @@ import numpy.typing as npt
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.chart import (
-    FEWEST,
     OFFSET_GRID,
-    RUN,
     DriftChart,
     highest,
     ratios_of,
+)
+from models.monitoring.config import (
+    BLOCK,
+    BOOTSTRAP_RUNS,
+    FEWEST_GROUPS,
+    LEAST_BLOCKS,
+    LEAST_SHRINKAGE,
+    RESPONSE_GROUPS,
+    RIDGE,
+    RUN,
 )
 from models.monitoring.group_scores import SCORES, Usual, scores_at
 from models.paths.folds import Fold, Folds
@@ -24,15 +32,6 @@ from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.reference.learning import relearned
 from models.walking.speed_reference import SpeedReference
-
-_ENOUGH = 400  # walking groups that the answers to offsets are learned of, to some 4 %
-_RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
-# Walking groups after one another that the bootstrap keeps together: people share their quarter of
-# an hour, and runs of 16 are held against an offset. Of fewer, recorded days alarm twice as often.
-_BLOCK = 24
-_BLOCKS = 12  # at least, of a reference
-_RUNS = 100
-_LEAST_SHRUNK = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,12 +73,12 @@ def learn_chart(
     """
     check_in_time(observations)
     scored: list[_FoldScores] = []
-    wanted = _ENOUGH
+    wanted = RESPONSE_GROUPS
     for fold in folds.each:
         scored.append(_fold_scores(observations, prior, site, fold, wanted))
         wanted -= len(scored[-1].before)
     count = sum(len(part.still) for part in scored)
-    if count < FEWEST:
+    if count < FEWEST_GROUPS:
         return None
     order = np.argsort(np.concatenate([part.times for part in scored]), kind="stable")
     scores = np.concatenate([part.still for part in scored])[order]
@@ -149,8 +148,8 @@ def _covariance(scores: Array) -> Array:
     variance = products.var(axis=0) * count**2 / (count - 1) ** 3
     beside = ~np.eye(len(sd), dtype=bool)
     shrunk = variance[beside].sum() / max(float((correlation[beside] ** 2).sum()), 1e-9)
-    shrunk = float(np.clip(shrunk, _LEAST_SHRUNK, 1.0))
-    own = (1 + _RIDGE) * np.eye(len(sd))
+    shrunk = float(np.clip(shrunk, LEAST_SHRINKAGE, 1.0))
+    own = (1 + RIDGE) * np.eye(len(sd))
     return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
 
 
@@ -158,8 +157,8 @@ def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
     """The highest statistic of each of so many runs of a still camera."""
     ratios = ratios_of(chart)
     count = len(scores)
-    reached = np.empty(_RUNS)
-    for run in range(_RUNS):
+    reached = np.empty(BOOTSTRAP_RUNS)
+    for run in range(BOOTSTRAP_RUNS):
         taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
         people = scores[drawn_blocks(rng, count, count)]
         walked = people[drawn_blocks(rng, count, RUN)]
@@ -169,6 +168,6 @@ def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
 
 def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
     """Indices (wanted,) of walking groups, some after one another at a time."""
-    block = min(_BLOCK, -(-count // _BLOCKS))
+    block = min(BLOCK, -(-count // LEAST_BLOCKS))
     starts = rng.integers(0, count, -(-wanted // block))
     return np.asarray(((starts[:, None] + np.arange(block)).ravel() % count)[:wanted])

@@ -22,14 +22,11 @@ import numpy as np
 
 from models.geometry.rotation import Array
 from models.monitoring.chart import TestStatistic
+from models.monitoring.config import CREEP_DAYS, CREEP_RAD, CREEP_TESTS, CREEPING_SHARE
 from models.monitoring.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
 from models.quantiles import value_below
 
-SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
 ANGLES = (0, 1, 3)  # tilt, roll and heading creep
-_A_MONTH_RAD, _MONTH_DAYS = np.radians(0.5), 30.0
-_CREEPING = 0.1  # of cameras
-_LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn with its own noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +54,7 @@ def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = Non
     scores = ramp_scores(log, from_s)
     if scores is None:
         return None
-    chance = min(alarms_a_year / _LOOKS, 0.5) / 2
+    chance = min(alarms_a_year / CREEP_TESTS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
     statistics = scores.score**2 / scores.information
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
@@ -137,11 +134,11 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     scores = ramp_scores(log, from_s)
     if scores is None:
         return turns
-    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / _MONTH_DAYS
-    usual = (_A_MONTH_RAD * months) ** 2
+    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / CREEP_DAYS
+    usual = (CREEP_RAD * months) ** 2
     size = usual * scores.score / (1 + usual * scores.information)
     ratio = 0.5 * (size * scores.score - np.log1p(usual * scores.information))
-    odds = _CREEPING / (1 - _CREEPING) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
+    odds = CREEPING_SHARE / (1 - CREEPING_SHARE) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
     probability = odds / (1 + odds.sum())
     turns[:, ANGLES] = ((probability * size) @ scores.ramps.at(np.asarray(days))).T
     return turns

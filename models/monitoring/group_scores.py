@@ -17,6 +17,7 @@ import numpy.typing as npt
 from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.monitoring.config import LARGEST_RESIDUAL, PACE_SD, STATURE_SD, STEP_SHARES
 from models.paths.likelihood import Walkers, walkers_of
 from models.paths.reference import candidate_of
 from models.paths.registration import Site
@@ -27,10 +28,7 @@ from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.speed_reference import SpeedReference, channels_of
 
 SCORES = 14
-# The reach, and a part of it: a map is smoothed by a metre, and has finer lines.
-_STEPS = np.concatenate([share * np.diag(REACH) for share in (1.0, 0.35)])
-_FARTHEST = 0.5  # of a log: a pace that is further off says no more than this
-_PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and paces are weighed
+_STEPS = np.concatenate([share * np.diag(REACH) for share in STEP_SHARES])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,10 +107,10 @@ def _bounded(
     """Weighted residuals of paces, and of statures where boxes have them, bounded."""
     heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
     speeds = measure_speeds(walkers.steps, parameters, heading)
-    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / PACE_SD**2
     if speed_reference.statures is not None:
         tops = measure_statures(observations.tops, parameters, heading)
-        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / _STATURE_SD**2
+        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / STATURE_SD**2
     return scores
 
 
@@ -121,7 +119,7 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ learned.mean, 0.0)
     slopes = measured.d_value - learned.field.slopes(measured, features, learned.mean)
-    pull = -np.clip(residual, -_FARTHEST, _FARTHEST)[:, None] * slopes
+    pull = -np.clip(residual, -LARGEST_RESIDUAL, LARGEST_RESIDUAL)[:, None] * slopes
     sums = np.zeros((tracks, 3))
     np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
     number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)

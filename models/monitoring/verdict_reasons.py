@@ -8,17 +8,19 @@ from models.geometry.plane_parameters import ANGLES, PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
+from models.monitoring.config import (
+    CLOCK_LEAST_LOG,
+    CLOCK_SIGMAS,
+    GROUPS_FOR_POSE,
+    STILL_RAD,
+    STILL_SIGMAS,
+    USUAL_RATE_HZ,
+)
 from models.monitoring.creep import Creep
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
 from models.reasons import Reason, TracksCode, Value
 
-_SIGMAS = 4.0
-_LEAST_LOG = math.log(1.08)
-_STILL_SIGMAS = 2.0
-_STILL_RAD = math.radians(1.0)
-_USUAL_RATE_HZ = 25.0
 _HEIGHT = 2
-_GROUPS_FOR_POSE = 24
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
@@ -86,7 +88,7 @@ def may_be_clock(chart: ChartResult) -> bool:
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < _GROUPS_FOR_POSE
+    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < GROUPS_FOR_POSE
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
@@ -105,10 +107,10 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
         return None
     factor = 1 + drift.by.height_m / prior.height_m
     relative_sd = drift.sd.height_m / (factor * prior.height_m)
-    if abs(math.log(factor)) <= max(_SIGMAS * relative_sd, _LEAST_LOG):
+    if abs(math.log(factor)) <= max(CLOCK_SIGMAS * relative_sd, CLOCK_LEAST_LOG):
         return None
     for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
-        if abs(angle) > min(_STILL_SIGMAS * sd, _STILL_RAD):
+        if abs(angle) > min(STILL_SIGMAS * sd, STILL_RAD):
             return None
-    values = {"factor": factor, "rate_hz": frame_rate_hz or _USUAL_RATE_HZ}
+    values = {"factor": factor, "rate_hz": frame_rate_hz or USUAL_RATE_HZ}
     return Reason(code=TracksCode.SCALE_CHANGED, values=values)

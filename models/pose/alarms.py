@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.geometry.rotation import Mask
-from models.monitoring.chart import RUN, ChartResult, chart_result
+from models.monitoring.chart import ChartResult, chart_result
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import score_groups
 from models.pose.site import CameraSite
 from models.tracks.observations import Observations, of_tracks

@@ -9,7 +9,14 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.creep import SHARE
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.serialization import (
+    chart_from_bytes,
+    chart_to_bytes,
+    creep_log_from_bytes,
+    creep_log_to_bytes,
+)
+from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import (
     CameraSite,
     Creep,
@@ -198,7 +205,7 @@ def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | Non
     if anchor is None or anchor.log is None:
         return None
     log = creep_log_from_bytes(anchor.log)
-    return creep_result(log, SHARE * false_alarms_per_year, anchor.from_s)
+    return creep_result(log, CREEP_SHARE * false_alarms_per_year, anchor.from_s)
 
 
 def _anchor(record: AnchorRecord, bounds: WindowBounds) -> Anchor:

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import SHARE
+from models.monitoring.config import CREEP_SHARE
 from models.monitoring.serialization import chart_from_bytes
 from models.paths.serialization import flow_from_bytes
 from models.pose import (
@@ -169,7 +169,7 @@ def _read(
     if site.chart is None:
         return None
     rate = AlarmRate(
-        alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
+        alarms_a_year=(1 - CREEP_SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
         calm_groups=evidence.limits.people,

@@ -9,7 +9,8 @@ from typing import Self
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.monitoring.creep import SHARE, Creep, creep_result
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.creep import Creep, creep_result
 from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
 from models.simulation.pose_offset import PoseOffset
 from models.tracks.trajectory import Trajectory
@@ -156,7 +157,7 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
             log, observe_feet(tracks, life.simulated.intrinsics, life.simulated.prior), life.first
         )
         tracks = []
-        found = creep_result(log, SHARE * life.plan.alarms_a_year, from_s)
+        found = creep_result(log, CREEP_SHARE * life.plan.alarms_a_year, from_s)
         if found is None:
             continue
         highest = max(highest, found.excess)

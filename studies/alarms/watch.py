@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import RUN, DriftChart, Ratios, ratios_of, trace
+from models.monitoring.chart import DriftChart, Ratios, ratios_of, trace
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import GroupScores, Usual
 from models.pose import CameraSite
 from studies.alarms.results import DAYS

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import OFFSET_GRID, RUN, DriftChart, Ratios, ratios_of, slope_of, trace
+from models.monitoring.chart import OFFSET_GRID, DriftChart, Ratios, ratios_of, slope_of, trace
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import score_groups, scores_at
 from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of

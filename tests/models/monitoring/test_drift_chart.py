@@ -10,7 +10,6 @@ from models.errors import CheckpointError
 from models.monitoring import chart_learning
 from models.monitoring.chart import (
     CLOCK,
-    LENGTHS,
     OFFSET_GRID,
     DriftChart,
     GridOffset,
@@ -20,6 +19,7 @@ from models.monitoring.chart import (
 )
 from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
+from models.monitoring.config import LENGTHS
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.verdict_reasons import may_be_clock
