@@ -110,7 +110,7 @@ def parts(
     write: Annotated[Path | None, typer.Option(help="A page with markers for the table.")] = None,
 ) -> None:
     """Measure what each part of the estimator is worth: the protocol with one off at a time."""
-    from studies.parts.run import run_parts
+    from studies.served.parts import run_parts
 
     run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write)
 
@@ -122,7 +122,7 @@ def flow_study(
     output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("flow-study.json"),
 ) -> None:
     """Simulated sites: how well a flow map tells a knock, and what a new path does to a pose."""
-    from studies.paths.run import run_flow_study
+    from studies.paths.flow_tables import run_flow_study
 
     run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
 
@@ -301,13 +301,13 @@ for _command in (
 
 # Studies with arguments of their own: `python -m studies NAME --help`.
 _OTHERS = {
-    "still-days": "studies.changes.still_days",
-    "cuts": "studies.changes.cut_study",
+    "still-days": "studies.alarms.still_days",
+    "cuts": "studies.alarms.cut_study",
     "heads": "studies.paths.heads_study",
-    "arrivals": "studies.alarms.rhythm_study",
+    "arrivals": "studies.alarms.arrivals_study",
     "base-study": "studies.base_model.base_study",
     "base-model": "studies.base_model.making",
-    "start-weights": "studies.start_weights.making",
+    "start-weights": "studies.regressors.start_weights",
 }
 
 

@@ -59,7 +59,7 @@ FREE_RAD = np.radians(60.0)  # sd of a turn by one group, at the most: keeps all
 # Prior of the turn that growth takes out of tracks: how fast cameras creep, and how many do.
 CREEP_RAD, CREEP_DAYS, CREEPING_SHARE = np.radians(0.5), 30.0, 0.1
 
-# Arrivals: chosen on the simulated years of `studies.alarms.rhythm_study` (seed 7)
+# Arrivals: chosen on the simulated years of `studies.alarms.arrivals_study` (seed 7)
 FEWEST_WEEKDAYS, FEWEST_WEEKEND_DAYS = 5, 4  # days of each, for the two to have their own rates
 TAIL = (0.9, 0.99)  # quantiles of gaps that the burst is read at
 FEWEST_GAPS, BURST_UNKNOWN = 10, 3.0  # beyond a quantile, to read it; with fewer, the burst

@@ -14,13 +14,13 @@ from models.pose import learn_site
 from models.tracks.trajectory import Trajectory
 from studies.alarms.results import DAYS, AlarmResults, Delay, offsets_of
 from studies.alarms.watch import Watch, first_alarm, watch_over
-from studies.paths.simulated_site import (
+from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
+from studies.simulation.simulated_site import (
     SPEED_TRACKS,
     SimulatedSite,
     draw_simulated_site,
     observe_feet,
 )
-from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
 
 _WEEK = 7
 _LONGEST_TRACKS = 900  # that a knock is waited for

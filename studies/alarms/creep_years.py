@@ -14,12 +14,12 @@ from models.monitoring.creep import Creep, creep_result
 from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
 from models.simulation.pose_offset import PoseOffset
 from models.tracks.trajectory import Trajectory
-from studies.paths.simulated_site import (
+from studies.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
+from studies.simulation.simulated_site import (
     SimulatedSite,
     draw_simulated_site,
     observe_feet,
 )
-from studies.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
 
 MONTH_DAYS = 365.25 / 12
 NUMBERS = {"tilt": 0, "roll": 1, "heading": 3}

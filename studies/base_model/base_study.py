@@ -22,10 +22,9 @@ from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.tracks.scenes import Scene
-from studies.protocol.base_runs import base_model
 from studies.protocol.cases import RANGES, Answer, ProtocolCase, draw_case
+from studies.protocol.estimators import base_model, joint
 from studies.protocol.flow_runs import fused
-from studies.protocol.joint_runs import joint
 from studies.protocol.learned import learn_case
 from studies.protocol.partings import HALVES_IN_TIME, Parting, Split
 from studies.recordings import load_recording

@@ -23,7 +23,8 @@ from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
-from studies.paths.simulated_site import (
+from studies.protocol.cases import angle_deg, pose_of_plane_parameters
+from studies.simulation.simulated_site import (
     LearnedSite,
     SimulatedSite,
     draw_simulated_site,
@@ -31,7 +32,6 @@ from studies.paths.simulated_site import (
     observe_feet,
     seen_from,
 )
-from studies.protocol.cases import angle_deg, pose_of_plane_parameters
 
 REFERENCE_TRACKS = 2000
 KNOCKED_TRACKS = (25, 100, 400)

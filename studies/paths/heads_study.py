@@ -26,10 +26,10 @@ from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import walk_site
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory, by_end
-from studies.paths.simulated_site import draw_simulated_site
 from studies.protocol.cases import PANNED, ProtocolCase, angle_deg, draw_case
 from studies.protocol.served import served_pose
 from studies.simulation.heads import HeadConfig, with_box_heads, with_heads
+from studies.simulation.simulated_site import draw_simulated_site
 
 WAYS = ("feet", "heads", "columns")
 _HEADS = HeadConfig(forward_rad=math.radians(3), bias_rad=math.radians(1))

@@ -14,10 +14,10 @@ from studies.protocol.cases import (
     draw_case,
     pose_of_plane_parameters,
 )
+from studies.protocol.estimators import joint, track_errors
 from studies.protocol.flow_curves import CurvePoint, flow_errors
 from studies.protocol.flow_plots import plot_flow, plot_flow_errors
 from studies.protocol.flow_runs import fused
-from studies.protocol.joint_runs import joint, track_errors
 from studies.protocol.learned import learn_case
 from studies.protocol.plots import plot_drift, plot_ground, plot_track_errors
 from studies.protocol.report import ENOUGH_TRACKS

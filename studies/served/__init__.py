@@ -1,1 +1,1 @@
-"""Offline runs of what the service would serve: windows, batches, outcomes, long replays."""
+"""Offline runs of what the service would serve: windows, outcomes, long replays, parts off."""

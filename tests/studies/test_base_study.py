@@ -9,7 +9,6 @@ from models.geometry.pose import CameraPose
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.scenes import Scene, SceneTrack
 from studies.base_model.base_study import BaseOutcome, report_lines, together
-from studies.protocol.base_runs import base_model
 from studies.protocol.cases import (
     HALVES_OF_PEOPLE,
     KNOCKED,
@@ -17,6 +16,7 @@ from studies.protocol.cases import (
     ProtocolCase,
     draw_case,
 )
+from studies.protocol.estimators import base_model
 from studies.protocol.learned import Learned
 
 

@@ -13,7 +13,7 @@ from models.simulation.simulated_site import (
     draw_lanes,
 )
 from studies.paths.flow_study import draw_new_lane, study_site, walk_changed
-from studies.paths.simulated_site import draw_simulated_site
+from studies.simulation.simulated_site import draw_simulated_site
 from tests.models.sites import LENS, PRIOR
 
 QUIET = SiteConfig(noise_px=0.0, standing_share=0.0, aside_m=0.0)

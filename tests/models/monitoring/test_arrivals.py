@@ -15,7 +15,7 @@ from models.monitoring.arrivals import (
     judge_silence,
     learn_arrivals,
 )
-from studies.alarms.rhythm_study import describe, study_rhythm
+from studies.alarms.arrivals_study import describe, study_rhythm
 
 RULE = SilenceRule(false_per_year=1.0, least_s=600.0, limit_s=86_400.0)
 DAY_CELLS, WEEKEND_CELLS = np.arange(24), np.arange(24, 48)

@@ -9,7 +9,7 @@ from rich.console import Console
 from models.reasons import Reason, TracksCode
 from models.simulation.pose_offset import PoseOffset
 from studies.paths.flow_study import ChangedResult, OffsetResult, SiteResults
-from studies.paths.run import changed_table, knocked_table
+from studies.paths.flow_tables import changed_table, knocked_table
 from tests.service.commands.test_replay import surefoot
 
 

@@ -15,10 +15,10 @@ from rich.console import Console
 from models.monitoring.verdict import DriftLimits
 from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
-from studies.parts.catalogue import PARTS
 from studies.runs import with_bar
 from studies.served.figures import Figures, figures_of
 from studies.served.outcomes import ServedOutcome
+from studies.served.parts_catalogue import PARTS
 from studies.served.replays import ReplayPlan
 from studies.served.tasks import Table, tasks_of, work
 from studies.served.windows import Window

@@ -21,7 +21,7 @@ from models.geometry.rotation import angle_between
 from models.regression.checkpoint import START, START_FORMAT
 from models.regression.network import PoseRegressor, pose_from_output
 from models.serialization import to_bytes
-from studies.start_weights.rounds import StartPlan, StartTraining
+from studies.regressors.start_training import StartPlan, StartTraining
 
 
 def held_out_figures(network: PoseRegressor, plan: StartPlan) -> dict[str, Any]:
