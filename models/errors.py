@@ -1,4 +1,4 @@
-"""What can go wrong in calibration; the service maps these to problem documents."""
+"""Errors of calibration; the service maps these to problem documents."""
 
 
 class CalibrationError(ValueError):

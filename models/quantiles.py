@@ -11,7 +11,7 @@ SD_OF_MEDIAN_DEVIATION = round(1 / NormalDist().inv_cdf(0.75), 4)
 
 @cache
 def chi_squared_above(chance: float, freedom: int) -> float:
-    """What a chi-squared of some degrees of freedom is above with a chance."""
+    """Quantile that a chi-squared of some degrees of freedom is above with a chance."""
     from scipy.special import chdtri  # late: the HTTP process has no use for it
 
     return float(chdtri(freedom, chance))
@@ -19,7 +19,7 @@ def chi_squared_above(chance: float, freedom: int) -> float:
 
 @cache
 def f_above(chance: float, freedom: int, other_freedom: int) -> float:
-    """What an F of two degrees of freedom is above with a chance."""
+    """Quantile that an F of two degrees of freedom is above with a chance."""
     from scipy.special import fdtri
 
     return float(fdtri(freedom, other_freedom, 1 - chance))
@@ -36,7 +36,7 @@ def chance_below(value: float, freedom: float) -> float:
 
 
 def value_below(chance: float, freedom: float) -> float:
-    """What a Student's t of some degrees of freedom is below with a chance."""
+    """Quantile that a Student's t of some degrees of freedom is below with a chance."""
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, chance))

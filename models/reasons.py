@@ -1,4 +1,4 @@
-"""Why something is said: a code and the numbers and names that belong to it, and no sentence."""
+"""Reasons: a code and the numbers and names that belong to it, and no sentence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ class Reason:
 
 
 class TracksCode(StrEnum):
-    """What tracks can be a reason for. Codes are kept by clients and in stores: they stay."""
+    """Codes of reasons that tracks give. They are kept by clients and in stores: they stay."""
 
     BEYOND_LIMITS = "beyond_limits"
     BEYOND_LIMITS_UNCONFIRMED = "beyond_limits_unconfirmed"

@@ -30,13 +30,13 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """What bytes hold, and in which version; a version is read by its own release and later."""
+    """Name and version of a stored format; a version is read by its own release and later."""
 
     name: str
     version: int
 
 
-def pack(form: Format, values: Mapping[str, Any]) -> bytes:
+def to_bytes(form: Format, values: Mapping[str, Any]) -> bytes:
     """Arrays, numbers and texts by name as bytes: the same values, the same bytes."""
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     rest = {name: _plain(value) for name, value in values.items() if name not in arrays}
@@ -47,8 +47,8 @@ def pack(form: Format, values: Mapping[str, Any]) -> bytes:
     return gzip.compress(data, mtime=0)
 
 
-def unpack(form: Format, data: bytes) -> dict[str, Any]:
-    """The values of `pack`; arrays of one's own.
+def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
+    """The values of `to_bytes`; arrays of one's own.
 
     Raises:
         CheckpointError: the bytes are damaged, or of another format or version.

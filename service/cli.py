@@ -18,7 +18,7 @@ from service.workers.processes.signals import be_private
 from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:
-    from models.simulation.pose_offset import Knock
+    from models.simulation.pose_offset import PoseOffset
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -145,14 +145,14 @@ def demo(
     raise typer.Exit(run_demo(port=port, seed=seed, stay=stays, picture=picture))
 
 
-def _knock(text: str) -> "Knock":
-    from models.simulation.pose_offset import Knock
+def _knock(text: str) -> "PoseOffset":
+    from models.simulation.pose_offset import PoseOffset
 
     try:
         tilt_deg, roll_deg, log_height = (float(part) for part in text.split(","))
     except ValueError as error:
         raise typer.BadParameter(f"knock: three numbers with commas, got {text!r}") from error
-    return Knock(
+    return PoseOffset(
         tilt_rad=math.radians(tilt_deg), roll_rad=math.radians(roll_deg), log_height=log_height
     )
 

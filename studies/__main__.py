@@ -31,7 +31,7 @@ def evaluate(
         float, typer.Option(min=0.001, help="With --alarms: false ones allowed.")
     ] = 1.0,
 ) -> None:
-    """Knock the cameras of recorded scenes and measure every estimator: the protocol."""
+    """Measure every estimator on recorded scenes whose cameras are knocked: the protocol."""
     from models.errors import CalibrationError
     from studies.alarms.run import AlarmPlan, run_scene_alarms
     from studies.protocol.run import run_protocol
@@ -81,7 +81,7 @@ def protocol(
         Path | None, typer.Option(help="A page with markers to write the tables into.")
     ] = None,
 ) -> None:
-    """What is served, measured in the order of time, with faults, and over long recordings."""
+    """Measure what is served in the order of time, with faults, and over long recordings."""
     from studies.faults.catalogue import FAULTS
     from studies.served.run import run_served
     from studies.served.tasks import Table
@@ -109,8 +109,8 @@ def parts(
     output: Annotated[Path, typer.Option(help="Where figures are kept.")] = Path("parts.jsonl"),
     write: Annotated[Path | None, typer.Option(help="A page with markers for the table.")] = None,
 ) -> None:
-    """What each part of the estimator is worth: the protocol with one off at a time."""
-    from studies.parts.run import run_parts
+    """Measure what each part of the estimator is worth: the protocol with one off at a time."""
+    from studies.served.parts import run_parts
 
     run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write)
 
@@ -122,7 +122,7 @@ def flow_study(
     output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("flow-study.json"),
 ) -> None:
     """Simulated sites: how well a flow map tells a knock, and what a new path does to a pose."""
-    from studies.paths.run import run_flow_study
+    from studies.paths.flow_tables import run_flow_study
 
     run_flow_study(sites=sites, seed=seed, processes=processes, output=output)
 
@@ -301,13 +301,13 @@ for _command in (
 
 # Studies with arguments of their own: `python -m studies NAME --help`.
 _OTHERS = {
-    "still-days": "studies.changes.still_days",
-    "cuts": "studies.changes.cut_study",
+    "still-days": "studies.alarms.still_days",
+    "cuts": "studies.alarms.cut_study",
     "heads": "studies.paths.heads_study",
-    "arrivals": "studies.alarms.rhythm_study",
+    "arrivals": "studies.alarms.arrivals_study",
     "base-study": "studies.base_model.base_study",
     "base-model": "studies.base_model.making",
-    "start-weights": "studies.start_weights.making",
+    "start-weights": "studies.regressors.start_weights",
 }
 
 

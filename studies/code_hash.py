@@ -39,7 +39,7 @@ def _all(root: Path) -> Iterable[tuple[str, Path]]:
 
 
 def _reached(modules: Iterable[str], root: Path) -> Iterable[tuple[str, Path]]:
-    """What some modules import of the root, they themselves among it."""
+    """Modules that some modules import of the root, they themselves among them."""
     finder = ModuleFinder(path=[str(root)])
     for name in modules:
         finder.import_hook(name)

@@ -112,16 +112,16 @@ def _numbers(path: Path) -> npt.NDArray[np.float64]:
     return np.array(body.replace("\n", ",").rstrip(",").split(","), dtype=np.float64).reshape(-1, 4)
 
 
-def _lens(told: Mapping[str, Any]) -> Intrinsics:
-    return Intrinsics(**{**told, "distortion": tuple(told["distortion"])})
+def _lens(values: Mapping[str, Any]) -> Intrinsics:
+    return Intrinsics(**{**values, "distortion": tuple(values["distortion"])})
 
 
-def _pose(told: Mapping[str, float]) -> CameraPose:
+def _pose(values: Mapping[str, float]) -> CameraPose:
     return CameraPose(
-        height_m=told["height_m"],
-        tilt_rad=math.radians(told["tilt_deg"]),
-        roll_rad=math.radians(told["roll_deg"]),
-        heading_rad=math.radians(told["heading_deg"]),
-        x_m=told["x_m"],
-        y_m=told["y_m"],
+        height_m=values["height_m"],
+        tilt_rad=math.radians(values["tilt_deg"]),
+        roll_rad=math.radians(values["roll_deg"]),
+        heading_rad=math.radians(values["heading_deg"]),
+        x_m=values["x_m"],
+        y_m=values["y_m"],
     )

@@ -1,4 +1,4 @@
-"""What every study shares: its processes, a bar of what has ended, and JSON that grows."""
+"""Processes of studies, a bar of what has ended, and JSON that grows."""
 
 import json
 import multiprocessing
@@ -21,7 +21,7 @@ _TICK_S = 1.0
 
 
 def spawning() -> SpawnContext:
-    """How studies make processes: spawned, not forked, for torch's threads survive no fork."""
+    """Start method of processes: spawned, not forked, for torch's threads survive no fork."""
     return multiprocessing.get_context("spawn")
 
 
@@ -31,7 +31,7 @@ def process_pool(processes: int) -> ProcessPoolExecutor:
 
 
 def shared_values() -> SyncManager:
-    """What processes share, in one of its own, which ends with this one, too."""
+    """Manager of values that processes share, in a process of its own, which ends with this one."""
     manager = SyncManager(ctx=spawning())
     manager.start(_end_with_parent)
     return manager

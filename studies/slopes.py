@@ -7,7 +7,7 @@ from models.geometry.rotation import Array
 _FEWEST = 3
 
 
-def slope_with_error(true: Array, told: Array) -> tuple[float | None, float | None]:
+def slope_with_error(true: Array, found: Array) -> tuple[float | None, float | None]:
     """Least squares' slope (N,) against (N,), with an intercept, and its standard error.
 
     None where there are fewer than 3, or the true ones are all the same.
@@ -16,6 +16,6 @@ def slope_with_error(true: Array, told: Array) -> tuple[float | None, float | No
         return None, None
     centred = true - true.mean()
     power = float(centred @ centred)
-    slope = float(centred @ told) / power
-    residual = told - told.mean() - slope * centred
+    slope = float(centred @ found) / power
+    residual = found - found.mean() - slope * centred
     return slope, float(np.sqrt(residual @ residual / max(len(true) - 2, 1) / power))

@@ -65,7 +65,7 @@ class Camera:
     prior_pose: Pose
 
     def as_json(self) -> str:
-        """What `read_camera` reads."""
+        """JSON of the camera, for `read_camera`."""
         return json.dumps(asdict(self), indent=1)
 
 

@@ -1,4 +1,4 @@
-"""What tracks tell of a camera: whether it has moved, and its pose, with intervals."""
+"""Result of an estimate: whether the camera has moved, and its pose, with intervals."""
 
 import math
 from collections.abc import Sequence
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from models.geometry.pose_parameters import PARAMETERS
-from models.monitoring.chart import CLOCK, Reading
+from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import AlarmRate, SecondLook, drift_of, estimate_pose, observe, read_alarm_chart
+from models.pose import AlarmRate, SecondLook, alarm_chart_result, drift_of, estimate_pose, observe
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
@@ -67,15 +67,15 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     model, ordered = site.model, in_order(tracks)
     observed = observe(ordered, model.intrinsics, model.prior)
     found = estimate_pose(observed, model, SecondLook(limits=_LIMITS, drifting=False))
-    reading = read_alarm_chart(observed, model, _rate(ordered, alarms_a_year), first=found.first)
+    chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
     earlier = None if found.earlier is None else drift_of(found.earlier, model.prior)
-    verdict = judge(found.drift, _LIMITS, (), reading, earlier)
+    verdict = judge(found.drift, _LIMITS, (), chart, earlier)
     drift = {_field(name): _in_unit(name, found.drift.of(name)[0]) for name in PARAMETERS}
     sd = {_field(name): _in_unit(name, found.drift.of(name)[1]) for name in PARAMETERS}
     estimated = tuple(_field(name) for name in found.drift.identifiable)
     return Result(
         moved=verdict.drifting,
-        why=_why(found.drift, reading),
+        why=_why(found.drift, chart),
         pose=Pose.of(found.pose),
         estimated=estimated,
         sd={name: sd[name] for name in estimated},
@@ -94,7 +94,7 @@ def _rate(tracks: Sequence[Track], alarms_a_year: float) -> AlarmRate:
     )
 
 
-def _why(drift: Drift, reading: Reading | None) -> str:
+def _why(drift: Drift, chart: ChartResult | None) -> str:
     """The drift in words: each number with its standard deviation, and what the chart says."""
     parts = [
         f"{name} {_in_unit(name, drift.of(name)[0]):+.2f} {_UNITS[name]} "
@@ -102,11 +102,11 @@ def _why(drift: Drift, reading: Reading | None) -> str:
         for name in drift.identifiable
     ]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
-    if reading is not None and reading.suspicious:
-        number = "times" if reading.parameter == CLOCK else PARAMETERS[reading.parameter]
+    if chart is not None and chart.suspicious:
+        number = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
         words += (
             f"; people walk as if the {number} had changed "
-            f"(drift chart: {reading.statistic:.0f}, alarm at {reading.level:.0f})"
+            f"(drift chart: {chart.statistic:.0f}, alarm at {chart.level:.0f})"
         )
     return words
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from models.errors import CheckpointError
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
+from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
 from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import CameraSite, learn_site, observe
 from models.walking.serialization import reference_from_bytes, reference_to_bytes

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
+from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
 from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import (
     WalkConfig,

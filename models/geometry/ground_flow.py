@@ -1,4 +1,4 @@
-"""How the ground points of fixed rays move when the camera turns.
+"""Velocities of the ground points of fixed rays when the camera turns.
 
 Points are in camera heights, relative to the camera's foot point, axes as the world's.
 """
@@ -12,7 +12,7 @@ from models.geometry.rotation import Array, rotation_and_derivatives
 
 
 class GroundFlow(NamedTuple):
-    """How one ground point moves, `x` and `y`, and the share `fall` that its ray falls."""
+    """Velocity of one ground point, `x` and `y`, and the share `fall` that its ray falls."""
 
     x: float
     y: float
@@ -27,7 +27,7 @@ def rotation_and_turns(tilt_rad: float, roll_rad: float, heading_rad: float) -> 
 
 @compiled
 def ground_flow(x: float, y: float, turn: Array) -> GroundFlow:
-    """How a ground point moves under a turn (3, 3).
+    """Velocity of a ground point under a turn (3, 3).
 
     It is g = w_xy / -w_z of its ray's direction w; w changes by w T, and w_z by that share of
     itself, with the sign turned.

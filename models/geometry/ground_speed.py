@@ -1,4 +1,4 @@
-"""How fast people walk over the ground, as a pose has it."""
+"""Walking speed over the ground, as a pose has it."""
 
 import math
 from collections.abc import Sequence

@@ -27,7 +27,7 @@ def horizon_pixels(
 
 
 def ground_share(intrinsics: Intrinsics, pose: CameraPose, across: int = 33) -> float:
-    """Which share of the picture shows ground rather than sky, of a lattice of its pixels."""
+    """Share of the picture that shows ground rather than sky, of a lattice of its pixels."""
     _, hits = ground_from_pixel(
         intrinsics, pose.rotation, pose.centre_m, picture_lattice(intrinsics, across)
     )

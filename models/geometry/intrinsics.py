@@ -110,13 +110,13 @@ class Intrinsics:
         return np.where(valid[..., None], directions, np.nan), valid
 
     def contains(self, uv: Array, margin_px: float = 0.0) -> Mask:
-        """Which pixels (..., 2) lie inside the image, widened by a margin; NaN does not."""
+        """Mask of pixels (..., 2) inside the image, widened by a margin; NaN is not."""
         u, v = uv[..., 0], uv[..., 1]
         across = (u >= -0.5 - margin_px) & (u <= self.width - 0.5 + margin_px)
         return np.asarray(across & (v >= -0.5 - margin_px) & (v <= self.height - 0.5 + margin_px))
 
     def shows_foot(self, uv: Array) -> Mask:
-        """Which pixels (..., 2) can be feet: inside the image, and not at its lower border.
+        """Mask of pixels (..., 2) that can be feet: inside the image, and not at its lower border.
 
         There boxes end whose feet are beyond it: within two pixels, or 0.3 % of the height.
         """

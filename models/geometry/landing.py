@@ -1,4 +1,4 @@
-"""Where one ray lands on the ground: `ground_of_rays` for loops that are compiled.
+"""Ground point of one ray: `ground_of_rays` for loops that are compiled.
 
 Places are in camera heights, from the camera's foot point; axes are the world's.
 """
@@ -12,7 +12,7 @@ from models.geometry.rotation import Array
 
 
 class Landing(NamedTuple):
-    """Where a ray hits the ground, `x` and `y`; both are 0 where it is not `valid`."""
+    """Ground point of a ray, `x` and `y`; both are 0 where it is not `valid`."""
 
     x: float
     y: float
@@ -21,7 +21,7 @@ class Landing(NamedTuple):
 
 @compiled
 def landing(rays: Array, number: int, rotation: Array) -> Landing:
-    """Where one of rays (M, 3) of the camera frame lands; `rotation` (3, 3) `camera_from_world`."""
+    """Ground point of one of camera-frame rays (M, 3); `rotation` (3, 3) `camera_from_world`."""
     ray_x, ray_y, ray_z = rays[number, 0], rays[number, 1], rays[number, 2]
     x = ray_x * rotation[0, 0] + ray_y * rotation[1, 0] + ray_z * rotation[2, 0]
     y = ray_x * rotation[0, 1] + ray_y * rotation[1, 1] + ray_z * rotation[2, 1]

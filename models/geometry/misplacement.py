@@ -1,4 +1,4 @@
-"""What a camera's move means on the ground: where people are placed by a pose that is not true."""
+"""Errors on the ground of a pose that is not true: where it places people."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from models.geometry.pose import CameraPose
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misplacement:
-    """How far off a person is placed who stands at a distance from the camera's foot.
+    """Error in the place of a person who stands at a distance from the camera's foot.
 
     `off_m` and `placed_m` are None where the wrong pose takes the person to be above its horizon,
     which is nowhere. `farther_m` is how much of it is along the line of sight, positive away from
@@ -31,7 +31,7 @@ class Misplacement:
 def misplacements(
     intrinsics: Intrinsics, true: CameraPose, believed: CameraPose, distances_m: Sequence[float]
 ) -> tuple[Misplacement, ...]:
-    """How far off people straight ahead are placed by a believed pose while another one is true.
+    """Errors in the places of people straight ahead, of a believed pose while another one is true.
 
     A person stands at each distance from the point below the camera, in the direction that the
     true optical axis has on the ground. What the true camera sees there is put back on the ground

@@ -55,6 +55,11 @@ class CameraPose:
         return np.array([self.x_m, self.y_m, self.height_m])
 
     @property
+    def level_from_camera(self) -> Array:
+        """Rotation (3, 3) from the camera frame to right, ahead, up; its heading is 0 there."""
+        return np.asarray(rotation_from_angles(self.tilt_rad, self.roll_rad, 0.0).T)
+
+    @property
     def translation_m(self) -> Array:
         """`t` of `x_camera = R x_world + t` (3,); never the height."""
         return np.asarray(-self.rotation @ self.centre_m)

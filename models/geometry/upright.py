@@ -78,7 +78,7 @@ def heads_above(intrinsics: Intrinsics, pose: CameraPose, ground_m: Array, head_
 
 
 def uncut(intrinsics: Intrinsics, uv: Array) -> Mask:
-    """Which pixels (N, 2) are inside the image, and not at its border, where what is cut ends."""
+    """Mask of pixels (N, 2) inside the image, and not at its border, where what is cut ends."""
     u, v = uv.T
     return np.asarray((u > 1) & (v > 1) & (u < intrinsics.width - 2) & (v < intrinsics.height - 2))
 

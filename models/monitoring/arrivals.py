@@ -1,4 +1,4 @@
-"""How many tracks a camera usually sees when, and how improbable it is that none come for a while.
+"""Arrival model of a camera's tracks, and the probability that none come for a while.
 
 A profile over the hours of the day, weekends apart, says how many are expected. People come in
 walking groups, trains and rushes: gaps between tracks, measured in tracks expected meanwhile, would
@@ -16,30 +16,30 @@ import numpy as np
 
 from models.durations import HOUR_S
 from models.geometry.rotation import Array
+from models.monitoring.config import (
+    BURST_UNKNOWN,
+    CHANGES_PER_HOUR,
+    DAY_VARIANCE,
+    DAY_WEIGHT,
+    FEW_GROUPS,
+    FEWEST_GAPS,
+    FEWEST_WEEKDAYS,
+    FEWEST_WEEKEND_DAYS,
+    IMPLAUSIBLE,
+    QUIET_LEVEL,
+    QUIET_SHAPE,
+    QUIET_SHARE,
+    SHAPES,
+    TAIL,
+    TURNS_QUIET,
+)
 
 CELLS = 48  # the hours of a weekday, then those of a day of a weekend
-_FEWEST_WEEKDAYS, _FEWEST_WEEKEND_DAYS = 5, 4  # to tell the two apart
-_TAIL = (0.9, 0.99)
-_FEWEST_GAPS = 10  # beyond a quantile, to read it
-_BURST_UNKNOWN = 3.0  # with fewer gaps than that
-# What days are taken to differ by before many are seen: variance of the level, worth so many days.
-_DAY_VARIANCE, _DAY_WEIGHT = 0.1, 5.0
-_SHAPES = (1.0, 50.0)
-# A quiet day or hour has a quarter of the people, give or take a fifth of that. Chosen, with the
-# numbers below, on the simulated years of `studies.alarms.rhythm_study` (seed 7).
-_QUIET_LEVEL, _QUIET_SHAPE = 0.25, 20.0
-_QUIET_SHARE = 0.05  # of days
-_TURNS_QUIET = 0.1  # of changes of the level
-_CHANGES_PER_HOUR = 0.05  # how often the level becomes another within a day
 _HOURS_PER_YEAR = 8766.0
 
 
-_FEW = 3.0  # walking groups
-_SURELY = 1e-3  # chance below which people should have been seen: then the fixed limit counts
-
-
 class SilenceVerdict(StrEnum):
-    """What a silence is taken for."""
+    """Verdict on a silence."""
 
     USUAL = "usual"
     IMPROBABLE = "improbable"
@@ -50,7 +50,7 @@ class SilenceVerdict(StrEnum):
 class SilenceRule:
     """So many silences a year may be called improbable though they are none, and none shorter.
 
-    Whatever the rhythm, one longer than `limit_s` in which people should have been seen is.
+    Whatever the arrivals, one longer than `limit_s` in which people should have been seen is.
     """
 
     false_per_year: float
@@ -59,8 +59,8 @@ class SilenceRule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rhythm:
-    """A camera's rhythm.
+class ArrivalProcess:
+    """Arrival process of a camera's tracks: Poisson of walking groups, given the level of the day.
 
     `rates` are tracks expected in each of the 48 hours, `burst` the tracks that come at once,
     `shape` that of the day's level, `usual_gap_s` what 95 % of the gaps are shorter than, `days`
@@ -74,7 +74,7 @@ class Rhythm:
     days: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no rhythm.
+        """Refuse what is no arrival process.
 
         Raises:
             ValueError: a number is out of its range.
@@ -86,15 +86,15 @@ class Rhythm:
 
     @property
     def arrivals_per_year(self) -> float:
-        """How many walking groups come in a year: after each, a silence may begin."""
+        """Walking groups in a year: after each, a silence may begin."""
         week = 5 * sum(self.rates[:24]) + 2 * sum(self.rates[24:])
         return week / (7 * 24) * _HOURS_PER_YEAR / self.burst
 
 
-def learn_rhythm(
+def learn_arrivals(
     counts: Array, cells: np.ndarray, known: np.ndarray, first_hour: int, times_s: Array
-) -> Rhythm:
-    """The rhythm of hours in a row.
+) -> ArrivalProcess:
+    """Arrival process of hours in a row.
 
     Args:
         counts: tracks of each hour (H,).
@@ -105,7 +105,7 @@ def learn_rhythm(
     """
     rates = _rates(counts, cells, known)
     usual = np.diff(times_s)
-    return Rhythm(
+    return ArrivalProcess(
         rates=tuple(float(rate) for rate in rates),
         burst=_burst(rates[cells], known, first_hour, times_s),
         shape=_shape(counts, rates[cells], known),
@@ -115,29 +115,29 @@ def learn_rhythm(
 
 
 def expected_tracks(
-    rhythm: Rhythm, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
+    process: ArrivalProcess, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
 ) -> float:
-    """How many tracks are expected between two times, within the hours of `cells` (H,)."""
+    """Expected number of tracks between two times, within the hours of `cells` (H,)."""
     starts_s = HOUR_S * (first_hour + np.arange(len(cells)))
     overlap_s = np.minimum(starts_s + HOUR_S, to_s) - np.maximum(starts_s, from_s)
-    rates = np.array(rhythm.rates)[cells]
+    rates = np.array(process.rates)[cells]
     return float(rates @ np.clip(overlap_s, 0.0, None)) / HOUR_S
 
 
 def chance_of_silence(
-    rhythm: Rhythm, missed: float, silent_s: float, seen: float, expected: float
+    process: ArrivalProcess, missed: float, silent_s: float, seen: float, expected: float
 ) -> float:
     """The probability that a silence is as long as this one, after one more walking group.
 
     Args:
-        rhythm: of the camera.
+        process: that of the camera.
         missed: tracks expected during the silence.
         silent_s: how long it is: the longer, the more likely is the level another one by now.
         seen: tracks in the hours before it, which tell the level of the day.
         expected: tracks expected in these.
     """
-    missed, seen, expected = (number / rhythm.burst for number in (missed, seen, expected))
-    levels = ((rhythm.shape, rhythm.shape), (_QUIET_SHAPE, _QUIET_SHAPE / _QUIET_LEVEL))
+    missed, seen, expected = (number / process.burst for number in (missed, seen, expected))
+    levels = ((process.shape, process.shape), (QUIET_SHAPE, QUIET_SHAPE / QUIET_LEVEL))
     # Gamma-Poisson: what was seen makes (a, b) into (a + seen, b + expected).
     logs = [
         math.log(share)
@@ -145,19 +145,19 @@ def chance_of_silence(
         - math.lgamma(a)
         + a * math.log(b)
         - (a + seen) * math.log(b + expected)
-        for share, (a, b) in zip((1 - _QUIET_SHARE, _QUIET_SHARE), levels, strict=True)
+        for share, (a, b) in zip((1 - QUIET_SHARE, QUIET_SHARE), levels, strict=True)
     ]
     weights = [math.exp(value - max(logs)) for value in logs]
     same = [((b + expected) / (b + expected + missed)) ** (a + seen) for a, b in levels]
     other = [(b / (b + missed)) ** a for a, b in levels]
-    changed = 1 - (1 - _CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
-    after_change = (1 - _TURNS_QUIET) * other[0] + _TURNS_QUIET * other[1]
+    changed = 1 - (1 - CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
+    after_change = (1 - TURNS_QUIET) * other[0] + TURNS_QUIET * other[1]
     unchanged = sum(w * chance for w, chance in zip(weights, same, strict=True)) / sum(weights)
     return float((1 - changed) * unchanged + changed * after_change)
 
 
 def judge_silence(
-    rhythm: Rhythm,
+    process: ArrivalProcess,
     rule: SilenceRule,
     *,
     missed: float,
@@ -165,23 +165,23 @@ def judge_silence(
     seen: float,
     expected: float,
 ) -> SilenceVerdict:
-    """Whether a silence is too improbable to be one; the numbers are `chance_of_silence`'s."""
-    if silent_s < rule.least_s or not is_missed(rhythm, missed):
+    """Verdict on a silence; the arguments are those of `chance_of_silence`."""
+    if silent_s < rule.least_s or not is_missed(process, missed):
         return SilenceVerdict.USUAL
-    chance = chance_of_silence(rhythm, missed, silent_s, seen, expected)
-    if silent_s > rule.limit_s and chance < _SURELY:
+    chance = chance_of_silence(process, missed, silent_s, seen, expected)
+    if silent_s > rule.limit_s and chance < IMPLAUSIBLE:
         return SilenceVerdict.TOO_LONG
-    allowed = rule.false_per_year / max(rhythm.arrivals_per_year, 1.0)
+    allowed = rule.false_per_year / max(process.arrivals_per_year, 1.0)
     return SilenceVerdict.IMPROBABLE if chance < allowed else SilenceVerdict.USUAL
 
 
-def is_missed(rhythm: Rhythm, missed: float) -> bool:
-    """Whether more than a few walking groups should have come: fewer may stay away any day."""
-    return missed > _FEW * rhythm.burst
+def is_missed(process: ArrivalProcess, missed: float) -> bool:
+    """True where more than a few walking groups should have come: fewer may stay away any day."""
+    return missed > FEW_GROUPS * process.burst
 
 
 def delay_of(latest_s: Array) -> float:
-    """How late a camera's tracks usually come at the most, in seconds, with a margin.
+    """Longest usual delay of a camera's tracks, in seconds, with a margin.
 
     Days on which they came far later than on others were those of an outage that was caught up
     with, and do not count.
@@ -200,7 +200,7 @@ def _rates(counts: Array, cells: np.ndarray, known: np.ndarray) -> Array:
     """Tracks an hour (48,): of each hour of the day, with one more day like the hours beside it."""
     days = np.bincount(cells[known], minlength=CELLS).astype(float)
     sums = np.bincount(cells[known], weights=counts[known], minlength=CELLS)
-    apart = days[:24].max() >= _FEWEST_WEEKDAYS and days[24:].max() >= _FEWEST_WEEKEND_DAYS
+    apart = days[:24].max() >= FEWEST_WEEKDAYS and days[24:].max() >= FEWEST_WEEKEND_DAYS
     if not apart:
         days, sums = (np.tile(part[:24] + part[24:], 2) for part in (days, sums))
     rates = np.zeros(CELLS)
@@ -212,7 +212,7 @@ def _rates(counts: Array, cells: np.ndarray, known: np.ndarray) -> Array:
 
 
 def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> float:
-    """How much longer gaps are than those of people who come alone, in tracks expected meanwhile.
+    """Ratio of the longest gaps to those of people who come alone, in tracks expected meanwhile.
 
     Source: the time-rescaling theorem (Brown et al., 2002, Neural Computation 14, theorem 1).
     """
@@ -224,10 +224,10 @@ def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> 
     rescaled = rescaled[np.diff(unseen[np.minimum(place.astype(int), len(rates))]) == 0]
     found = [
         float(np.quantile(rescaled, share)) / -math.log(1 - share)
-        for share in _TAIL
-        if len(rescaled) * (1 - share) >= _FEWEST_GAPS
+        for share in TAIL
+        if len(rescaled) * (1 - share) >= FEWEST_GAPS
     ]
-    return max(1.0, *found) if found else _BURST_UNKNOWN
+    return max(1.0, *found) if found else BURST_UNKNOWN
 
 
 def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
@@ -240,5 +240,5 @@ def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
     seen, expected = (part.reshape(-1, 24).sum(axis=1) for part in (counts, rates))
     seen, expected = seen[expected > 0], expected[expected > 0]
     excess = (seen / expected - 1) ** 2 - 1 / expected
-    variance = (_DAY_WEIGHT * _DAY_VARIANCE + float(excess.sum())) / (_DAY_WEIGHT + len(excess))
-    return float(np.clip(1 / max(variance, 1e-6), *_SHAPES))
+    variance = (DAY_WEIGHT * DAY_VARIANCE + float(excess.sum())) / (DAY_WEIGHT + len(excess))
+    return float(np.clip(1 / max(variance, 1e-6), *SHAPES))

@@ -1,10 +1,10 @@
-"""The control chart: a CUSUM over walking groups, held against what a knock would make of them.
+"""The control chart: a CUSUM over walking groups, held against what an offset would make of them.
 
-For each of a grid of knocks, of tilt, roll, log height and heading, both ways and in three sizes,
+For each of a grid of offsets, of tilt, roll, log height and heading, both ways and in three sizes,
 and for times that are too long or too short, the chart knows how the mean score of walking groups
 would
-change: it has seen the reference's people as a camera knocked so would. The statistic is the
-largest log likelihood ratio of any knock against none, over the newest 16 to 400 walking groups: a
+change: it has seen the reference's people as a camera so moved would. The statistic is the
+largest log likelihood ratio of any offset against none, over the newest 16 to 400 walking groups: a
 two-sided CUSUM for each parameter and size (Page 1954) in Lorden's and Lai's window-limited form,
 which is the same for one size and keeps its meaning where the reference is itself unsure: its noise
 is in the ratio, so that no number of new people makes a reference's own error a drift.
@@ -16,31 +16,27 @@ import numpy as np
 import numpy.typing as npt
 
 from models.geometry.rotation import Array
+from models.monitoring.config import (
+    FEWEST_GROUPS,
+    HABITS,
+    LEAST_LEVEL,
+    LENGTHS,
+    OFFSET_SIZES,
+    OTHER_PEOPLE,
+    SCORE_BOUND,
+    STRONGEST,
+    SUSPICION,
+)
 from models.monitoring.group_scores import GroupScores
 from models.serialization import stored_as
 from models.walking.speed_reference import SpeedReference
 
-FEWEST = 16  # walking groups that a move is detected by
-LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
 CLOCK = 4  # beside the four of a pose: times that are too long
-# What a site's people do of themselves for hours on end, as moves of the camera, and of its clock:
-# about as those of recorded days did beyond chance (`python -m studies still-days`). Their pace
-# differed by 5 %, but 30 frames a second taken for 25, which is 18 %, must remain an alarm.
-HABITS = np.array([np.radians(0.1), np.radians(0.2), 0.01, np.radians(0.2), 0.03])
-# For days and seasons, of which too few are recorded to say: in rain and in winter they may walk
-# elsewhere, and faster.
-HABITS_OF_DAYS = np.array([np.radians(0.2), np.radians(0.2), 0.01, np.radians(0.3), 0.03])
-RUN = 1000  # walking groups; levels are of so many in a row
-# The reference's noise counts for so much: whoever walks by on other days is another sample, too.
-OTHER_PEOPLE = 1.5
-_STRONGEST = 2.0  # times a knock of the grid, that it stands for
-_SUSPICION = 100.0  # times as many alarms
-_LEAST_LEVEL = 5.4  # of a run of endless normal walking groups that is wrong once in e runs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knocked:
-    """A knock of the grid: of tilt, roll, log height, heading or clock (0 to 4), and how far."""
+class GridOffset:
+    """An offset of the grid: of tilt, roll, log height, heading or clock (0 to 4), and how far."""
 
     parameter: int
     size: float
@@ -58,12 +54,9 @@ class Knocked:
         return float(np.exp(self.size)) if self.parameter == CLOCK else 1.0
 
 
-_ANGLES = tuple(float(np.radians(angle)) for angle in (1.0, 2.5, 6.0))
-# Of each parameter, the smallest first. 0.18 is 30 frames a second taken for 25.
-_SIZES = (_ANGLES, _ANGLES, (0.05, 0.12, 0.3), _ANGLES, (0.08, 0.18))
-KNOCKS = tuple(
-    Knocked(parameter=parameter, size=sign * size)
-    for parameter, sizes in enumerate(_SIZES)
+OFFSET_GRID = tuple(
+    GridOffset(parameter=parameter, size=sign * size)
+    for parameter, sizes in enumerate(OFFSET_SIZES)
     for sign in (1, -1)
     for size in sizes
 )
@@ -71,11 +64,11 @@ KNOCKS = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftChart:
-    """What groups' scores are like while a camera stands, and what each knock makes of them.
+    """Distribution of groups' scores while a camera stands, and their response to each pose offset.
 
     Scores are bounded around `middle` (14,) by five times their `width` (14,); of these, `mean`
     (14,) and `covariance` (14, 14) are of the `walking_groups` of the reference and `responses`
-    (14, K) are what is added to the mean by each knock of the grid. `typical` and `tail` say how
+    (14, K) are what is added to the mean by each offset of the grid. `typical` and `tail` say how
     high the statistic gets in runs of 1000 walking groups: its median, and its mean excess over
     that. `speed_reference` is how people walk by the same tracks; a flow map of these goes with a
     chart.
@@ -92,20 +85,20 @@ class DriftChart:
     tail: float
 
     def level(self, alarms_a_run: float) -> float:
-        """What the statistic passes so many times in a run of 1000 groups of a still camera."""
+        """Level passed so many times by the statistic in 1000 groups of a still camera."""
         share = -np.expm1(-alarms_a_run)
         learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
-        return max(learned, _LEAST_LEVEL - float(np.log(share))) * _unsure(
+        return max(learned, LEAST_LEVEL - float(np.log(share))) * _unsure(
             self.walking_groups, len(self.mean)
         )
 
     def bounded(self, scores: Array) -> Array:
         """Scores (..., 14) in units of their width, none farther from the middle than 5."""
-        return np.clip((scores - self.middle) / self.width, -5.0, 5.0)
+        return np.clip((scores - self.middle) / self.width, -SCORE_BOUND, SCORE_BOUND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tested:
+class TestStatistic:
     """A statistic, and the level that it passes as rarely as false alarms are allowed."""
 
     statistic: float
@@ -113,7 +106,7 @@ class Tested:
 
     @property
     def moved(self) -> bool:
-        """Whether it is beyond its level."""
+        """True where the statistic is beyond its level."""
         return self.statistic > self.level
 
     @property
@@ -123,12 +116,12 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading(Tested):
-    """What a chart says of the newest walking groups.
+class ChartResult(TestStatistic):
+    """Chart result of the newest walking groups.
 
     `statistic` is compared with `level`: where it is below by now, the highest since the chart was
     last calm for some walking groups in a row, so that it matters not after whom somebody looks.
-    `parameter` is 0 to 4 as for a knock of the grid, `sign` the way it seems to have gone,
+    `parameter` is 0 to 4 as for an offset of the grid, `sign` the way it seems to have gone,
     `walking_groups` how many say so and `track_idx` the first track of theirs. What is `suspicious`
     would be an alarm were a hundred times as many allowed.
     """
@@ -140,15 +133,15 @@ class Reading(Tested):
     suspicious: bool
 
 
-def read_chart(
+def chart_result(
     chart: DriftChart,
     scores: GroupScores,
     alarms_a_run: float,
     *,
     calm_ratio: float,
     calm_groups: int,
-) -> Reading | None:
-    """What the chart says now; None of fewer than 16 walking groups.
+) -> ChartResult | None:
+    """Chart result of now; None of fewer than 16 walking groups.
 
     Args:
         chart: of the camera.
@@ -157,7 +150,7 @@ def read_chart(
         calm_ratio: of its level, below which the chart is calm.
         calm_groups: how many walking groups in a row it must be, to have calmed down.
     """
-    if len(scores.values) < FEWEST:
+    if len(scores.values) < FEWEST_GROUPS:
         return None
     most = int(LENGTHS[-1])
     newest = chart.bounded(scores.values[-most:])
@@ -167,16 +160,16 @@ def read_chart(
     at = len(newest) - 1
     if path.statistic[at] <= level:
         at = since + int(path.statistic[since:].argmax())
-    knock = KNOCKS[int(path.knock_idx[at])]
+    offset = OFFSET_GRID[int(path.offset_idx[at])]
     walking_groups, statistic = int(path.walking_groups[at]), float(path.statistic[at])
-    return Reading(
+    return ChartResult(
         statistic=statistic,
         level=level,
-        parameter=knock.parameter,
-        sign=1 if knock.size > 0 else -1,
+        parameter=offset.parameter,
+        sign=1 if offset.size > 0 else -1,
         walking_groups=walking_groups,
         track_idx=int(scores.last[-most:][at + 1 - walking_groups]),
-        suspicious=statistic > chart.level(_SUSPICION * alarms_a_run),
+        suspicious=statistic > chart.level(SUSPICION * alarms_a_run),
     )
 
 
@@ -193,7 +186,7 @@ def _last_calm(calm: npt.NDArray[np.bool_], walking_groups: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratios:
-    """How means of groups are held against knocks: weights (L, 14, K) and strengths (L, K)."""
+    """Likelihood ratios of pose offsets: weights (L, 14, K) of mean scores and strengths (L, K)."""
 
     weights: Array
     strengths: Array
@@ -201,16 +194,18 @@ class Ratios:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trace:
-    """The statistic (T,) after each of groups, the knock and the groups that it is of (T,)."""
+    """The statistic (T,) after each of groups, the offset and the groups that it is of (T,)."""
 
     statistic: Array
-    knock_idx: npt.NDArray[np.int64]
+    offset_idx: npt.NDArray[np.int64]
     walking_groups: npt.NDArray[np.int64]
 
 
 def ratios_of(chart: DriftChart) -> Ratios:
     """The weights of a chart for each number of newest walking groups."""
-    slopes = np.stack([slope_of(chart, parameter) for parameter in range(len(_SIZES))], axis=1)
+    slopes = np.stack(
+        [slope_of(chart, parameter) for parameter in range(len(OFFSET_SIZES))], axis=1
+    )
     habits = (slopes * HABITS) @ (slopes * HABITS).T
     weights, strengths = [], []
     for length in LENGTHS:
@@ -225,7 +220,7 @@ def trace(ratios: Ratios, apart: Array) -> Trace:
     count = len(apart)
     sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
     statistic = np.full(count, -np.inf)
-    knock_idx, walking_groups = np.zeros((2, count), dtype=np.int64)
+    offset_idx, walking_groups = np.zeros((2, count), dtype=np.int64)
     for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
         if length > count:
             break
@@ -236,15 +231,15 @@ def trace(ratios: Ratios, apart: Array) -> Trace:
         own = slice(length - 1, count)
         higher = value > statistic[own]
         statistic[own] = np.where(higher, value, statistic[own])
-        knock_idx[own] = np.where(higher, best, knock_idx[own])
+        offset_idx[own] = np.where(higher, best, offset_idx[own])
         walking_groups[own] = np.where(higher, length, walking_groups[own])
-    return Trace(statistic=statistic, knock_idx=knock_idx, walking_groups=walking_groups)
+    return Trace(statistic=statistic, offset_idx=offset_idx, walking_groups=walking_groups)
 
 
 def highest(ratios: Ratios, apart: Array) -> float:
     """The highest statistic of `trace`, in a fraction of its time; -inf of fewer than 16 groups.
 
-    A ratio rises with what is shown, so of all groups the most shown for each knock will do.
+    A ratio rises with what is shown, so of all groups the most shown for each offset will do.
     """
     sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
     found = -np.inf
@@ -257,15 +252,17 @@ def highest(ratios: Ratios, apart: Array) -> float:
 
 
 def _ratio(shown: Array, strengths: Array) -> Array:
-    """The log likelihood ratios of knocks (..., K), each as strong as is likeliest in its reach."""
-    times = np.clip(shown / strengths, 1.0, _STRONGEST)
+    """Log likelihood ratios of offsets (..., K), each as strong as is likeliest in its reach."""
+    times = np.clip(shown / strengths, 1.0, STRONGEST)
     return np.asarray(times * shown - times**2 * strengths / 2)
 
 
 def slope_of(chart: DriftChart, parameter: int) -> Array:
-    """The response (14,) to a unit of a parameter, by its smallest knocks both ways."""
-    size = _SIZES[parameter][0]
-    on, back = (KNOCKS.index(Knocked(parameter=parameter, size=sign * size)) for sign in (1, -1))
+    """The response (14,) to a unit of a parameter, by its smallest offsets both ways."""
+    size = OFFSET_SIZES[parameter][0]
+    on, back = (
+        OFFSET_GRID.index(GridOffset(parameter=parameter, size=sign * size)) for sign in (1, -1)
+    )
     return np.asarray((chart.responses[:, on] - chart.responses[:, back]) / (2 * size))
 
 

@@ -8,12 +8,20 @@ import numpy.typing as npt
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.chart import (
-    FEWEST,
-    KNOCKS,
-    RUN,
+    OFFSET_GRID,
     DriftChart,
     highest,
     ratios_of,
+)
+from models.monitoring.config import (
+    BLOCK,
+    BOOTSTRAP_RUNS,
+    FEWEST_GROUPS,
+    LEAST_BLOCKS,
+    LEAST_SHRINKAGE,
+    RESPONSE_GROUPS,
+    RIDGE,
+    RUN,
 )
 from models.monitoring.group_scores import SCORES, Usual, scores_at
 from models.paths.folds import Fold, Folds
@@ -25,27 +33,18 @@ from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.reference.learning import relearned
 from models.walking.speed_reference import SpeedReference
 
-_ENOUGH = 400  # walking groups that the answers to knocks are learned of, to some 4 %
-_RIDGE = 0.05  # of each score's variance is its own, so that no direction is too good
-# Walking groups after one another that the bootstrap keeps together: people share their quarter of
-# an hour, and runs of 16 are held against a knock. Of fewer, recorded days alarm twice as often.
-_BLOCK = 24
-_BLOCKS = 12  # at least, of a reference
-_RUNS = 100
-_LEAST_SHRUNK = 0.02
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
+class _FoldScores:
     """Scores (P, 14) of groups left out, and when each was last seen (P,).
 
-    Of some of these, `before` (Q, 14) are the scores and `knocked` (K, Q, 14) those after knocks.
+    Of some of these, `before` (Q, 14) are the scores and `offset` (K, Q, 14) those after offsets.
     """
 
     still: Array
     times: npt.NDArray[np.int64]
     before: Array
-    knocked: Array
+    offset: Array
 
 
 def learn_chart(
@@ -58,7 +57,7 @@ def learn_chart(
     """The chart of a site; None where fewer than 12 walking groups have scores.
 
     Each quarter of the walking groups is scored by what the others say is usual, and some of them
-    again as a camera that has been knocked would see them. How high the statistic gets by chance is
+    again as a camera that has moved would see them. How high the statistic gets by chance is
     learned by bootstrap: what is taken for usual, the people that there really are, and runs of
     these in blocks are all drawn anew.
 
@@ -73,16 +72,16 @@ def learn_chart(
         ShapeError: tracks that are not in the order of their ends.
     """
     check_in_time(observations)
-    asked: list[_Asked] = []
-    wanted = _ENOUGH
+    scored: list[_FoldScores] = []
+    wanted = RESPONSE_GROUPS
     for fold in folds.each:
-        asked.append(_asked(observations, prior, site, fold, wanted))
-        wanted -= len(asked[-1].before)
-    known = sum(len(part.still) for part in asked)
-    if known < FEWEST:
+        scored.append(_fold_scores(observations, prior, site, fold, wanted))
+        wanted -= len(scored[-1].before)
+    count = sum(len(part.still) for part in scored)
+    if count < FEWEST_GROUPS:
         return None
-    order = np.argsort(np.concatenate([part.times for part in asked]), kind="stable")
-    scores = np.concatenate([part.still for part in asked])[order]
+    order = np.argsort(np.concatenate([part.times for part in scored]), kind="stable")
+    scores = np.concatenate([part.still for part in scored])[order]
     middle = np.median(scores, axis=0)
     width = SD_OF_MEDIAN_DEVIATION * np.median(np.abs(scores - middle), axis=0) + 1e-9
     chart = DriftChart(
@@ -91,14 +90,14 @@ def learn_chart(
         width=width,
         mean=np.zeros(SCORES),
         covariance=np.eye(SCORES),
-        responses=np.zeros((SCORES, len(KNOCKS))),
-        walking_groups=float(known),
+        responses=np.zeros((SCORES, len(OFFSET_GRID))),
+        walking_groups=float(count),
         typical=0.0,
         tail=1.0,
     )
     bounded = chart.bounded(scores)
-    before = chart.bounded(np.concatenate([part.before for part in asked]))
-    after = chart.bounded(np.concatenate([part.knocked for part in asked], axis=1))
+    before = chart.bounded(np.concatenate([part.before for part in scored]))
+    after = chart.bounded(np.concatenate([part.offset for part in scored], axis=1))
     chart = replace(
         chart,
         mean=bounded.mean(axis=0),
@@ -112,10 +111,10 @@ def learn_chart(
     )
 
 
-def _asked(
+def _fold_scores(
     observations: Observations, prior: CameraPose, site: SpeedReference, fold: Fold, wanted: int
-) -> _Asked:
-    """The scores of a fold's groups; of so many as are wanted, after knocks too."""
+) -> _FoldScores:
+    """The scores of a fold's groups; of so many as are wanted, after offsets too."""
     seen = of_tracks(observations, fold.asked)
     speed_reference = relearned(of_tracks(observations, fold.known), prior, site)
     usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.site)
@@ -123,7 +122,7 @@ def _asked(
     still = scores_at(seen, fold.walkers, usual, np.zeros(4))
     # Evenly over the time: mornings and evenings answer differently.
     some = np.linspace(0, last.size - 1, min(last.size, wanted)).astype(np.int64)
-    answers = np.zeros((1 + len(KNOCKS), 0, SCORES))
+    answers = np.zeros((1 + len(OFFSET_GRID), 0, SCORES))
     if some.size:
         group_idx = fold.walkers.group_idx
         theirs = np.flatnonzero(np.isin(group_idx, group_idx[last[some]]))
@@ -131,9 +130,9 @@ def _asked(
         # Who walks with whom hangs on who else is there: the groups stay what they were.
         walkers = replace(walkers_of(few, candidate_of(prior)), group_idx=group_idx[theirs])
         # A camera that has moved on sees people as one that stays would from a little back.
-        moves = [(np.zeros(4), 1.0), *((-knock.step, knock.stretch) for knock in KNOCKS)]
+        moves = [(np.zeros(4), 1.0), *((-offset.step, offset.stretch) for offset in OFFSET_GRID)]
         answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])
-    return _Asked(still=still, times=fold.asked[last], before=answers[0], knocked=answers[1:])
+    return _FoldScores(still=still, times=fold.asked[last], before=answers[0], offset=answers[1:])
 
 
 def _covariance(scores: Array) -> Array:
@@ -149,8 +148,8 @@ def _covariance(scores: Array) -> Array:
     variance = products.var(axis=0) * count**2 / (count - 1) ** 3
     beside = ~np.eye(len(sd), dtype=bool)
     shrunk = variance[beside].sum() / max(float((correlation[beside] ** 2).sum()), 1e-9)
-    shrunk = float(np.clip(shrunk, _LEAST_SHRUNK, 1.0))
-    own = (1 + _RIDGE) * np.eye(len(sd))
+    shrunk = float(np.clip(shrunk, LEAST_SHRINKAGE, 1.0))
+    own = (1 + RIDGE) * np.eye(len(sd))
     return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
 
 
@@ -158,8 +157,8 @@ def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
     """The highest statistic of each of so many runs of a still camera."""
     ratios = ratios_of(chart)
     count = len(scores)
-    reached = np.empty(_RUNS)
-    for run in range(_RUNS):
+    reached = np.empty(BOOTSTRAP_RUNS)
+    for run in range(BOOTSTRAP_RUNS):
         taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
         people = scores[drawn_blocks(rng, count, count)]
         walked = people[drawn_blocks(rng, count, RUN)]
@@ -169,6 +168,6 @@ def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
 
 def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
     """Indices (wanted,) of walking groups, some after one another at a time."""
-    block = min(_BLOCK, -(-count // _BLOCKS))
+    block = min(BLOCK, -(-count // LEAST_BLOCKS))
     starts = rng.integers(0, count, -(-wanted // block))
     return np.asarray(((starts[:, None] + np.arange(block)).ravel() % count)[:wanted])

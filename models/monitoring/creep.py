@@ -1,4 +1,4 @@
-"""Creep: a turn too slow for any window, told by what each day says against the first map.
+"""Creep: a turn too slow for any window, detected by the scores of each day against the first map.
 
 A map that grows takes a slow turn along with it, and no window of some days is long enough to see
 it. So the first chart of a site, with the map and the speeds of its reference, stays, and each day
@@ -21,18 +21,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import Tested
+from models.monitoring.chart import TestStatistic
+from models.monitoring.config import CREEP_DAYS, CREEP_RAD, CREEP_TESTS, CREEPING_SHARE
 from models.monitoring.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
 from models.quantiles import value_below
 
-SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
 ANGLES = (0, 1, 3)  # tilt, roll and heading creep
-_LOOKS = 200.0  # independent ones a year that the test is worth, by logs drawn with its own noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Creep(Tested):
-    """What a log says: a camera's turn by now, at its likeliest.
+class Creep(TestStatistic):
+    """Most likely creep of a camera: its turn by now.
 
     `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
     how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
@@ -44,28 +43,28 @@ class Creep(Tested):
     since_day: float
 
 
-def read_creep(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
-    """What a log says of its newest weeks; None of too few people.
+def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
+    """Most likely creep by a log's newest weeks; None of too few people.
 
     Args:
         log: of the days.
         alarms_a_year: how many false ones are allowed of the creep alone.
         from_s: since when the camera has stood as it does, but for a creep; whole days count.
     """
-    held = hold_to_ramps(log, from_s)
-    if held is None:
+    scores = ramp_scores(log, from_s)
+    if scores is None:
         return None
-    chance = min(alarms_a_year / _LOOKS, 0.5) / 2
+    chance = min(alarms_a_year / CREEP_TESTS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
-    statistics = held.shown**2 / held.known
+    statistics = scores.score**2 / scores.information
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
     return Creep(
         statistic=float(statistics[row, way]),
         level=level,
         parameter=ANGLES[int(row)],
-        by=float(held.shown[row, way] / held.known[row, way]),
-        sd=float(held.known[row, way] ** -0.5),
-        since_day=float(held.ramps.starts[way]),
+        by=float(scores.score[row, way] / scores.information[row, way]),
+        sd=float(scores.information[row, way] ** -0.5),
+        since_day=float(scores.ramps.starts[way]),
     )
 
 
@@ -80,7 +79,7 @@ class Ramps:
     now: float
 
     def at(self, days: Array) -> Array:
-        """How far (W, N) each is by some days (N,)."""
+        """Size (W, N) of each ramp on some days (N,)."""
         turned = np.maximum(days - self.starts[:, None], 0.0)
         turned = turned / np.maximum(self.now - self.starts, 1e-9)[:, None]
         turned[0] = 1.0
@@ -88,19 +87,19 @@ class Ramps:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Held:
-    """What weeks say of turns (3, W) of tilt, roll, heading along ramps: their pull and its weight.
+class RampScores:
+    """Scores of weeks along ramps of turns (3, W) of tilt, roll, heading, and their weights.
 
-    A turn's likeliest size is `shown / known`, with a variance of `1 / known`.
+    A turn's likeliest size is `score / information`, with a variance of `1 / information`.
     """
 
     ramps: Ramps
-    shown: Array
-    known: Array
+    score: Array
+    information: Array
 
 
-def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
-    """What the weeks of a log say of every ramp; None of too few people."""
+def ramp_scores(log: CreepLog, from_s: float | None) -> RampScores | None:
+    """Scores of a log's weeks along every ramp; None of too few people."""
     weeks = weeks_of(log, from_s)
     if weeks is None:
         return None
@@ -109,13 +108,37 @@ def hold_to_ramps(log: CreepLog, from_s: float | None) -> Held | None:
     ways = ramps.at(weeks.middle_day)
     weighed = np.linalg.inv(noise_of(log, weeks))
     pull = (weighed @ weeks.moves.ravel()).reshape(-1, NUMBERS)
-    return Held(
+    return RampScores(
         ramps=ramps,
-        shown=np.array([ways @ pull[:, number] for number in ANGLES]),
-        known=np.array(
+        score=np.array([ways @ pull[:, number] for number in ANGLES]),
+        information=np.array(
             [
                 np.einsum("wb,bc,wc->w", ways, weighed[number::NUMBERS, number::NUMBERS], ways)
                 for number in ANGLES
             ]
         ),
     )
+
+
+def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None) -> Array:
+    """Posterior mean (N, 4) of a camera's turn in tilt, roll, log height, heading by days (N,).
+
+    The log is that of a camera that stands, or of one that creeps along one of the ramps, by half a
+    degree a month, more or less: each weighs by its marginal likelihood and by how rare creeps are.
+    So the tracks of a camera that stands are left as they are, and not bent to the noise of its
+    first map. 0 where the log is of too few people. `from_s` as for a creep.
+
+    Source: Bayesian model averaging; the ratio of the marginal likelihoods of a Gaussian's mean.
+    """
+    turns = np.zeros((len(days), 4))
+    scores = ramp_scores(log, from_s)
+    if scores is None:
+        return turns
+    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / CREEP_DAYS
+    usual = (CREEP_RAD * months) ** 2
+    size = usual * scores.score / (1 + usual * scores.information)
+    ratio = 0.5 * (size * scores.score - np.log1p(usual * scores.information))
+    odds = CREEPING_SHARE / (1 - CREEPING_SHARE) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
+    probability = odds / (1 + odds.sum())
+    turns[:, ANGLES] = ((probability * size) @ scores.ramps.at(np.asarray(days))).T
+    return turns

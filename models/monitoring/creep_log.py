@@ -1,4 +1,4 @@
-"""What each day of people says of how a camera stands, held against its first map and speeds.
+"""Log of daily scores since a reference, held against its first map and speeds.
 
 What is kept of a day is its people's pull on tilt, roll, log height, heading and the log of times:
 their scores, weighed by how each of these would change them (the sufficient statistic of a small
@@ -12,23 +12,27 @@ import numpy.typing as npt
 
 from models.durations import DAY_S
 from models.geometry.rotation import Array
-from models.monitoring.chart import HABITS_OF_DAYS, OTHER_PEOPLE, DriftChart, slope_of
+from models.monitoring.chart import DriftChart, slope_of
+from models.monitoring.config import (
+    BLOCK_DAYS,
+    FEWEST_LOGGED,
+    FREE_RAD,
+    HABITS_OF_DAYS,
+    MOST_BLOCKS,
+    OTHER_PEOPLE,
+    SEASON_DAYS,
+)
 from models.monitoring.group_scores import GroupScores
 
 NUMBERS = 5  # tilt, roll, log height, heading, log of times
-_BLOCK_DAYS = 7  # weekends walk otherwise
-_MOST_BLOCKS = 104
-_FEWEST_GROUPS = 60
-_SLOW_DAYS = 60.0  # how long a habit of a season lasts
-_FREE_RAD = np.radians(60.0)  # one group tells everything at least so badly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CreepLog:
-    """What days (D,) of people said of how a camera stands, against its first map and speeds.
+    """Sums of the scores of days (D,) of people, against the first map and speeds of a reference.
 
     `day_idx` counts days from the epoch, `groups` are how many came, `pulls` (D, 5) what they
-    add up to. `information` (5, 5) is what a group tells, and `reference_groups` made the chart,
+    add up to. `information` (5, 5) is that of a group, and `reference_groups` made the chart,
     the last of them on the day `since_day`.
     """
 
@@ -89,17 +93,17 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
     """The newest weeks since a time, the newest first; None of too few people."""
     from_day = -np.inf if from_s is None else np.ceil(from_s / DAY_S)
     kept = (log.day_idx >= from_day) & (log.groups > 0)
-    if log.groups[kept].sum() < _FEWEST_GROUPS:
+    if log.groups[kept].sum() < FEWEST_LOGGED:
         return None
     day_idx, groups = log.day_idx[kept], log.groups[kept]
-    ago, week = np.unique((day_idx[-1] - day_idx) // _BLOCK_DAYS, return_inverse=True)
+    ago, week = np.unique((day_idx[-1] - day_idx) // BLOCK_DAYS, return_inverse=True)
     people = np.bincount(week, groups)
     pulls = np.zeros((ago.size, NUMBERS))
     np.add.at(pulls, week, log.pulls[kept])
     first = np.full(ago.size, np.inf)
     np.minimum.at(first, week, day_idx.astype(np.float64))
-    newest = slice(0, _MOST_BLOCKS)
-    moves = np.linalg.solve(_group_tells(log), (pulls / people[:, None]).T)
+    newest = slice(0, MOST_BLOCKS)
+    moves = np.linalg.solve(_group_information(log), (pulls / people[:, None]).T)
     return Weeks(
         groups=np.asarray(people[newest], dtype=np.float64),
         days=np.bincount(week)[newest].astype(np.float64),
@@ -112,18 +116,18 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
 
 def noise_of(log: CreepLog, weeks: Weeks) -> Array:
     """The covariance (5 B, 5 B) of the weeks' mean moves if the camera stands."""
-    person = np.linalg.inv(_group_tells(log))
+    person = np.linalg.inv(_group_information(log))
     apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
     people = np.diag(1 / weeks.groups) + OTHER_PEOPLE / log.reference_groups
-    habits = np.exp(-apart / _SLOW_DAYS) + np.diag(1 / weeks.days)
+    habits = np.exp(-apart / SEASON_DAYS) + np.diag(1 / weeks.days)
     return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS_OF_DAYS**2)))
 
 
-def _group_tells(log: CreepLog) -> Array:
-    """What a group tells (5, 5), nothing of it so badly that it cannot be inverted."""
-    return np.asarray(log.information + np.eye(NUMBERS) / _FREE_RAD**2)
+def _group_information(log: CreepLog) -> Array:
+    """Information of a group (5, 5), none of it so small that it cannot be inverted."""
+    return np.asarray(log.information + np.eye(NUMBERS) / FREE_RAD**2)
 
 
 def _slopes(chart: DriftChart) -> Array:
-    """How the mean scores (14, 5) change with each number, by its smallest knocks."""
+    """Change of the mean scores (14, 5) with each parameter, by its smallest offsets."""
     return np.stack([slope_of(chart, number) for number in range(NUMBERS)], axis=1)

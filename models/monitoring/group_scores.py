@@ -1,4 +1,4 @@
-"""What a walking group says of small moves of a camera: by how they walk, and where.
+"""Scores of a walking group for small moves of a camera: by how people walk, and where.
 
 Each walking group has fourteen scores. Three are slopes of the joint estimator's likelihood along
 tilt, roll and log height: sharp, but who walks far too slowly counts as someone who stands, so that
@@ -17,6 +17,7 @@ import numpy.typing as npt
 from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.monitoring.config import LARGEST_RESIDUAL, PACE_SD, STATURE_SD, STEP_SHARES
 from models.paths.likelihood import Walkers, walkers_of
 from models.paths.reference import candidate_of
 from models.paths.registration import Site
@@ -27,15 +28,12 @@ from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.speed_reference import SpeedReference, channels_of
 
 SCORES = 14
-# The reach, and a part of it: a map is smoothed by a metre, and has finer lines.
-_STEPS = np.concatenate([share * np.diag(REACH) for share in (1.0, 0.35)])
-_FARTHEST = 0.5  # of a log: a pace that is further off says no more than this
-_PACE_SD, _STATURE_SD = 0.2, 0.06  # of logs, between people: how boxes and paces are weighed
+_STEPS = np.concatenate([share * np.diag(REACH) for share in STEP_SHARES])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usual:
-    """What is usual before a camera: how people walk, and where, seen from the prior pose."""
+    """Usual speeds and paths before a camera, seen from the prior pose."""
 
     prior: CameraPose
     speed_reference: SpeedReference
@@ -106,13 +104,13 @@ def _slowed(steps: Steps, stretch: float) -> Steps:
 def _bounded(
     observations: Observations, walkers: Walkers, usual: Usual, parameters: Array
 ) -> Array:
-    """How far off paces are, and statures where boxes tell them, times what would mend it."""
+    """Weighted residuals of paces, and of statures where boxes have them, bounded."""
     heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
     speeds = measure_speeds(walkers.steps, parameters, heading)
-    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / _PACE_SD**2
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / PACE_SD**2
     if speed_reference.statures is not None:
         tops = measure_statures(observations.tops, parameters, heading)
-        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / _STATURE_SD**2
+        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / STATURE_SD**2
     return scores
 
 
@@ -121,7 +119,7 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ learned.mean, 0.0)
     slopes = measured.d_value - learned.field.slopes(measured, features, learned.mean)
-    pull = -np.clip(residual, -_FARTHEST, _FARTHEST)[:, None] * slopes
+    pull = -np.clip(residual, -LARGEST_RESIDUAL, LARGEST_RESIDUAL)[:, None] * slopes
     sums = np.zeros((tracks, 3))
     np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
     number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)

@@ -8,7 +8,7 @@ from models.geometry.plane_parameters import ANGLES
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS, PoseParameters
 from models.geometry.rotation import angle_between
-from models.monitoring.chart import Reading
+from models.monitoring.chart import ChartResult
 from models.monitoring.creep import Creep
 
 # What a clock that is wrong looks like in a pose is a height.
@@ -34,13 +34,13 @@ class Drift:
 
     @property
     def turned(self) -> bool:
-        """Whether an angle is identifiable."""
+        """True where an angle is identifiable."""
         return bool(set(ANGLES) & set(self.identifiable))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftLimits:
-    """When a drift counts: beyond so many standard deviations and beyond a floor.
+    """Limits of a drift: so many standard deviations, and a floor.
 
     And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise.
     """
@@ -72,14 +72,14 @@ class DriftVerdict:
 
     @property
     def drifting(self) -> bool:
-        """Whether the camera has moved, by now."""
+        """True while the camera counts as moved."""
         return bool(self.drifted)
 
 
 def drift_between(
     found: PoseParameters, sd: PoseParameters, identifiable: Sequence[str], prior: CameraPose
 ) -> Drift:
-    """How far an estimate is from the prior pose; x and y count as unmoved.
+    """Drift: estimate less prior pose; x and y count as unmoved.
 
     Args:
         found: what is estimated.
@@ -120,7 +120,7 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
 
 
 def asks_again(drift: Drift, limits: DriftLimits, *, drifting: bool) -> bool:
-    """Whether a verdict on a drift needs what the window says without its newest people."""
+    """True where a verdict on a drift needs the estimate without the window's newest people."""
     excess = max(_ratios(drift, limits).values(), default=0.0)
     return excess < limits.clear_ratio if drifting else excess >= 1
 
@@ -129,7 +129,7 @@ def judge(
     drift: Drift,
     limits: DriftLimits,
     drifted: tuple[str, ...],
-    reading: Reading | None = None,
+    chart: ChartResult | None = None,
     earlier: Drift | None = None,
     creep: Creep | None = None,
 ) -> DriftVerdict:
@@ -148,24 +148,24 @@ def judge(
         drift: of the window.
         limits: what counts.
         drifted: the parameters that have drifted, by the verdicts before; empty where none has.
-        reading: of the chart, where there is one.
+        chart: its result, where there is one.
         earlier: of the window without its newest people; None where too few are left, or nobody
             has asked (`asks_again`).
         creep: of the weeks up to now, where there is an anchor.
     """
     ratios = _ratios(drift, limits)
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
-    if not ratios and reading is None and not crept:
+    if not ratios and chart is None and not crept:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     excess = max(ratios.values(), default=0.0)
     beyond = _beyond(drift, limits)
-    charted = (_CHARTED[reading.parameter],) if reading is not None and reading.moved else crept
-    calm = all(said is None or said.excess < limits.clear_ratio for said in (reading, creep))
-    well = calm and _is_well(drift, limits, drifted, reading)
+    charted = (_CHARTED[chart.parameter],) if chart is not None and chart.moved else crept
+    calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
+    well = calm and _is_well(drift, limits, drifted, chart)
     streak = 1 if beyond or charted else -1 if well else 0
     if drifted:
         drifted = tuple(n for n in PARAMETERS if n in drifted or n in beyond)
-        if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, reading):
+        if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, chart):
             drifted = ()
     elif charted or (earlier is not None and beyond.items() & _beyond(earlier, limits).items()):
         drifted = tuple(beyond) or charted
@@ -185,8 +185,8 @@ def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
 
 
 def _is_well(
-    drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], reading: Reading | None
+    drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], chart: ChartResult | None
 ) -> bool:
-    identifiable = set(drift.identifiable) if reading is None else set(PARAMETERS)
+    identifiable = set(drift.identifiable) if chart is None else set(PARAMETERS)
     excess = max(_ratios(drift, limits).values(), default=0.0)
     return excess < limits.clear_ratio and set(drifted) <= identifiable

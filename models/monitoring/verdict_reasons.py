@@ -1,13 +1,26 @@
-"""What a verdict and a chart give as their reason: codes and values."""
+"""Reasons of a verdict and of a chart result: codes and values."""
 
+import math
 from datetime import UTC, datetime
 
 from models.durations import DAY_S
+from models.geometry.plane_parameters import ANGLES, PLANE_PARAMETERS
+from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
-from models.monitoring.chart import CLOCK, Reading
+from models.monitoring.chart import CLOCK, ChartResult
+from models.monitoring.config import (
+    CLOCK_LEAST_LOG,
+    CLOCK_SIGMAS,
+    GROUPS_FOR_POSE,
+    STILL_RAD,
+    STILL_SIGMAS,
+    USUAL_RATE_HZ,
+)
 from models.monitoring.creep import Creep
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
 from models.reasons import Reason, TracksCode, Value
+
+_HEIGHT = 2
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
@@ -33,27 +46,27 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
     return Reason(code=code, values=values)
 
 
-def reason_of_reading(reading: Reading) -> Reason | None:
-    """Which way the drift chart says that a camera has moved; None where it says nothing.
+def reason_of_chart(chart: ChartResult) -> Reason | None:
+    """Direction in which the drift chart takes the camera to have moved; None where it is calm.
 
     Its `number` is a parameter of a pose, or `times` where all were too long (`sign` 1) or too
     short (-1).
     """
-    if not reading.suspicious:
+    if not chart.suspicious:
         return None
-    parameter = "times" if reading.parameter == CLOCK else PARAMETERS[reading.parameter]
+    parameter = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
     values: dict[str, Value] = {
         "number": parameter,
-        "sign": reading.sign,
-        "parties": reading.walking_groups,
-        "statistic": reading.statistic,
-        "level": reading.level,
+        "sign": chart.sign,
+        "parties": chart.walking_groups,
+        "statistic": chart.statistic,
+        "level": chart.level,
     }
     return Reason(code=TracksCode.CHART, values=values)
 
 
 def reason_of_creep(creep: Creep) -> Reason | None:
-    """Which way a camera has crept, how far and since when; None where it has not.
+    """Direction, size and beginning of a camera's creep; None where it has not crept.
 
     `since` is a time, as of `datetime.isoformat`.
     """
@@ -68,3 +81,36 @@ def reason_of_creep(creep: Creep) -> Reason | None:
         "level": creep.level,
     }
     return Reason(code=TracksCode.CREPT, values=values)
+
+
+def may_be_clock(chart: ChartResult) -> bool:
+    """True where an alarm may be of the clock, after too few walking groups for the pose to decide.
+
+    An alarm about a scale that waits for a few more people can be called what it is.
+    """
+    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < GROUPS_FOR_POSE
+
+
+def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
+    """Reason of a change of scale with unchanged angles; None where there is none.
+
+    Times that are too long by a factor make people slow, and only a higher camera makes them walk
+    as before: the height grows by that factor and nothing else does. A camera that was raised
+    without turning looks the same.
+
+    Args:
+        drift: the estimate against the prior pose.
+        prior: that pose.
+        frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
+    """
+    if not set(PLANE_PARAMETERS) <= set(drift.identifiable):
+        return None
+    factor = 1 + drift.by.height_m / prior.height_m
+    relative_sd = drift.sd.height_m / (factor * prior.height_m)
+    if abs(math.log(factor)) <= max(CLOCK_SIGMAS * relative_sd, CLOCK_LEAST_LOG):
+        return None
+    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
+        if abs(angle) > min(STILL_SIGMAS * sd, STILL_RAD):
+            return None
+    values = {"factor": factor, "rate_hz": frame_rate_hz or USUAL_RATE_HZ}
+    return Reason(code=TracksCode.SCALE_CHANGED, values=values)

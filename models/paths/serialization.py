@@ -7,7 +7,7 @@ from models.paths.map.density_map import FlowMap
 from models.paths.map.rounding import of_levels, to_levels
 from models.paths.map.view import coverage_of
 from models.paths.reference import FlowReference
-from models.serialization import Format, flattened, pack, restored, under, unpack
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes, under
 
 _FORMAT = Format(name="flow", version=1)
 
@@ -19,7 +19,7 @@ def flow_to_bytes(reference: FlowReference) -> bytes:
         del values[name]  # made anew of the map
     values["flow.log_density"] = to_levels(reference.flow.log_density)
     values["flow.unseen"] = np.rint(reference.flow.unseen * 255).astype(np.uint8)
-    return pack(_FORMAT, values)
+    return to_bytes(_FORMAT, values)
 
 
 def flow_from_bytes(data: bytes) -> FlowReference:
@@ -28,7 +28,7 @@ def flow_from_bytes(data: bytes) -> FlowReference:
     Raises:
         CheckpointError: the bytes are no flow of this format.
     """
-    values = unpack(_FORMAT, data)
+    values = from_bytes(_FORMAT, data)
     try:
         values["flow.log_density"] = of_levels(values["flow.log_density"])
         values["flow.unseen"] = values["flow.unseen"] / 255

@@ -5,11 +5,11 @@ All that these three take and give can be imported from here.
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart import Reading
-from models.monitoring.creep import Creep, read_creep
+from models.monitoring.chart import ChartResult
+from models.monitoring.creep import Creep, creep_result
 from models.monitoring.creep_log import CreepLog
 from models.monitoring.verdict import Drift, DriftLimits
-from models.pose.alarms import AlarmRate, read_alarm_chart
+from models.pose.alarms import AlarmRate, alarm_chart_result
 from models.pose.anchoring import begin_creep_log, log_creep, without_creep
 from models.pose.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
 from models.pose.learning import assume_site, learn_site
@@ -36,7 +36,7 @@ __all__ = [
     "LastPose",
     "Observations",
     "PoseFinding",
-    "Reading",
+    "ChartResult",
     "SecondLook",
     "Trajectory",
     "WalkConfig",
@@ -53,7 +53,7 @@ __all__ = [
     "log_creep",
     "observe",
     "observe_walks",
-    "read_alarm_chart",
-    "read_creep",
+    "alarm_chart_result",
+    "creep_result",
     "without_creep",
 ]

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.geometry.rotation import Mask
-from models.monitoring.chart import RUN, Reading, read_chart
+from models.monitoring.chart import ChartResult, chart_result
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import score_groups
 from models.pose.site import CameraSite
 from models.tracks.observations import Observations, of_tracks
@@ -25,14 +26,14 @@ class AlarmRate:
     calm_groups: int = 12
 
 
-def read_alarm_chart(
+def alarm_chart_result(
     tracks: Observations,
     site: CameraSite,
     rate: AlarmRate,
     *,
     counted: Mask | None = None,
     first: int = 0,
-) -> Reading | None:
+) -> ChartResult | None:
     """What the chart says of tracks from the first one on, or else of all; None of too few.
 
     None, too, of a site without a flow map or a chart.
@@ -58,7 +59,7 @@ def read_alarm_chart(
         seen = tracks if asked.size == tracks.tracks else of_tracks(tracks, asked)
         scores = score_groups(seen, usual)
         groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
-        reading = read_chart(
+        reading = chart_result(
             site.chart,
             scores,
             RUN * rate.alarms_a_year / groups_a_year,

@@ -14,11 +14,11 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
+from models.monitoring.creep import posterior_mean_turns
 from models.monitoring.creep_log import CreepLog, add_day, begin_log
-from models.monitoring.creep_posterior import believed_turns
 from models.monitoring.group_scores import score_groups
 from models.pose.site import CameraSite
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 
@@ -71,13 +71,13 @@ def without_creep(
         from_s: since when it has stood as it does, but for a creep.
     """
     ended_s = np.array([track.time_s[-1] for track in tracks])
-    turns = believed_turns(log, ended_s / DAY_S, from_s)
+    turns = posterior_mean_turns(log, ended_s / DAY_S, from_s)
 
     def seen(track: Trajectory, turn: Array) -> Trajectory | None:
         if np.abs(turn).max() < _NOTHING_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
-        stood = Knock(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)
-        return knock_trajectory(track, intrinsics, stood, prior)
+        stood = PoseOffset(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)
+        return offset_trajectory(track, intrinsics, stood, prior)
 
     return [seen(track, turn) for track, turn in zip(tracks, turns, strict=True)]

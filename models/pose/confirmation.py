@@ -4,7 +4,7 @@ import numpy as np
 
 from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PARAMETERS
-from models.monitoring.chart import HABITS_OF_DAYS
+from models.monitoring.config import HABITS_OF_DAYS
 from models.pose.fusion import FusedEstimate
 from models.quantiles import chi_squared_above, f_above
 

@@ -7,7 +7,7 @@ from models.errors import CheckpointError
 from models.geometry.rotation import Array
 from models.pose.fusion import Around
 from models.pose.warm_start import LastPose
-from models.serialization import Format, flattened, pack, restored, unpack
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes
 from models.walking.fit import Near
 
 _FORMAT = Format(name="last_pose", version=2)
@@ -21,7 +21,7 @@ def last_pose_to_bytes(last: LastPose) -> bytes:
     if last.around is not None:
         values |= {"wider": last.around.wider, "told": last.around.told.raw}
         values |= _numbered("told_means", last.around.told.means)
-    return pack(_FORMAT, values)
+    return to_bytes(_FORMAT, values)
 
 
 def last_pose_from_bytes(data: bytes) -> LastPose:
@@ -30,7 +30,7 @@ def last_pose_from_bytes(data: bytes) -> LastPose:
     Raises:
         CheckpointError: the bytes are no last pose of this format.
     """
-    values = unpack(_FORMAT, data)
+    values = from_bytes(_FORMAT, data)
     try:
         given: dict[str, Any] = {
             "means": _taken(values, "means"),

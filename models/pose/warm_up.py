@@ -10,17 +10,17 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.pose.alarms import AlarmRate, read_alarm_chart
+from models.pose.alarms import AlarmRate, alarm_chart_result
 from models.pose.estimating import PoseFinding, estimate_pose
 from models.pose.learning import learn_site
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe
 
 _LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 _PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(18), roll_rad=math.radians(1))
-_KNOCK = Knock(tilt_rad=math.radians(5), roll_rad=math.radians(-4))
+_KNOCK = PoseOffset(tilt_rad=math.radians(5), roll_rad=math.radians(-4))
 _PEOPLE = 40
 _RATE = AlarmRate(alarms_a_year=1.0, tracks_a_year=10_000.0)
 
@@ -34,7 +34,7 @@ def warm_up(seed: int = 0) -> PoseFinding:
     people = by_end(walk_site(_LENS, _KNOCK.apply(_PRIOR), lanes, config, _PEOPLE, rng))
     bare = [replace(each, top_v=None) for each in people]
     found = estimate_pose(observe(bare, _LENS, _PRIOR), site)
-    read_alarm_chart(observe(people, _LENS, _PRIOR), site, _RATE)
+    alarm_chart_result(observe(people, _LENS, _PRIOR), site, _RATE)
     return found
 
 

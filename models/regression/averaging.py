@@ -1,12 +1,11 @@
 """The averaged estimate: the mean of what a regressor says of each track."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import (
     Array,
@@ -21,7 +20,7 @@ _RESAMPLES = 300
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackPredictions:
-    """What a regressor says of N tracks: heights (N,) in metres, quaternions wxyz (N, 4)."""
+    """Predictions of a regressor for N tracks: heights (N,) in metres, quaternions wxyz (N, 4)."""
 
     height_m: Array
     quaternion_wxyz: Array
@@ -95,16 +94,6 @@ def averaged_estimate(predictions: TrackPredictions, seed: int) -> PoseEstimate:
             heading_rad=float(_around(headings[1:], headings[0]).std(ddof=1)),
         ),
         tracks=count,
-    )
-
-
-def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
-    """The estimate as a pose; what is not identifiable (x, y, heading) is the prior pose's."""
-    return replace(
-        prior,
-        height_m=max(estimate.value.height_m, 1e-3),
-        tilt_rad=estimate.value.tilt_rad,
-        roll_rad=estimate.value.roll_rad,
     )
 
 

@@ -12,7 +12,7 @@ from models.errors import CheckpointError
 from models.regression.network import PoseRegressor, network_for
 from models.regression.recipe import Recipe
 from models.regression.weights_files import weights_path
-from models.serialization import Format, unpack
+from models.serialization import Format, from_bytes
 
 START = Path(__file__).parent / "start" / "start.safetensors.gz"
 START_FORMAT = Format(name="regressor_start", version=1)
@@ -66,7 +66,7 @@ def starting_network(recipe: Recipe, path: Path = START) -> PoseRegressor:
     if recipe.start == "fresh":
         return network
     try:
-        arrays = unpack(START_FORMAT, path.read_bytes())
+        arrays = from_bytes(START_FORMAT, path.read_bytes())
         state = {name: torch.from_numpy(array).float() for name, array in arrays.items()}
         network.load_state_dict(state)
     except (OSError, RuntimeError, TypeError) as error:

@@ -1,4 +1,4 @@
-"""What a network reads of a walk."""
+"""Inputs of a network, of a walk."""
 
 import math
 
@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import level_from_camera
 from models.geometry.rotation import Array
 from models.regression.recipe import Inputs, TrainingPlan
 
@@ -49,7 +48,7 @@ def _levelled(uv: Array, plan: TrainingPlan) -> Array:
     prior, recipe, walk = plan.prior_pose, plan.recipe, plan.walk
     points = _scaled(uv, plan.intrinsics)
     rays, _ = plan.intrinsics.rays(uv)
-    level = rays @ level_from_camera(prior).T
+    level = rays @ prior.level_from_camera.T
     level = level / np.linalg.norm(level, axis=-1, keepdims=True)
     down = np.maximum(-level[..., 2:], _LOWEST)
     ground = level[..., :2] / down

@@ -1,4 +1,4 @@
-"""What a training does, as values. Imports no torch: the HTTP process names recipes too."""
+"""Configuration of a training. Imports no torch: the HTTP process names recipes too."""
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal

@@ -31,7 +31,7 @@ _MUST_BEAT = 0.8  # of the error that answering the prior pose always would make
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingProgress:
-    """How far a training is; `loss` is the mean over the last epoch so far."""
+    """Progress of a training; `loss` is the mean over the last epoch so far."""
 
     step: int
     steps: int
@@ -57,7 +57,7 @@ class HeldOutMetrics:
 
     @property
     def passed(self) -> bool:
-        """Whether the network learned something from the walks."""
+        """True where the network learned something from the walks."""
         return (
             math.isfinite(self.final_loss)
             and self.median_height_error_m < _MUST_BEAT * self.prior_height_error_m
@@ -171,7 +171,7 @@ def _centre(network: PoseRegressor, plan: TrainingPlan, rng: np.random.Generator
 
 
 def _in_bfloat16(recipe: Recipe) -> bool:
-    """Whether products of this recipe are of bfloat16 here; emulated, they would take longer."""
+    """True where products of this recipe are of bfloat16 here; emulated, they would take longer."""
     if recipe.arithmetic != "bfloat16":
         return False
     # The oldest torch that we run on cannot be asked.

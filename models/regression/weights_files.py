@@ -1,4 +1,4 @@
-"""Where weights lie. Imports no torch: backups and the HTTP process name such files too."""
+"""Place of the weights' files. Imports no torch: backups and the HTTP process name them too."""
 
 from pathlib import Path
 

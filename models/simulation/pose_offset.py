@@ -13,7 +13,7 @@ from models.tracks.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knock:
+class PoseOffset:
     """A move of the camera: radians of tilt, roll, heading, and the log of the height ratio."""
 
     tilt_rad: float = 0.0
@@ -32,17 +32,17 @@ class Knock:
         )
 
 
-def knock_trajectory(
-    trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, knocked: CameraPose
+def offset_trajectory(
+    trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, moved: CameraPose
 ) -> Trajectory | None:
-    """What the camera sees of the same people after a move; the longest run inside the image.
+    """Trajectory of the same people after a move of the camera; the longest run inside the image.
 
     None where fewer than two points stay in the picture. Exact for the feet, which lie on the
     ground; the boxes' upper edges are those of upright people of the same height. Heads lean as
     they did, to the side.
     """
     ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, trajectory.uv)
-    uv, _ = pixel_from_ground(intrinsics, knocked.rotation, knocked.centre_m, ground)
+    uv, _ = pixel_from_ground(intrinsics, moved.rotation, moved.centre_m, ground)
     seen = on_ground & intrinsics.contains(uv)
     runs = np.split(np.arange(seen.size), np.flatnonzero(np.diff(seen)) + 1)
     longest = max((run for run in runs if seen[run[0]]), key=len, default=np.arange(0))
@@ -53,11 +53,11 @@ def knock_trajectory(
         tall, _ = statures(
             intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
         )
-        top_v = tops_seen(intrinsics, knocked.rotation, knocked.centre_m, ground, tall)
+        top_v = tops_seen(intrinsics, moved.rotation, moved.centre_m, ground, tall)
         top_v = top_v[longest]
     head_uv = None
     if trajectory.head_uv is not None:
         heads_m = heads_above(intrinsics, pose, ground, trajectory.head_uv)
-        head_uv = heads_seen(intrinsics, knocked, heads_m)[longest]
+        head_uv = heads_seen(intrinsics, moved, heads_m)[longest]
     # What is behind the camera now has no pixels.
     return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v, head_uv=head_uv)

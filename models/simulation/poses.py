@@ -12,7 +12,7 @@ from models.geometry.rotation import Array, rotation_from_angles
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseRange:
-    """How far, and how finely, poses are spread around the prior pose."""
+    """Spread and fineness of poses around the prior pose."""
 
     height_m: float = 3.0
     height_step_m: float = 0.4

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import zip_longest
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,13 +17,12 @@ from models.tracks.trajectory import Trajectory
 _STEP_S = 0.4
 _REACH_M = 40.0  # half the length of a walk
 _MOST_DRAWS = 60
-_BETWEEN_S = 20.0  # one sets out after another
-_PLACES_DRAWN = 10
+BETWEEN_S = 20.0  # one sets out after another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteConfig:
-    """How people walk at a site and how they are seen.
+    """Walks of people at a site, and the noise of what is seen of them.
 
     Speeds are log-normal: `between_sd` of the log between people, `within_sd` within one, with
     `correlation` between moments 1.5 s apart. `standing_share` of people stand; `aside_m` is how
@@ -94,75 +92,12 @@ def walk_site(
     for number in range(count * _MOST_DRAWS):
         if len(tracks) == count:
             return tracks
-        track = _walk(
-            intrinsics, pose, lanes[number % len(lanes)], config, _BETWEEN_S * number, rng
-        )
+        track = _walk(intrinsics, pose, lanes[number % len(lanes)], config, BETWEEN_S * number, rng)
         if track is not None:
             tracks.append(track)
     raise DegenerateGeometryError(
         f"pose: {len(tracks)} of {count} walks are seen in {count * _MOST_DRAWS} draws"
     )
-
-
-def draw_new_lane(
-    intrinsics: Intrinsics,
-    pose: CameraPose,
-    lanes: Sequence[Lane],
-    config: SiteConfig,
-    rng: np.random.Generator,
-) -> Lane:
-    """A lane that people of a site take when their own is closed, off the lanes there are.
-
-    It passes the visible place that is farthest from all lanes, of a few that are drawn, and its
-    direction is midway between two of theirs.
-
-    Raises:
-        DegenerateGeometryError: the pose sees no ground within reach.
-    """
-    places = np.array(
-        [
-            lane.point
-            for _ in range(_PLACES_DRAWN)
-            for lane in draw_lanes(intrinsics, pose, config, rng)
-        ]
-    )
-    apart = np.min([_aside_m(lane, places) for lane in lanes], axis=0)
-    angles = np.sort([math.atan2(lane.direction[1], lane.direction[0]) % math.pi for lane in lanes])
-    gaps = np.diff(np.append(angles, angles[0] + math.pi))
-    angle = angles[gaps.argmax()] + gaps.max() / 2
-    return Lane(
-        point=places[apart.argmax()], direction=np.array([math.cos(angle), math.sin(angle)])
-    )
-
-
-def walk_changed(
-    intrinsics: Intrinsics,
-    pose: CameraPose,
-    lanes: Sequence[Lane],
-    new_lane: Lane,
-    config: SiteConfig,
-    count: int,
-    rng: np.random.Generator,
-) -> list[Trajectory]:
-    """Tracks as of `walk_site`, in time order, of which every other walks a new lane.
-
-    Raises:
-        DegenerateGeometryError: hardly any walk is seen from the pose.
-    """
-    kept = walk_site(intrinsics, pose, lanes, config, count - count // 2, rng)
-    new = walk_site(intrinsics, pose, [new_lane], config, count // 2, rng)
-    return [
-        replace(track, time_s=track.time_s - track.time_s[0] + _BETWEEN_S * number)
-        for number, track in enumerate(
-            track for pair in zip_longest(kept, new) for track in pair if track is not None
-        )
-    ]
-
-
-def _aside_m(lane: Lane, places: Array) -> Array:
-    """How far places (N, 2) are from a lane's middle, in metres."""
-    normal = np.array([-lane.direction[1], lane.direction[0]])
-    return np.asarray(np.abs((places - lane.point) @ normal))
 
 
 def _walk(

@@ -19,7 +19,7 @@ _SHORTER_AFTER = 15  # rounds after which a walk that never fits is asked for wi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WalkConfig:
-    """How simulated people walk. The paper's speeds are V ~ N(1.4, 0.1^2) m/s (Carey 2005)."""
+    """Walks of simulated people. The paper's speeds are V ~ N(1.4, 0.1^2) m/s (Carey 2005)."""
 
     speed_mean_mps: float = 1.4
     speed_sd_mps: float = 0.1

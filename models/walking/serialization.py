@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from models.serialization import Format, flattened, pack, restored, unpack
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes
 from models.walking.speed_reference import SpeedReference
 
 _FORMAT = Format(name="site", version=1)
@@ -10,7 +10,7 @@ _FORMAT = Format(name="site", version=1)
 
 def reference_to_bytes(reference: SpeedReference) -> bytes:
     """A reference as it is stored, but for what is implausible, which has a column of its own."""
-    return pack(_FORMAT, flattened(replace(reference, implausible=None)))
+    return to_bytes(_FORMAT, flattened(replace(reference, implausible=None)))
 
 
 def reference_from_bytes(data: bytes) -> SpeedReference:
@@ -19,4 +19,4 @@ def reference_from_bytes(data: bytes) -> SpeedReference:
     Raises:
         CheckpointError: the bytes are no reference of this format.
     """
-    return restored(SpeedReference, unpack(_FORMAT, data), implausible=None)
+    return restored(SpeedReference, from_bytes(_FORMAT, data), implausible=None)

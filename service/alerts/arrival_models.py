@@ -10,7 +10,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.durations import DAY_S, HOUR_S
-from models.monitoring.arrivals import Rhythm, delay_of, learn_rhythm
+from models.monitoring.arrivals import ArrivalProcess, delay_of, learn_arrivals
 from service.enums import AlertKind, Outcome
 from service.settings import Settings
 from service.store import alerts, cameras, rhythms, tracks
@@ -23,7 +23,7 @@ _NOT_AGAIN_WITHIN = timedelta(minutes=50)
 class ArrivalModel:
     """Arrivals of a usual week, and how late its tracks come at the most, in seconds."""
 
-    rhythm: Rhythm
+    rhythm: ArrivalProcess
     delay_s: float
 
 
@@ -90,7 +90,7 @@ def compute_arrival_model(
     if watched.sum() < 24 * settings.rhythm_days:
         return None, known
     cells = cells_of(first, len(seen), settings.zone)
-    rhythm = learn_rhythm(seen, cells, watched, first, np.sort(np.array(arrivals.ended_s)))
+    rhythm = learn_arrivals(seen, cells, watched, first, np.sort(np.array(arrivals.ended_s)))
     delay_s = delay_of(np.array(list(known.latest_s.values())))
     return ArrivalModel(rhythm=rhythm, delay_s=delay_s), known
 
@@ -141,7 +141,7 @@ def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
 def unpacked(profile: dict[str, Any]) -> ArrivalModel:
     """An arrival model as it was stored."""
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
-    return ArrivalModel(rhythm=Rhythm(**numbers), delay_s=profile["delay_s"])
+    return ArrivalModel(rhythm=ArrivalProcess(**numbers), delay_s=profile["delay_s"])
 
 
 def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import SceneTrack
@@ -18,7 +18,7 @@ from service.formats.degrees import in_degrees
 CAMERA_ID = "demo-street"
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1))
-KNOCK = Knock(tilt_rad=math.radians(6), roll_rad=math.radians(-5))
+KNOCK = PoseOffset(tilt_rad=math.radians(6), roll_rad=math.radians(-5))
 REFERENCE_TRACKS, STILL_TRACKS, KNOCKED_TRACKS = 100, 50, 100
 BETWEEN_S = 6.0  # of the street's time; the recording ends now
 

@@ -11,7 +11,7 @@ import httpx
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack, load_scene
 from service.formats.degrees import in_degrees
 
@@ -35,7 +35,7 @@ def replay_scene(
     folder: Path,
     url: str,
     *,
-    knock: Knock,
+    knock: PoseOffset,
     speed: float,
     on_progress: Callable[[ReplayProgress], None],
     token: str | None = None,
@@ -135,13 +135,13 @@ def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str,
     }
 
 
-def _seen(scene: Scene, knock: Knock) -> Iterator[SceneTrack]:
+def _seen(scene: Scene, knock: PoseOffset) -> Iterator[SceneTrack]:
     """Tracks as the knocked camera would have them, of those long enough to be taken."""
-    if knock == Knock():
+    if knock == PoseOffset():
         yield from scene.tracks
         return
     knocked = knock.apply(scene.true_pose)
     for track in scene.tracks:
-        seen = knock_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
+        seen = offset_trajectory(track.trajectory, scene.intrinsics, scene.true_pose, knocked)
         if seen is not None and seen.long_enough:
             yield SceneTrack(track_id=track.track_id, trajectory=seen)

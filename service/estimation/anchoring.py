@@ -9,17 +9,21 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
-from models.monitoring.creep import SHARE
-from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.serialization import (
+    chart_from_bytes,
+    chart_to_bytes,
+    creep_log_from_bytes,
+    creep_log_to_bytes,
+)
 from models.paths.serialization import flow_from_bytes, flow_to_bytes
 from models.pose import (
     CameraSite,
     Creep,
     begin_creep_log,
+    creep_result,
     log_creep,
     observe,
-    read_creep,
 )
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
@@ -201,7 +205,7 @@ def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | Non
     if anchor is None or anchor.log is None:
         return None
     log = creep_log_from_bytes(anchor.log)
-    return read_creep(log, SHARE * false_alarms_per_year, anchor.from_s)
+    return creep_result(log, CREEP_SHARE * false_alarms_per_year, anchor.from_s)
 
 
 def _anchor(record: AnchorRecord, bounds: WindowBounds) -> Anchor:

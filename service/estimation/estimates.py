@@ -10,9 +10,19 @@ from models.durations import DAY_S
 from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
 from models.monitoring.chart import CLOCK
-from models.monitoring.clock import clock_fault, may_be_clock
-from models.monitoring.verdict import Drift, DriftVerdict, judge, pose_after
-from models.monitoring.verdict_reasons import reason_of_creep, reason_of_drift, reason_of_reading
+from models.monitoring.verdict import (
+    Drift,
+    DriftVerdict,
+    judge,
+    pose_after,
+)
+from models.monitoring.verdict_reasons import (
+    clock_fault,
+    may_be_clock,
+    reason_of_chart,
+    reason_of_creep,
+    reason_of_drift,
+)
 from models.pose import drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
@@ -150,7 +160,7 @@ def _judge(
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
         clock,
-        None if finding.reading is None else reason_of_reading(finding.reading),
+        None if finding.reading is None else reason_of_chart(finding.reading),
         finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
@@ -160,7 +170,7 @@ def _judge(
     state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     charted = reading if reading is not None and reading.moved else None
     if charted is not None and clock is None and charted.parameter == CLOCK:
-        clock = reason_of_reading(charted)
+        clock = reason_of_chart(charted)
     return Judgement(
         state=PoseState.DRIFTING if verdict.drifting else state,
         reasons=reasons,

@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from models.monitoring.chart import Reading
-from models.monitoring.chart_serialization import chart_from_bytes
-from models.monitoring.creep import SHARE
+from models.monitoring.chart import ChartResult
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.serialization import chart_from_bytes
 from models.paths.serialization import flow_from_bytes
 from models.pose import (
     AlarmRate,
@@ -16,11 +16,11 @@ from models.pose import (
     Creep,
     Observations,
     SecondLook,
+    alarm_chart_result,
     assume_site,
     count_walks,
     estimate_pose,
     observe_walks,
-    read_alarm_chart,
 )
 from models.pose.fusion import FusedEstimate
 from models.reasons import Reason
@@ -58,7 +58,7 @@ class Finding:
     fused: FusedEstimate
     earlier: FusedEstimate | None
     averaged: PoseEstimate | None
-    reading: Reading | None
+    reading: ChartResult | None
     creep: Creep | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
@@ -164,18 +164,18 @@ def _read(
     site: CameraSite,
     first: int,
     failures: PartialFailures,
-) -> Reading | None:
+) -> ChartResult | None:
     """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
     rate = AlarmRate(
-        alarms_a_year=(1 - SHARE) * evidence.alarms_a_year,
+        alarms_a_year=(1 - CREEP_SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
         calm_groups=evidence.limits.people,
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
-    read = partial(read_alarm_chart, observed, site, rate, counted=unanswered, first=first)
+    read = partial(alarm_chart_result, observed, site, rate, counted=unanswered, first=first)
     return failures.unless_failed("chart", read)
 
 

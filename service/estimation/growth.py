@@ -15,7 +15,7 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.creep_serialization import creep_log_from_bytes
+from models.monitoring.serialization import creep_log_from_bytes
 from models.paths.serialization import flow_from_bytes
 from models.pose import learn_site, observe, without_creep
 from models.pose.change_point import FEWEST_BESIDE

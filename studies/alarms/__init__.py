@@ -1,1 +1,1 @@
-"""What is measured of alarms: false ones, and delays, on recorded scenes and simulated years."""
+"""Studies of alarms: false ones, and delays, on recorded scenes and simulated years."""

@@ -12,15 +12,15 @@ from models.monitoring.chart import trace
 from models.monitoring.group_scores import score_groups
 from models.pose import learn_site
 from models.tracks.trajectory import Trajectory
-from studies.alarms.results import DAYS, AlarmResults, Delay, knocks_of
+from studies.alarms.results import DAYS, AlarmResults, Delay, offsets_of
 from studies.alarms.watch import Watch, first_alarm, watch_over
-from studies.paths.simulated_site import (
+from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
+from studies.simulation.simulated_site import (
     SPEED_TRACKS,
     SimulatedSite,
     draw_simulated_site,
     observe_feet,
 )
-from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
 
 _WEEK = 7
 _LONGEST_TRACKS = 900  # that a knock is waited for
@@ -69,10 +69,10 @@ def live_year(
     walked = np.concatenate(apart)
     delays = [
         delay
-        for asked, knock in knocks_of(angles_deg, rng)
+        for wanted, offset in offsets_of(angles_deg, rng)
         if (
             delay := _knocked(
-                simulated, mixes, asked, knock.apply(simulated.prior), watch, day, rng
+                simulated, mixes, wanted, offset.apply(simulated.prior), watch, day, rng
             )
         )
     ]
@@ -91,7 +91,7 @@ def live_year(
 def _knocked(
     simulated: SimulatedSite,
     mixes: Array,
-    asked: Delay,
+    delay: Delay,
     moved: CameraPose,
     watch: Watch,
     day: int,
@@ -113,8 +113,8 @@ def _knocked(
         return None
     groups_a_track = observations.tracks / scores.last.size
     return Delay(
-        angle_deg=asked.angle_deg,
-        pan=asked.pan,
+        angle_deg=delay.angle_deg,
+        pan=delay.pan,
         tracks=first_alarm(watch, watch.apart(scores), groups_a_track),
     )
 

@@ -49,20 +49,22 @@ def run_creep_study(
 
 
 def creep_table(cases: Sequence[CreepCase]) -> Table:
-    """How far cameras had gone when their creep was told, by number and rate."""
+    """Table of cameras' turns when their creep was detected, by number and rate."""
     table = Table(title="turned by so many deg when it was told: median, 90 %, worst; bar 1.5, 2.5")
     for name in ("deg a month", *NUMBERS):
         table.add_column(name, justify="right")
     for rate_deg in sorted({case.rate_deg for case in cases}):
         cells = []
         for number in NUMBERS:
-            told = [
+            turned = [
                 case.told_deg if case.told_deg is not None else np.inf
                 for case in cases
                 if (case.number, case.rate_deg) == (number, rate_deg)
             ]
-            quantiles = np.quantile(told, [0.5, 0.9, 1.0], method="higher") if told else np.zeros(0)
-            cells.append(", ".join(f"{each:.2f}" for each in quantiles) + f" (n {len(told)})")
+            quantiles = (
+                np.quantile(turned, [0.5, 0.9, 1.0], method="higher") if turned else np.zeros(0)
+            )
+            cells.append(", ".join(f"{each:.2f}" for each in quantiles) + f" (n {len(turned)})")
         table.add_row(f"{rate_deg:g}", *cells)
     return table
 

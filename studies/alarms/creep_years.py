@@ -9,16 +9,17 @@ from typing import Self
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.monitoring.creep import SHARE, Creep, read_creep
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.creep import Creep, creep_result
 from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.trajectory import Trajectory
-from studies.paths.simulated_site import (
+from studies.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
+from studies.simulation.simulated_site import (
     SimulatedSite,
     draw_simulated_site,
     observe_feet,
 )
-from studies.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
 
 MONTH_DAYS = 365.25 / 12
 NUMBERS = {"tilt": 0, "roll": 1, "heading": 3}
@@ -30,7 +31,7 @@ _EVERY_DAYS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CreepPlan:
-    """How busy cameras are, of how many people their references are, and what is allowed.
+    """Plan of creeping years: traffic, people of the references, and the alarms allowed.
 
     For how many days they creep at the most, and stand.
     """
@@ -46,7 +47,7 @@ class CreepPlan:
 class CreepCase:
     """A camera that crept by `rate_deg` a month in a number, or stood, for some `days`.
 
-    `told_deg` is how far it had gone when that was told first, after so many `days`; `said_deg`
+    `told_deg` is how far it had gone when that was detected, after so many `days`; `said_deg`
     with `said_sd_deg` is what was said then of `said_number`. All are None where it never was.
     `alarms` are all of them; after each the log begins anew, as after a person's answer. `highest`
     is the largest statistic, in units of its level, `groups` made the reference.
@@ -67,7 +68,7 @@ class CreepCase:
 
     @property
     def still(self) -> bool:
-        """Whether the camera stood."""
+        """True where the camera stood."""
         return not self.rate_deg
 
 
@@ -141,7 +142,7 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
     assert log is not None
     alarms, highest = 0, 0.0
     from_s: float | None = None
-    told: Creep | None = None
+    first: Creep | None = None
     told_deg: float | None = None
     tracks: list[Trajectory] = []
     days = 0
@@ -156,14 +157,14 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
             log, observe_feet(tracks, life.simulated.intrinsics, life.simulated.prior), life.first
         )
         tracks = []
-        found = read_creep(log, SHARE * life.plan.alarms_a_year, from_s)
+        found = creep_result(log, CREEP_SHARE * life.plan.alarms_a_year, from_s)
         if found is None:
             continue
         highest = max(highest, found.excess)
         if found.moved:
             alarms, from_s = alarms + 1, (life.day + 1) * DAY_S
-            if told is None:
-                told, told_deg = found, turned_deg
+            if first is None:
+                first, told_deg = found, turned_deg
             if rate_deg:
                 break
     return CreepCase(
@@ -174,9 +175,9 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
         days=days,
         groups=log.reference_groups,
         told_deg=told_deg,
-        said_number=None if told is None else _NAMES[told.parameter],
-        said_deg=None if told is None else math.degrees(told.by),
-        said_sd_deg=None if told is None else math.degrees(told.sd),
+        said_number=None if first is None else _NAMES[first.parameter],
+        said_deg=None if first is None else math.degrees(first.by),
+        said_sd_deg=None if first is None else math.degrees(first.sd),
         alarms=alarms,
         highest=highest,
     )
@@ -184,4 +185,4 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
 
 def turned(pose: CameraPose, number: str, by_deg: float) -> CameraPose:
     """A pose turned in tilt, roll or heading."""
-    return Knock(**{f"{number}_rad": math.radians(by_deg)}).apply(pose)
+    return PoseOffset(**{f"{number}_rad": math.radians(by_deg)}).apply(pose)

@@ -1,4 +1,4 @@
-"""What is measured of alarms: false ones of cameras that stand, tracks until those of knocks."""
+"""Results of alarms: false ones of cameras that stand, tracks until those of pose offsets."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 
 DAYS = 365.25
 _REDRAWN = 4000
@@ -41,14 +41,16 @@ class AlarmResults:
     delays: tuple[Delay, ...]
 
 
-def knocks_of(angles_deg: Sequence[float], rng: np.random.Generator) -> list[tuple[Delay, Knock]]:
-    """For each angle a knock in a drawn direction of tilt and roll, and a pan of a drawn sign."""
+def offsets_of(
+    angles_deg: Sequence[float], rng: np.random.Generator
+) -> list[tuple[Delay, PoseOffset]]:
+    """Offset for each angle in a drawn direction of tilt and roll, and a pan of a drawn sign."""
     found = []
     for angle_deg in angles_deg:
         angle, way = math.radians(angle_deg), rng.uniform(0, 2 * math.pi)
         tilt, roll = angle * math.cos(way), angle * math.sin(way)
-        aside = Knock(tilt_rad=tilt, roll_rad=roll, log_height=0.0)
-        pan = Knock(
+        aside = PoseOffset(tilt_rad=tilt, roll_rad=roll, log_height=0.0)
+        pan = PoseOffset(
             tilt_rad=0.0, roll_rad=0.0, log_height=0.0, heading_rad=angle * rng.choice([-1.0, 1.0])
         )
         for knock, is_pan in ((aside, False), (pan, True)):

@@ -25,7 +25,7 @@ _TABLE_WIDTH = 130
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmPlan:
-    """What is set and what is simulated: false alarms a year, traffic, and for how long."""
+    """Plan of a study of alarms: false alarms a year, traffic, and for how long."""
 
     alarms_a_year: float
     tracks_a_day: float

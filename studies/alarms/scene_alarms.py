@@ -19,12 +19,12 @@ from models.monitoring.verdict import DriftLimits, judge
 from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
 from models.pose import Observations, observe
-from models.simulation.pose_offset import knock_trajectory
+from models.simulation.pose_offset import offset_trajectory
 from models.tracks.observations import of_tracks
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Trajectory, by_end
 from models.walking.config import FEWEST_WALKERS
-from studies.alarms.results import DAYS, AlarmResults, knocks_of
+from studies.alarms.results import DAYS, AlarmResults, offsets_of
 from studies.alarms.watch import first_alarm, watch_over
 from studies.protocol.cases import STILL, draw_case
 from studies.protocol.learned import Learned, learn_case
@@ -62,8 +62,8 @@ def judge_scene(
     wanted = round(years * DAYS * tracks_a_day * groups_a_track)
     walked = still[drawn_blocks(rng, len(still), wanted)]
     delays = []
-    for asked, knock in knocks_of(angles_deg, rng):
-        moved = knock.apply(scene.true_pose)
+    for delay, offset in offsets_of(angles_deg, rng):
+        moved = offset.apply(scene.true_pose)
         seen = _seen(scene, case.seen, moved)
         apart = watch.apart(score_groups(seen, watch.usual))
         if len(apart):
@@ -71,7 +71,7 @@ def judge_scene(
             drawn = (apart[drawn_blocks(rng, len(apart), _LONGEST)] for _ in range(_DRAWS))
             tracks = seen.tracks / len(apart)
             delays += [
-                replace(asked, tracks=min(by_pose, first_alarm(watch, one, tracks)))
+                replace(delay, tracks=min(by_pose, first_alarm(watch, one, tracks)))
                 for one in drawn
             ]
     return AlarmResults(
@@ -113,7 +113,7 @@ def _pose_excess(learned: Learned, seen: Observations, limits: DriftLimits) -> f
 
 def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Observations:
     knocked = (
-        knock_trajectory(track, scene.intrinsics, scene.true_pose, moved) for track in tracks
+        offset_trajectory(track, scene.intrinsics, scene.true_pose, moved) for track in tracks
     )
     kept = [track for track in knocked if track is not None and track.long_enough]
     return observe(by_end(kept), scene.intrinsics, scene.true_pose)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import RUN, DriftChart, Ratios, ratios_of, trace
+from models.monitoring.chart import DriftChart, Ratios, ratios_of, trace
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import GroupScores, Usual
 from models.pose import CameraSite
 from studies.alarms.results import DAYS
@@ -24,7 +25,7 @@ class Watch:
     level: float
 
     def apart(self, scores: GroupScores) -> Array:
-        """How far walking groups (P, 14) are from what is usual."""
+        """Differences of walking groups (P, 14) from what is usual."""
         return self.chart.bounded(scores.values) - self.chart.mean
 
     def alarms(self, apart: Array) -> list[int]:

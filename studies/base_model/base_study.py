@@ -1,4 +1,4 @@
-"""What the base model is worth: alone, beside the joint and the fused pose, and as a factor of it.
+"""Study of the base model: alone, beside the joint and the fused pose, and as a factor of it.
 
 By time, as `protocol --tables time`: the earlier people are the reference, the camera is
 moved, the later ones walk before it; or by random halves of the people. Cases of one window share
@@ -22,10 +22,9 @@ from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.tracks.scenes import Scene
-from studies.protocol.base_runs import base_model
 from studies.protocol.cases import RANGES, Answer, ProtocolCase, draw_case
+from studies.protocol.estimators import base_model, joint
 from studies.protocol.flow_runs import fused
-from studies.protocol.joint_runs import joint
 from studies.protocol.learned import learn_case
 from studies.protocol.partings import HALVES_IN_TIME, Parting, Split
 from studies.recordings import load_recording
@@ -115,8 +114,8 @@ def _judged(
     )
 
 
-def told(outcomes: Sequence[BaseOutcome]) -> Iterator[str]:
-    """Lines: each way's errors; windows better and worse than fused; whether agreement tells."""
+def report_lines(outcomes: Sequence[BaseOutcome]) -> Iterator[str]:
+    """Lines: each way's errors; windows better and worse than fused; the worth of agreement."""
     ways = list(dict.fromkeys(outcome.way for outcome in outcomes))
     for way in ways:
         own = [outcome for outcome in outcomes if outcome.way == way]
@@ -168,4 +167,4 @@ def main(arguments: Sequence[str]) -> None:
                 knocks = chosen.knocks.split(",")
                 outcomes += scene_outcomes(scene, int(seed), knocks, chosen.split)
             sys.stderr.write(f"{scene.scene_id} is done\n")
-    sys.stdout.write("\n".join(told(outcomes)) + "\n")
+    sys.stdout.write("\n".join(report_lines(outcomes)) + "\n")

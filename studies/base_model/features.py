@@ -1,4 +1,4 @@
-"""What the base model reads of a segment of a walk: place, course, pace, as all cameras see them.
+"""Features of a segment of a walk for the base model: place, course, pace, alike for all cameras.
 
 Points of the ground are in heights of the pose that is looked from, paces in assumed walking
 speeds, noise in angles: no pixel, metre or focal length is left. Numpy only.
@@ -7,7 +7,6 @@ speeds, noise in angles: no pixel, metre or focal length is left. Numpy only.
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import level_from_camera
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from studies.base_model.segments import LONGEST_S, NODES, Segments
@@ -40,7 +39,7 @@ def segment_features(
     if not len(segments):
         return np.empty((0, FEATURES))
     rays, _ = intrinsics.rays(segments.nodes_uv)
-    level = np.nan_to_num(rays) @ level_from_camera(pose).T
+    level = np.nan_to_num(rays) @ pose.level_from_camera.T
     level = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ground = level[..., :2] / _safe(-level[..., 2:])  # (B, 5, 2) in heights of the pose
     scale = pose.height_m / prior.height_m
@@ -121,7 +120,7 @@ def _safe(below: Array) -> Array:
 
 
 def walking(features: Array) -> Mask:
-    """Which segments (B,) show people who walk: none who stand, dawdle, run or stray.
+    """Mask of segments (B,) of people who walk: none who stand, dawdle, run or stray.
 
     They go straight, and as fast as most of the brisker half, give or take.
     """

@@ -46,7 +46,7 @@ class SetNetwork(nn.Module):
         self.segment = _perceptron(FEATURES, _WIDTH, _WIDTH, _CODE)
         self.asks = nn.Linear(_CODE, _CODE)
         self.tells = nn.Linear(_CODE, 2 * _CODE)
-        self.nobody = nn.Parameter(torch.zeros(_CODE))  # what is asked where nobody is alike
+        self.nobody = nn.Parameter(torch.zeros(_CODE))  # the key where nobody is alike
         self.within = _perceptron(2 * _CODE + 2 * _HEADS, _WIDTH, _WIDTH, _WIDTH)
         self.equations = nn.Linear(_WIDTH, 4 + 2 * _HEADS)
         self.believed = nn.Parameter(torch.tensor([2.0, 2.0, 1.0]))  # log precision of no offset
@@ -66,9 +66,9 @@ class SetNetwork(nn.Module):
             reference_mask: (S, V), all 0 where there is no reference.
         """
         code, known = self._code(seen), self._code(reference)
-        told, paces = self._attend(code, known, reference, reference_mask)
-        beside, figures = self._solve(seen, seen_mask, code, told, paces)
-        here, here_figures = self._solve(seen, seen_mask, code, 0 * told, 0 * paces)
+        context, paces = self._attend(code, known, reference, reference_mask)
+        beside, figures = self._solve(seen, seen_mask, code, context, paces)
+        here, here_figures = self._solve(seen, seen_mask, code, 0 * context, 0 * paces)
         nothing = known.new_zeros(*known.shape[:2], _HEADS, 2)
         there, there_figures = self._solve(reference, reference_mask, known, 0 * known, nothing)
         out = self.together(
@@ -96,31 +96,33 @@ class SetNetwork(nn.Module):
     def _attend(
         self, code: Tensor, known: Tensor, reference: Tensor, mask: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """What segments (S, W, C) are told by those of the reference like them, and their paces.
+        """Attend from segments (S, W, C) to those of the reference like them, and to their paces.
 
         Paces (S, W, heads, 2) are usual log paces and their change; 0 where nobody is like them.
         """
         sets, segments, others = len(code), code.shape[1], known.shape[1]
         apart = _CODE // _HEADS
-        asked = self.asks(code).view(sets, segments, _HEADS, apart)
+        query = self.asks(code).view(sets, segments, _HEADS, apart)
         keys, values = self.tells(known).view(sets, others, 2, _HEADS, apart).unbind(2)
-        alike = torch.einsum("swhc,svhc->shwv", asked, keys) / apart**0.5
+        alike = torch.einsum("swhc,svhc->shwv", query, keys) / apart**0.5
         alike = alike.masked_fill(mask[:, None, None] == 0, -1e9)
-        nobody = (asked * self.nobody.view(_HEADS, apart)).sum(-1).transpose(1, 2)[..., None]
+        nobody = (query * self.nobody.view(_HEADS, apart)).sum(-1).transpose(1, 2)[..., None]
         share = torch.softmax(torch.cat([alike, nobody], dim=-1), dim=-1)[..., :-1]
-        told = torch.einsum("shwv,svhc->swhc", share, values).flatten(-2)
+        context = torch.einsum("shwv,svhc->swhc", share, values).flatten(-2)
         paces = -torch.stack([reference[..., SHORT], reference[..., SHORTER]], dim=-1)
-        return told, torch.einsum("shwv,svr->swhr", share, paces)
+        return context, torch.einsum("shwv,svr->swhr", share, paces)
 
     def _solve(
-        self, features: Tensor, mask: Tensor, code: Tensor, told: Tensor, paces: Tensor
+        self, features: Tensor, mask: Tensor, code: Tensor, context: Tensor, paces: Tensor
     ) -> tuple[Tensor, Tensor]:
         """The offset (S, 3) of the equations, and what sums them up (S, 2 C + 12)."""
-        read = nn.functional.silu(self.within(torch.cat([code, told, paces.flatten(-2)], dim=-1)))
-        said = self.equations(read)
-        shares = torch.softmax(said[..., 4:].unflatten(-1, (2, _HEADS)), dim=-1)
-        usual = (shares * paces.transpose(-1, -2)).sum(-1) + _AMISS * said[..., 2:4]
-        weight = torch.exp(said[..., :2].clamp(_LEAST_LOG_WEIGHT, _MOST_LOG_WEIGHT))
+        read = nn.functional.silu(
+            self.within(torch.cat([code, context, paces.flatten(-2)], dim=-1))
+        )
+        terms = self.equations(read)
+        shares = torch.softmax(terms[..., 4:].unflatten(-1, (2, _HEADS)), dim=-1)
+        usual = (shares * paces.transpose(-1, -2)).sum(-1) + _AMISS * terms[..., 2:4]
+        weight = torch.exp(terms[..., :2].clamp(_LEAST_LOG_WEIGHT, _MOST_LOG_WEIGHT))
         weight = weight * mask[..., None]
         ones = torch.ones_like(features[..., :1])
         rows = torch.stack(

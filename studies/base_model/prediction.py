@@ -1,11 +1,10 @@
-"""What the base model says of the tracks of a camera, beside those of its reference."""
+"""Prediction of the base model for a camera's tracks, beside those of its reference."""
 
 import numpy as np
 import torch
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import moved_by, offset_between
 from models.geometry.plane_parameters import PlaneEstimate, plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -13,6 +12,7 @@ from models.regression.averaging import FEWEST_TRACKS
 from models.simulation.walkers import WalkConfig
 from studies.base_model.features import FEATURES, segment_features, walking
 from studies.base_model.network import SetNetwork
+from studies.base_model.offsets import moved_by, offset_between
 from studies.base_model.segments import Segments
 
 _ROUNDS = 4  # looks, each from where the last one ended

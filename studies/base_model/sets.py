@@ -7,12 +7,12 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import moved_by, offset_between
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.simulation.poses import PoseSet
 from models.simulation.walkers import WalkConfig
 from studies.base_model.features import FEATURES, segment_features, walking
+from studies.base_model.offsets import moved_by, offset_between
 from studies.base_model.segments import Segments, segments_of_walks
 from studies.simulation.cameras import CameraRange, draw_camera
 from studies.simulation.crowds import FlowConfig
@@ -25,7 +25,7 @@ _POINTS = 11  # of a segment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteRange:
-    """What sites before a camera, and moves of it, are drawn from.
+    """Ranges that sites before a camera, and moves of it, are drawn from.
 
     A camera moves by up to `angle_rad` in tilt and roll and `log_height`, half of the time by
     `near_share` of it, on `panned_share` of the cameras in heading by N(0, `pan_sd_rad`), too. The

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from models.errors import CheckpointError
-from models.serialization import Format, pack, unpack
+from models.serialization import Format, from_bytes, to_bytes
 from studies.base_model.network import SetNetwork
 
 SHIPPED = Path(__file__).with_name("base_model.safetensors.gz")
@@ -27,7 +27,7 @@ def load_base_model(path: Path = SHIPPED) -> SetNetwork:
         data = path.read_bytes()
     except OSError as error:
         raise CheckpointError(f"base model: {error}") from error
-    arrays = unpack(_FORMAT, data)
+    arrays = from_bytes(_FORMAT, data)
     network = SetNetwork()
     try:
         network.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()})
@@ -40,12 +40,12 @@ def load_base_model(path: Path = SHIPPED) -> SetNetwork:
 def store_base_model(network: SetNetwork, path: Path, making: Mapping[str, Any]) -> None:
     """Write the weights, and beside them as JSON how they were made, with their SHA-256."""
     arrays = {name: np.asarray(value) for name, value in network.state_dict().items()}
-    data = pack(_FORMAT, arrays)
+    data = to_bytes(_FORMAT, arrays)
     path.write_bytes(data)
     record = {**making, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
     making_of(path).write_text(json.dumps(record, indent=2) + "\n")
 
 
 def making_of(path: Path) -> Path:
-    """Where it says how a file of weights was made."""
+    """Path of the record of how a file of weights was made."""
     return path.with_name("base_model.json")

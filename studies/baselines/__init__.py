@@ -1,1 +1,1 @@
-"""What others do, small and whole, to stand beside what is served. Nothing of it is served."""
+"""Baselines of others, small and whole, to stand beside what is served. Nothing is served."""

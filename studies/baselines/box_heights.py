@@ -26,7 +26,7 @@ _STEPS = np.array([0.02, 0.02, 0.002])  # degrees, degrees, log height: of secon
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statures:
-    """How tall people are taken to be, in metres."""
+    """Distribution of people's statures, in metres."""
 
     mean_m: float = 1.75
     sd_m: float = 0.1

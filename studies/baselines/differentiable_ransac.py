@@ -86,8 +86,8 @@ def hypotheses(
         drawn = _drawn_pose(world, rays, rng)
         if drawn is None:
             continue
-        rows, told = drawn
-        pose: Tensor = torch.from_numpy(told)
+        rows, values = drawn
+        pose: Tensor = torch.from_numpy(values)
         if coordinates.requires_grad:
             pose = _derived_pose(coordinates[rows], rays[rows])
         found.append(pose)
@@ -171,7 +171,7 @@ def _inliers(pose: Tensor, coordinates: Tensor, rays: Array) -> Tensor:
 
 
 def _misses(pose: Tensor, coordinates: Tensor, rays: Array) -> Tensor:
-    """How far beside its ray each point (N,) is seen, in focal lengths; far where it is behind."""
+    """Reprojection errors (N,) in focal lengths; large where a point is behind the camera."""
     seen = coordinates @ rotation_of(pose[:3]).T + pose[3:]
     depth = seen[:, 2].clamp(min=0.1)
     target = torch.from_numpy(rays).to(coordinates.dtype)

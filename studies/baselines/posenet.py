@@ -119,7 +119,7 @@ def read_windows(
 
 
 def parameters_of(network: nn.Module) -> int:
-    """How many numbers a network has learned."""
+    """Number of a network's parameters."""
     return sum(weights.numel() for weights in network.parameters())
 
 

@@ -101,8 +101,8 @@ def patches_of(intrinsics: Intrinsics, images: Images, poses: PoseSet) -> PatchS
     """Pictures with the places of their patches."""
     uv = patch_pixels(intrinsics, images)
     centre = poses.centre_m
-    asked = np.broadcast_to(uv, (len(images), *uv.shape))
-    ground, valid = ground_from_pixel(intrinsics, poses.rotation, centre, asked)
+    pixels = np.broadcast_to(uv, (len(images), *uv.shape))
+    ground, valid = ground_from_pixel(intrinsics, poses.rotation, centre, pixels)
     places = np.concatenate([ground - centre[:, None, :2], np.zeros((*valid.shape, 1))], axis=-1)
     near: Mask = valid & (np.linalg.norm(np.nan_to_num(places), axis=-1) < _FARTHEST_M)
     return PatchSet(
@@ -190,13 +190,13 @@ def pose_seen(
 
 
 def _places_off(network: SceneCoordinateNet, data: PatchSet, rows: npt.NDArray[np.int64]) -> Tensor:
-    """How far places are off, in metres, over the ground patches of some pictures."""
+    """Errors of places, in metres, over the ground patches of some pictures."""
     off = torch.linalg.vector_norm(network(data.images[rows]) - data.places_m[rows], dim=-1)
     mean: Tensor = off[data.on_ground[rows]].mean()
     return mean
 
 
 def mean_places_off(network: SceneCoordinateNet, data: PatchSet) -> float:
-    """How far places are off, in metres, over all ground patches."""
+    """Mean error of places, in metres, over all ground patches."""
     with torch.inference_mode():
         return float(_places_off(network, data, np.arange(len(data.images))))

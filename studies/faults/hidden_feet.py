@@ -26,7 +26,7 @@ _PASSING_M = (0.3, 0.9)  # of a person behind a cart, a child, a car that goes b
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thing:
-    """What hides feet: its place (2,) from the camera's foot, half its width and its height."""
+    """Object that hides feet: place (2,) from the camera's foot, half its width, and height."""
 
     place_m: Array
     half_width_m: float
@@ -74,7 +74,7 @@ def draw_things(view: View, size: float, seed: int) -> list[Thing]:
 
 
 def hidden_m(places: Array, thing: Thing, camera_m: float) -> Array:
-    """How much (N,) in metres of upright people at places (N, 2) a thing hides, 0 for none.
+    """Metres (N,) of upright people at places (N, 2) that a thing hides, 0 for none.
 
     Places are metres from the camera's foot, `camera_m` its height. A sight line over the upper
     edge of a thing at distance d and height h meets a person at distance D > d at the height
@@ -106,7 +106,7 @@ def jumps(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -> l
 
 
 def _passing_m(track: SceneTrack, size: float, seed: int) -> Array:
-    """How much (N,) in metres of a track's person something that passes hides, 0 for none."""
+    """Metres (N,) of a track's person that something that passes hides, 0 for none."""
     rng, time_s = own_rng(track.track_id, seed), track.trajectory.time_s
     cut = np.zeros(time_s.size)
     usual_s = (_PASSING_S[0] + _PASSING_S[1]) / 2 * (1 - size) / size if size > 0 else np.inf

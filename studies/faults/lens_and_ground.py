@@ -107,7 +107,7 @@ def wrong_principal_point(
 
 
 def _through(tracks: Sequence[SceneTrack], view: View, real: Intrinsics) -> list[SceneTrack]:
-    """What the real lens makes of the rays that the configured one has told."""
+    """Tracks as the real lens images the rays that the configured one has computed."""
     found = []
     for track in tracks:
         own = track.trajectory

@@ -74,7 +74,7 @@ def _instead(
 
 
 def _steadily(way: Way, speed_mps: float) -> Array:
-    """How far along (N,) somebody is at each interval who keeps a speed to the end of a way."""
+    """Distance (N,) at each interval of somebody who keeps a speed to the end of a way."""
     return np.asarray(np.arange(0.0, way.length_m, speed_mps * way.interval_s))
 
 

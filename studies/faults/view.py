@@ -1,4 +1,4 @@
-"""What an injector knows of a camera beside its tracks, and what several of them work out."""
+"""View of an injector: the camera beside its tracks, and what several injectors compute."""
 
 import zlib
 from collections.abc import Callable, Sequence
@@ -69,13 +69,13 @@ def own_rng(name: str, seed: int) -> np.random.Generator:
 
 
 def ground_of(track: SceneTrack, view: View) -> tuple[Array, Mask]:
-    """Where a track is on the ground (N, 2) in metres, and which points are (N,)."""
+    """Ground points (N, 2) of a track in metres, and which are valid (N,)."""
     pose = view.pose
     return ground_from_pixel(view.intrinsics, pose.rotation, pose.centre_m, track.trajectory.uv)
 
 
 def person_px(track: SceneTrack, view: View) -> Array:
-    """How tall (N,) in pixels somebody of 1.7 m is at each point; NaN where it is not known."""
+    """Height (N,) in pixels of somebody of 1.7 m at each point; NaN where it is not known."""
     ground, _ = ground_of(track, view)
     tall = np.full(len(ground), USUAL_STATURE_M)
     pose = view.pose

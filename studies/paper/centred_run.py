@@ -5,7 +5,7 @@ This is the paper's own experiment: the training range is centred on the truth.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,6 @@ from models.regression.averaging import (
     PoseEstimate,
     average_windows,
     averaged_estimate,
-    pose_of,
 )
 from models.regression.network import predict_windows
 from models.regression.recipe import TrainingPlan, plan_training
@@ -122,7 +121,7 @@ def averaged_of(
     plan: TrainingPlan,
     tracks: Sequence[Trajectory],
 ) -> PoseEstimate:
-    """What is said of tracks on average, of windows as long as those that were trained on.
+    """Mean prediction for tracks, of windows as long as those that were trained on.
 
     `predict` answers windows with heights (B,) in metres and unit quaternions wxyz (B, 4).
 
@@ -134,6 +133,16 @@ def averaged_of(
     height_m, quaternions = predict(windows)
     _, predictions = average_windows(height_m, quaternions, windows.owner_idx)
     return averaged_estimate(predictions, plan.seed)
+
+
+def pose_of(estimate: PoseEstimate, prior: CameraPose) -> CameraPose:
+    """The estimate as a pose; what is not identifiable (x, y, heading) is the prior pose's."""
+    return replace(
+        prior,
+        height_m=max(estimate.value.height_m, 1e-3),
+        tilt_rad=estimate.value.tilt_rad,
+        roll_rad=estimate.value.roll_rad,
+    )
 
 
 def whole_angle_deg(estimate: PoseEstimate, truth: CameraPose) -> float:

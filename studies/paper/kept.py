@@ -1,4 +1,4 @@
-"""What `paper` keeps: results of each part, of which code, and a manifest of them all."""
+"""Kept results of `paper`: of each part, of which code, and a manifest of them all."""
 
 import platform
 from collections.abc import Sequence
@@ -42,18 +42,18 @@ def results_of(rows: Sequence[dict[str, Any]]) -> list[PaperResult]:
 
 
 def is_begun(out: Path, name: str) -> bool:
-    """Whether a folder has results of a part."""
+    """True where a folder has results of a part."""
     return (out / f"{name}.jsonl").exists()
 
 
 def write_manifest(out: Path) -> None:
     """By what, on what and how long each part took, of all that the folder has."""
-    told = {}
+    parts = {}
     for name in PARTS:
         if not is_begun(out, name):
             continue
         kept, results = kept_results(out, name)
-        told[name] = {
+        parts[name] = {
             "heading": asdict(kept.heading),
             "cases": len(results),
             "seeds": sorted({each.case.seed for each in results}),
@@ -62,4 +62,4 @@ def write_manifest(out: Path) -> None:
             "seconds_a_case": fmean(each.seconds for each in results) if results else None,
         }
     versions = {name: version(name) for name in _VERSIONS} | {"python": platform.python_version()}
-    write_results(out / "manifest.json", versions=versions, parts=told)
+    write_results(out / "manifest.json", versions=versions, parts=parts)

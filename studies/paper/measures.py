@@ -1,4 +1,4 @@
-"""What every estimator of the paper's study is measured by: in the middle, and after knocks."""
+"""Measures of every estimator of the paper's study: in the middle, and after pose offsets."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -9,20 +9,20 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.rotation import Array
-from models.regression.averaging import PoseEstimate, pose_of
+from models.regression.averaging import PoseEstimate
 from models.regression.recipe import TrainingPlan, plan_training
 from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Windows, choose_step_s
 from studies.faults.catalogue import Fault
-from studies.paper.centred_run import averaged_of, whole_angle_deg
+from studies.paper.centred_run import averaged_of, pose_of, whole_angle_deg
 from studies.paper.part import Figures
 from studies.protocol.cases import (
     KNOCKED,
     STILL,
     Answer,
     Estimator,
-    KnockRange,
+    OffsetRange,
     Outcome,
     ProtocolCase,
     draw_case,
@@ -81,12 +81,12 @@ def errors_of(estimate: PoseEstimate, scene: Scene) -> tuple[float, float]:
 def outcomes_of(
     scene: Scene,
     estimator: Estimator,
-    knock_range: KnockRange,
+    offset_range: OffsetRange,
     seeds: Iterable[int] = range(KNOCKS),
     fault: Fault | None = None,
 ) -> list[Outcome]:
     """An estimator's answers to knocks of a scene's camera, beside the truth."""
-    cases = (draw_case(scene, seed, knock_range, fault=fault) for seed in seeds)
+    cases = (draw_case(scene, seed, offset_range, fault=fault) for seed in seeds)
     return [judge_answer(case, "", estimator(case), 0.0) for case in cases]
 
 
@@ -106,16 +106,16 @@ def still_figures(scene: Scene, estimator: Estimator) -> Figures:
 
 
 def knocked_figures(scene: Scene, estimator: Estimator) -> Figures:
-    """The middle errors of 12 knocks, and the slopes of what is told over what is true."""
+    """The middle errors of 12 pose offsets, and the slopes of what is found over what is true."""
     outcomes = outcomes_of(scene, estimator, KNOCKED)
     figures = {
         "knocked_share": median(each.height_error for each in outcomes),
         "knocked_deg": median(each.tilt_roll_error_deg for each in outcomes),
     }
-    true, told = (
+    true, found = (
         np.array([getattr(each, name) for each in outcomes]) for name in ("true_drift", "drift")
     )
     for axis, name in enumerate(("tilt", "roll", "height")):
-        slope, _ = slope_with_error(true[:, axis], told[:, axis])
+        slope, _ = slope_with_error(true[:, axis], found[:, axis])
         figures[f"slope_{name}"] = math.nan if slope is None else slope
     return figures

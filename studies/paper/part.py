@@ -22,7 +22,7 @@ _MADE_UP = "wildtrack"  # boxes there are projected cylinders of one size
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCase:
-    """What is run at once: a variant of a part's method on a scene, with a seed."""
+    """Unit of a run: a variant of a part's method on a scene, with a seed."""
 
     part: str
     scene: str

@@ -28,7 +28,7 @@ from studies.protocol.cases import (
     Estimator,
     ProtocolCase,
 )
-from studies.regressors.site_offset import without_offset
+from studies.protocol.regressors import without_offset
 
 _ALONE, _BESIDE = "cameratransform", "cameratransform, our reference's offset off"
 _VARIANTS = (_ALONE, _BESIDE, SERVED)

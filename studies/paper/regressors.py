@@ -157,7 +157,7 @@ def _trained(scene: Scene, plan: TrainingPlan, on_share: OnShare) -> Figures:
 
 
 def served_answer(case: ProtocolCase) -> Answer:
-    """What the service would serve, with all that a site's reference teaches it."""
+    """Answer that the service would serve, with all that a site's reference teaches it."""
     return fused(learn_case(case))
 
 

@@ -31,7 +31,7 @@ _ORDER = [CONSTANT, *VARIANTS, DEFAULT, SERVED]
 
 
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
-    """What is quick first; what takes a quarter of an hour for each seed last."""
+    """Cases, the quick first; what takes a quarter of an hour for each seed last."""
     left_open = [PAPERS_OWN] if PAPERS_OWN in scenes else []
     others = [scene for scene in scenes if scene not in left_open]
     rows: list[tuple[str, Sequence[str], Sequence[int]]]
@@ -71,7 +71,7 @@ def _table(results: Sequence[PaperResult]) -> str:
 
 
 def _row(scene: str, variant: str, found: Sequence[dict[str, float]]) -> list[str]:
-    def told(name: str, digits: int) -> str:
+    def figure(name: str, digits: int) -> str:
         values = [each[name] for each in found if name in each and math.isfinite(each[name])]
         if not values:
             return ""
@@ -82,7 +82,7 @@ def _row(scene: str, variant: str, found: Sequence[dict[str, float]]) -> list[st
         return f"{middle} ({least} to {most})" if len(values) > 1 else middle
 
     def pair(prefix: str) -> str:
-        both = [told(f"{prefix}_height_m", 2), told(f"{prefix}_deg", 2)]
+        both = [figure(f"{prefix}_height_m", 2), figure(f"{prefix}_deg", 2)]
         return ", ".join(both) if all(both) else ""
 
     share = mean(each["knocked_share"] for each in found)
@@ -94,10 +94,10 @@ def _row(scene: str, variant: str, found: Sequence[dict[str, float]]) -> list[st
         _PUBLISHED.get(scene, "") if variant == PAPER else "",
         pair("by_held_out"),
         pair("by_test"),
-        f"{100 * share:.1f}, {told('knocked_deg', 2)}",
-        ", ".join(told(f"slope_{name}", 2) or "none" for name in ("tilt", "roll", "height")),
+        f"{100 * share:.1f}, {figure('knocked_deg', 2)}",
+        ", ".join(figure(f"slope_{name}", 2) or "none" for name in ("tilt", "roll", "height")),
         pair("held_out"),
-        told("training_cpu_s", 0),
+        figure("training_cpu_s", 0),
     ]
 
 

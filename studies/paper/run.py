@@ -136,12 +136,12 @@ def _run(
 ) -> PaperResult | str:
     """The result of a case, or what it failed with: others go on."""
     torch.set_num_threads(1)
-    begun = last_told = time.monotonic()
+    begun = last_shown = time.monotonic()
 
     def report(share: float) -> None:
-        nonlocal last_told
-        if time.monotonic() - last_told > 1:
-            shares[number], last_told = share, time.monotonic()
+        nonlocal last_shown
+        if time.monotonic() - last_shown > 1:
+            shares[number], last_shown = share, time.monotonic()
 
     try:
         figures = PARTS[case.part].run(case, folder, report)

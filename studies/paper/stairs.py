@@ -64,7 +64,7 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
 
 
 def _faults(scene: Scene) -> dict[str, Fault | None]:
-    """What is wrong with the ground, by `_GROUNDS`."""
+    """Faults of the ground, by `_GROUNDS`."""
     flight_m = min(_HIGHEST_M, _HIGHEST_SHARE * scene.true_pose.height_m)
     faults = (
         None,

@@ -2,7 +2,7 @@
 
 The paper's error is a bowl with its floor where people really walk; where it was not, a frame rate
 was wrong. So the same is done with a clock that is 2.5 times too slow, and what the service says of
-either clock is told beside it.
+either clock stands beside it.
 """
 
 from collections.abc import Sequence
@@ -43,10 +43,10 @@ _AT = " at "
 def _cases(scenes: Sequence[str]) -> list[PaperCase]:
     """The quick recipe first, the paper's own scene first; the paper's recipe takes a night."""
     ordered = own_first(scenes)
-    told = [(SERVED, scene) for scene in ordered] + [(f"{SERVED}{_SLOW}", ordered[0])]
+    rows = [(SERVED, scene) for scene in ordered] + [(f"{SERVED}{_SLOW}", ordered[0])]
     return [
         PaperCase(part="speed-sweep", scene=scene, variant=variant, seed=0)
-        for variant, scene in told
+        for variant, scene in rows
     ] + [
         PaperCase(part="speed-sweep", scene=scene, variant=f"{recipe}{_AT}{speed:g} m/s", seed=0)
         for recipe in RECIPES
@@ -83,7 +83,7 @@ def _made_by(case: PaperCase) -> tuple[str, ...]:
 
 
 def _by_a_slow_clock(scene: Scene) -> Scene:
-    """The scene as told by a clock by which everything happens in less time."""
+    """The scene by a clock by which everything happens in less time."""
     tracks = []
     for track in scene.tracks:
         own = track.trajectory
@@ -93,9 +93,9 @@ def _by_a_slow_clock(scene: Scene) -> Scene:
 
 
 def _said_of_the_clock(scene: Scene) -> Figures:
-    """How fast the service takes people to be, and whether it says that this cannot be."""
-    told = (track.trajectory for track in scene.tracks)
-    tracks = by_end(each for each in told if each.long_enough)
+    """Walking speed that the service finds, and its reasons of the clock."""
+    every = (track.trajectory for track in scene.tracks)
+    tracks = by_end(each for each in every if each.long_enough)
     lens, pose = scene.intrinsics, scene.true_pose
     site = learn_site(observe(tracks, lens, pose), lens, pose, chart=False).speed_reference
     why = site.implausible

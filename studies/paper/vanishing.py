@@ -79,7 +79,7 @@ def _run(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
 
 
 def _way_seen(scene: Scene, track: Trajectory) -> float:
-    """How far apart in the picture a track begins and ends, where a head is known; in radians."""
+    """Angle in the picture between a track's begin and end, where a head is known; in radians."""
     feet, _ = rays_of(scene.intrinsics, track)
     return math.acos(min(1.0, float(feet[0] @ feet[-1]))) if len(feet) else 0.0
 
@@ -116,8 +116,8 @@ def _table(results: Sequence[PaperResult]) -> str:
 def _walkers(found: Sequence[Figures], ending: str) -> str:
     """Each walker's figure, the median of the seeds."""
     names = [f"walker_{number}{ending}" for number in range(1, _WALKERS + 1)]
-    told = [[each[name] for each in found if name in each] for name in names]
-    return ", ".join(f"{median(values):.1f}" if values else "none" for values in told)
+    columns = [[each[name] for each in found if name in each] for name in names]
+    return ", ".join(f"{median(values):.1f}" if values else "none" for values in columns)
 
 
 VANISHING_POINTS = PaperPart(

@@ -1,1 +1,1 @@
-"""Studies of simulated sites, and the paper's own experiment."""
+"""Studies of path density maps and of heads, on simulated sites."""

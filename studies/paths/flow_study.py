@@ -8,19 +8,23 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
 from models.errors import DegenerateGeometryError
+from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.paths.reference import candidate_of
 from models.quantiles import Z90
 from models.reasons import Reason
-from models.simulation.pose_offset import Knock
-from models.simulation.simulated_site import draw_new_lane, walk_changed
+from models.simulation.pose_offset import PoseOffset
+from models.simulation.simulated_site import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations, of_tracks
-from studies.paths.simulated_site import (
+from models.tracks.trajectory import Trajectory
+from studies.protocol.cases import angle_deg, pose_of_plane_parameters
+from studies.simulation.simulated_site import (
     LearnedSite,
     SimulatedSite,
     draw_simulated_site,
@@ -28,7 +32,6 @@ from studies.paths.simulated_site import (
     observe_feet,
     seen_from,
 )
-from studies.protocol.cases import angle_deg, pose_of_plane_parameters
 
 REFERENCE_TRACKS = 2000
 KNOCKED_TRACKS = (25, 100, 400)
@@ -36,10 +39,11 @@ CHANGED_TRACKS = (200, 400)
 _KNOCK_RAD = math.radians(8)
 _KNOCK_LOG_HEIGHT = 0.15
 _MOST_DRAWS = 20
+_PLACES_DRAWN = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KnockedResult:
+class OffsetResult:
     """The fused pose after a knock, from so many tracks.
 
     `errors` are of tilt, roll, heading in degrees and, last, of the log height; `covered` says
@@ -58,7 +62,7 @@ class ChangedResult:
 
     Angles to the truth and to the pose by as many tracks on the old paths, how far these were
     from the truth, and the log of the height against the truth's. `reason` is what the estimate
-    says, `registered` whether the map had a part in it, `covered` is as in `KnockedResult`.
+    says, `registered` whether the map had a part in it, `covered` is as in `OffsetResult`.
     """
 
     tracks: int
@@ -76,8 +80,8 @@ class SiteResults:
     """All of one site, and the seconds that each part took."""
 
     site: int
-    knock: Knock
-    knocked: tuple[KnockedResult, ...]
+    knock: PoseOffset
+    knocked: tuple[OffsetResult, ...]
     changed: tuple[ChangedResult, ...]
     simulated_s: float
     learned_s: float
@@ -125,12 +129,12 @@ def study_site(
 
 def _knocked(
     simulated: SimulatedSite, count: int, rng: np.random.Generator
-) -> tuple[Knock, Observations]:
+) -> tuple[PoseOffset, Observations]:
     """A knock after which the people are still seen, and what is seen of them."""
     for _ in range(_MOST_DRAWS):
         tilt, roll, pan = rng.uniform(-_KNOCK_RAD, _KNOCK_RAD, 3)
         log_height = rng.uniform(-_KNOCK_LOG_HEIGHT, _KNOCK_LOG_HEIGHT)
-        knock = Knock(
+        knock = PoseOffset(
             tilt_rad=float(tilt),
             roll_rad=float(roll),
             log_height=float(log_height),
@@ -156,14 +160,75 @@ def _changed(simulated: SimulatedSite, count: int, rng: np.random.Generator) -> 
     raise DegenerateGeometryError(f"new lane: none of {_MOST_DRAWS} is seen")
 
 
+def draw_new_lane(
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    lanes: Sequence[Lane],
+    config: SiteConfig,
+    rng: np.random.Generator,
+) -> Lane:
+    """A lane that people of a site take when their own is closed, off the lanes there are.
+
+    It passes the visible place that is farthest from all lanes, of a few that are drawn, and its
+    direction is midway between two of theirs.
+
+    Raises:
+        DegenerateGeometryError: the pose sees no ground within reach.
+    """
+    places = np.array(
+        [
+            lane.point
+            for _ in range(_PLACES_DRAWN)
+            for lane in draw_lanes(intrinsics, pose, config, rng)
+        ]
+    )
+    apart = np.min([_aside_m(lane, places) for lane in lanes], axis=0)
+    angles = np.sort([math.atan2(lane.direction[1], lane.direction[0]) % math.pi for lane in lanes])
+    gaps = np.diff(np.append(angles, angles[0] + math.pi))
+    angle = angles[gaps.argmax()] + gaps.max() / 2
+    return Lane(
+        point=places[apart.argmax()], direction=np.array([math.cos(angle), math.sin(angle)])
+    )
+
+
+def walk_changed(
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    lanes: Sequence[Lane],
+    new_lane: Lane,
+    config: SiteConfig,
+    count: int,
+    rng: np.random.Generator,
+) -> list[Trajectory]:
+    """Tracks as of `walk_site`, in time order, of which every other walks a new lane.
+
+    Raises:
+        DegenerateGeometryError: hardly any walk is seen from the pose.
+    """
+    kept = walk_site(intrinsics, pose, lanes, config, count - count // 2, rng)
+    new = walk_site(intrinsics, pose, [new_lane], config, count // 2, rng)
+    return [
+        replace(track, time_s=track.time_s - track.time_s[0] + BETWEEN_S * number)
+        for number, track in enumerate(
+            track for pair in zip_longest(kept, new) for track in pair if track is not None
+        )
+    ]
+
+
+def _aside_m(lane: Lane, places: Array) -> Array:
+    """Distances of places (N, 2) from a lane's middle, in metres."""
+    normal = np.array([-lane.direction[1], lane.direction[0]])
+    return np.asarray(np.abs((places - lane.point) @ normal))
+
+
 def _first(observations: Observations, count: int) -> Observations:
     return of_tracks(observations, np.arange(min(count, observations.tracks)))
 
 
-def _judge_knock(learned: LearnedSite, truth: CameraPose, tracks: Observations) -> KnockedResult:
+def _judge_knock(learned: LearnedSite, truth: CameraPose, tracks: Observations) -> OffsetResult:
     found = learned.fused(tracks)
     errors = _errors(found.values, truth)
-    return KnockedResult(
+    return OffsetResult(
         tracks=tracks.tracks,
         errors=_printed(errors),
         covered=_covered(errors, found.covariance),

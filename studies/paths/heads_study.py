@@ -1,4 +1,4 @@
-"""What heads are worth: knocked cameras with and without, and with heads that nobody measured.
+"""Study of heads: offset cameras with and without, and with heads that nobody measured.
 
 Simulated street cameras, and the feet of recorded scenes (halves of people, as in the protocol)
 under simulated heads: a jitter of 3 % of the stature, a lean of each person's own, people who lean
@@ -22,14 +22,14 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.pose import learn_site, observe
 from models.quantiles import Z90
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import walk_site
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory, by_end
-from studies.paths.simulated_site import draw_simulated_site
 from studies.protocol.cases import PANNED, ProtocolCase, angle_deg, draw_case
 from studies.protocol.served import served_pose
 from studies.simulation.heads import HeadConfig, with_box_heads, with_heads
+from studies.simulation.simulated_site import draw_simulated_site
 
 WAYS = ("feet", "heads", "columns")
 _HEADS = HeadConfig(forward_rad=math.radians(3), bias_rad=math.radians(1))
@@ -68,12 +68,12 @@ def head_outcomes(case: ProtocolCase) -> Iterator[HeadOutcome]:
         values = found.fused.values
         error = values[:3] - plane_parameters_of(case.true_pose)
         sd = np.sqrt(np.diag(found.fused.covariance))[:3]
-        told = replace(case.true_pose, tilt_rad=float(values[0]), roll_rad=float(values[1]))
+        pose = replace(case.true_pose, tilt_rad=float(values[0]), roll_rad=float(values[1]))
         yield HeadOutcome(
             place=case.scene_id,
             way=way,
             error=(math.degrees(error[0]), math.degrees(error[1]), float(error[2])),
-            angle_deg=angle_deg(told, case.true_pose),
+            angle_deg=angle_deg(pose, case.true_pose),
             covered=tuple((np.abs(error) <= Z90 * sd).tolist()),
             used=found.joint.heads is not None,
         )
@@ -84,7 +84,7 @@ def simulated_case(seed: int) -> ProtocolCase:
     rng = np.random.default_rng(seed)
     simulated = draw_simulated_site(rng)
     turns = np.radians(rng.uniform(-8, 8, 3))
-    true = Knock(
+    true = PoseOffset(
         tilt_rad=turns[0],
         roll_rad=turns[1],
         heading_rad=turns[2],
@@ -122,7 +122,7 @@ def _head_v(track: Trajectory) -> Array | None:
     return None if track.head_uv is None else track.head_uv[:, 1]
 
 
-def _told(outcomes: Sequence[HeadOutcome]) -> Iterator[str]:
+def _report_lines(outcomes: Sequence[HeadOutcome]) -> Iterator[str]:
     for place in sorted({outcome.place for outcome in outcomes}):
         for way in WAYS:
             each = [one for one in outcomes if (one.place, one.way) == (place, way)]
@@ -151,4 +151,4 @@ def main(arguments: Sequence[str]) -> None:
         drawn = (draw_case(scene, seed, PANNED) for seed in range(chosen.seeds))
         cases += [case for case in drawn if len(case.seen) >= _LEAST_SEEN]
     outcomes = [outcome for case in cases for outcome in head_outcomes(case)]
-    sys.stdout.write("\n".join(_told(outcomes)) + "\n")
+    sys.stdout.write("\n".join(_report_lines(outcomes)) + "\n")

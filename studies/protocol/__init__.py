@@ -1,1 +1,1 @@
-"""The protocol of virtual knocks: cases, estimators, outcomes, plots."""
+"""The protocol of virtual offsets: cases, estimators, outcomes, plots."""

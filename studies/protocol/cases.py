@@ -1,4 +1,4 @@
-"""The virtual knock: real tracks of a still camera, parted, moved and given to an estimator."""
+"""The virtual offset: real tracks of a still camera, parted, moved and given to an estimator."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from models.geometry.plane_parameters import PLANE_PARAMETERS, plane_parameters_
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory, by_end
 from studies.faults.catalogue import Fault
@@ -27,8 +27,8 @@ _UNKNOWN_SD = (math.radians(10), math.radians(10), 0.3)  # where there are too f
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KnockRange:
-    """How far a knock may go either way: uniform in angles and in the log of the height."""
+class OffsetRange:
+    """Largest pose offset either way: uniform in angles and in the log of the height."""
 
     tilt_rad: float = 0.0
     roll_rad: float = 0.0
@@ -37,9 +37,9 @@ class KnockRange:
 
 
 _FAR, _HARD = math.radians(8), math.radians(15)
-STILL = KnockRange()
-KNOCKED = KnockRange(tilt_rad=_FAR, roll_rad=_FAR, log_height=0.15)
-HARD = KnockRange(tilt_rad=_HARD, roll_rad=_HARD, log_height=0.35)
+STILL = OffsetRange()
+KNOCKED = OffsetRange(tilt_rad=_FAR, roll_rad=_FAR, log_height=0.15)
+HARD = OffsetRange(tilt_rad=_HARD, roll_rad=_HARD, log_height=0.35)
 PANNED = replace(KNOCKED, heading_rad=_FAR)
 HARD_PANNED = replace(HARD, heading_rad=math.radians(20))
 RANGES = {
@@ -48,18 +48,18 @@ RANGES = {
     "hard": HARD,
     "pan": PANNED,
     "hard-pan": HARD_PANNED,
-    "tilt-alone": KnockRange(tilt_rad=_FAR),
-    "roll-alone": KnockRange(roll_rad=_FAR),
-    "height-alone": KnockRange(log_height=0.15),
-    "pan-alone": KnockRange(heading_rad=_FAR),
+    "tilt-alone": OffsetRange(tilt_rad=_FAR),
+    "roll-alone": OffsetRange(roll_rad=_FAR),
+    "height-alone": OffsetRange(log_height=0.15),
+    "pan-alone": OffsetRange(heading_rad=_FAR),
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProtocolCase:
-    """What the service would see: tracks at the prior pose, then tracks after a knock.
+    """Case as the service would see it: tracks at the prior pose, then tracks after a pose offset.
 
-    `prior_pose` is the scene's true pose; `true_pose` where the camera is after the knock.
+    `prior_pose` is the scene's true pose; `true_pose` where the camera is after the offset.
     """
 
     scene_id: str
@@ -73,7 +73,7 @@ class ProtocolCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """What an estimator says: tilt, roll and log height (3,), their covariance (3, 3).
+    """Answer of an estimator: tilt, roll and log height (3,), their covariance (3, 3).
 
     `identifiable` names those of the three that it says the tracks determine. `heading_rad` and its
     standard deviation are what it says of the heading; None is the prior's.
@@ -94,7 +94,7 @@ Estimator = Callable[[ProtocolCase], Answer]
 class Outcome:
     """One case of one estimator. Triples are tilt and roll in degrees and log height.
 
-    `tracks` were seen after the knock, of which `used` gave the estimator something to go by. The
+    `tracks` were seen after the offset, of which `used` gave the estimator something to go by. The
     angle error is that of the whole rotation, heading included; `tilt_roll_error_deg` is what it
     would be were the heading right. `heading_error_deg` and whether its interval `heading_covered`
     the truth are None for an estimator that says nothing of it. `seconds` are those of the answer,
@@ -123,32 +123,32 @@ class Outcome:
 def draw_case(
     scene: Scene,
     seed: int,
-    knock_range: KnockRange,
+    offset_range: OffsetRange,
     parting: Parting = HALVES_OF_PEOPLE,
     fault: Fault | None = None,
 ) -> ProtocolCase:
-    """Part a scene's people in two and knock the camera before the second.
+    """Part a scene's people in two and offset the camera before the second.
 
     The protocol of `docs/results/protocol.md`. The same scene and seed give the same parts
-    and, up to the range, the same direction of the knock, however they are parted.
+    and, up to the range, the same direction of the offset, however they are parted.
 
     Args:
         scene: whose people.
-        seed: of the parts, the knock and the fault.
-        knock_range: how far the knock may go.
-        parting: who is the reference, and who comes after the knock.
-        fault: what is wrong with the tracks, before the knock too unless it sets in later.
+        seed: of the parts, the offset and the fault.
+        offset_range: how far the offset may go.
+        parting: who is the reference, and who comes after the offset.
+        fault: what is wrong with the tracks, before the offset too unless it sets in later.
     """
     rng = np.random.default_rng(seed)
     parts = part_people(scene, parting, rng)
-    tilt, roll = rng.uniform(-1, 1, 2) * (knock_range.tilt_rad, knock_range.roll_rad)
-    knock = Knock(
+    tilt, roll = rng.uniform(-1, 1, 2) * (offset_range.tilt_rad, offset_range.roll_rad)
+    offset = PoseOffset(
         tilt_rad=tilt,
         roll_rad=roll,
-        log_height=rng.uniform(-1, 1) * knock_range.log_height,
-        heading_rad=rng.uniform(-1, 1) * knock_range.heading_rad,
+        log_height=rng.uniform(-1, 1) * offset_range.log_height,
+        heading_rad=rng.uniform(-1, 1) * offset_range.heading_rad,
     )
-    still, knocked = scene.true_pose, knock.apply(scene.true_pose)
+    still, moved = scene.true_pose, offset.apply(scene.true_pose)
     begin = rng.uniform() if parting.seen_tracks is not None else 0.0
     reference: Sequence[SceneTrack] = first_seen(
         scene, parts.reference, still if scene.beyond_picture else None, parting.reference_tracks
@@ -156,17 +156,17 @@ def draw_case(
     later = parts.later
     if parting.seen_tracks is not None:
         later = later[int(begin * max(len(later) - parting.seen_tracks, 0)) :]
-    seen: Sequence[SceneTrack] = first_seen(scene, later, knocked, parting.seen_tracks)
+    seen: Sequence[SceneTrack] = first_seen(scene, later, moved, parting.seen_tracks)
     if fault is not None:
         if not fault.later:
             reference = fault.inject(reference, view_of(scene), seed)
-        seen = fault.inject(seen, view_of(scene, knocked), seed)
+        seen = fault.inject(seen, view_of(scene, moved), seed)
     return ProtocolCase(
         scene_id=scene.scene_id,
         seed=seed,
         intrinsics=scene.intrinsics,
         prior_pose=still,
-        true_pose=knocked,
+        true_pose=moved,
         reference=_taken(reference),
         seen=_taken(seen),
     )
@@ -234,7 +234,7 @@ def pose_of_plane_parameters(numbers: Array, prior: CameraPose) -> CameraPose:
 
 
 def _taken(tracks: Sequence[SceneTrack]) -> tuple[Trajectory, ...]:
-    """What the service takes, in the order that trackers post: as the tracks end."""
+    """Trajectories that the service takes, in the order that trackers post: as the tracks end."""
     return tuple(by_end(t.trajectory for t in tracks if t.trajectory.long_enough))
 
 

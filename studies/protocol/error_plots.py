@@ -14,10 +14,10 @@ from studies.protocol.cases import (
     draw_case,
     pose_of_plane_parameters,
 )
+from studies.protocol.estimators import joint, track_errors
 from studies.protocol.flow_curves import CurvePoint, flow_errors
 from studies.protocol.flow_plots import plot_flow, plot_flow_errors
 from studies.protocol.flow_runs import fused
-from studies.protocol.joint_runs import joint, track_errors
 from studies.protocol.learned import learn_case
 from studies.protocol.plots import plot_drift, plot_ground, plot_track_errors
 from studies.protocol.report import ENOUGH_TRACKS
@@ -66,8 +66,8 @@ def _draw_flow(scene: Path, path: Path) -> None:
     if learned.site.flow is None or answer.heading_rad is None:
         return
     prior = learned.case.prior_pose
-    told = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)
-    plot_flow(learned, {"new tracks by the prior pose": prior, "by the fused pose": told}, path)
+    pose = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)
+    plot_flow(learned, {"new tracks by the prior pose": prior, "by the fused pose": pose}, path)
 
 
 def _curve(pair: tuple[Path, int]) -> list[tuple[int, float, float]]:

@@ -1,4 +1,4 @@
-"""How the fused pose's error falls with the number of reference tracks, and of new ones."""
+"""Curves of the fused pose's error over the number of reference tracks, and of new ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from models.tracks.observations import of_tracks
 from models.tracks.scenes import Scene
 from studies.protocol.cases import (
     PANNED,
-    KnockRange,
+    OffsetRange,
     ProtocolCase,
     draw_case,
     judge_answer,
@@ -37,14 +37,14 @@ class CurvePoint:
 
 
 def flow_errors(
-    scene: Scene, seed: int, counts: Sequence[int], knock_range: KnockRange = PANNED
+    scene: Scene, seed: int, counts: Sequence[int], offset_range: OffsetRange = PANNED
 ) -> list[CurvePoint]:
     """The fused pose's error for some numbers of reference tracks, and of new tracks.
 
     Numbers beyond what the case has are left out, and those that tell too little for any estimate.
     The tracks of a smaller number are among those of a larger one.
     """
-    case = draw_case(scene, seed, knock_range)
+    case = draw_case(scene, seed, offset_range)
     known, seen = (
         observe(tracks, case.intrinsics, case.prior_pose) for tracks in (case.reference, case.seen)
     )

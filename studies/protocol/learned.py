@@ -1,4 +1,4 @@
-"""What the estimators of a case learn of its reference, each thing learned once."""
+"""References of the estimators of a case, each learned once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Who of a recording's people is the reference, and who comes after: in time, or at random."""
+"""Partings of a recording's people into reference and test: in time, or at random."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,14 +7,14 @@ from enum import StrEnum
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import knock_trajectory
+from models.simulation.pose_offset import offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack
 
 _NIGHT_S = 4 * 3600.0  # without anybody: another day begins
 
 
 class Split(StrEnum):
-    """How people are parted: the earlier from the later, or by lot."""
+    """Parting of people: the earlier from the later, or by lot."""
 
     TIME = "time"
     PEOPLE = "people"
@@ -73,7 +73,7 @@ def first_seen(
             break
         seen = track.trajectory
         if pose is not None:
-            moved = knock_trajectory(seen, scene.intrinsics, scene.true_pose, pose)
+            moved = offset_trajectory(seen, scene.intrinsics, scene.true_pose, pose)
             if moved is None:
                 continue
             seen = moved
@@ -83,7 +83,7 @@ def first_seen(
 
 
 def _earlier(scene: Scene) -> set[str]:
-    """Who came in the earlier half, or on the days before the night nearest to its end."""
+    """People of the earlier half, or of the days before the night nearest to its end."""
     came: dict[str, float] = {}
     for track in scene.tracks:
         since = float(track.trajectory.time_s[0])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate
+from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate, plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.network import predict_windows
@@ -22,14 +22,15 @@ from studies.regressors.calibrated import (
     sampling_covariance,
 )
 from studies.regressors.calibration import learn_calibration
-from studies.regressors.site_offset import without_offset
 from studies.simulation.crowds import FlowConfig
 
 # A number of which an answer is less sure than this is not identifiable.
 _IDENTIFIABLE_SD = (math.radians(3), math.radians(3), 0.2)
+# How far an estimator is usually off on a site for good: foot points, places of other speed.
+SITE_BIAS_SD = (math.radians(1.5), math.radians(2.0), 0.15)
 
 Tracks = Sequence[Trajectory]
-Reading = Callable[[Tracks], PlaneEstimate]
+Regressor = Callable[[Tracks], PlaneEstimate]
 
 
 def prepare_regressors(
@@ -99,9 +100,28 @@ def _declaring(estimator: Estimator) -> Estimator:
     return answer
 
 
-def _with_offset(reading: Reading, case: ProtocolCase) -> Answer:
+def _with_offset(regressor: Regressor, case: ProtocolCase) -> Answer:
     prior: CameraPose = case.prior_pose
-    return _answer(without_offset(reading(case.seen), reading(case.reference), prior))
+    return _answer(without_offset(regressor(case.seen), regressor(case.reference), prior))
+
+
+def without_offset(
+    estimate: PlaneEstimate, reference: PlaneEstimate, prior: CameraPose
+) -> PlaneEstimate:
+    """The estimate less what the estimator was off while the pose was known to be the prior.
+
+    The offset is `reference - prior`, shrunk by its own uncertainty: of a reference that knows
+    nothing nothing is taken off. What stays unknown of it is added to the covariance.
+    """
+    bias = np.diag(np.square(SITE_BIAS_SD))
+    gain = bias @ np.linalg.inv(bias + reference.covariance)
+    offset = gain @ (reference.values - plane_parameters_of(prior))
+    left = bias - gain @ bias
+    return PlaneEstimate(
+        values=estimate.values - offset,
+        covariance=estimate.covariance + (left + left.T) / 2,
+        tracks=estimate.tracks,
+    )
 
 
 def _answer(estimate: PlaneEstimate) -> Answer:

@@ -1,4 +1,4 @@
-"""What the outcomes of a protocol say: by scene and estimator, and over all scenes."""
+"""Report of a protocol's outcomes: by scene and estimator, and over all scenes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -127,9 +127,9 @@ def _slopes(
 ) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
     true = np.array([outcome.true_drift for outcome in outcomes]).reshape(-1, 3)
     found = np.array([outcome.drift for outcome in outcomes]).reshape(-1, 3)
-    told = [slope_with_error(true[:, number], found[:, number]) for number in range(3)]
-    slopes = tuple(slope for slope, _ in told if slope is not None)
-    errors = tuple(error for _, error in told if error is not None)
+    slopes_found = [slope_with_error(true[:, number], found[:, number]) for number in range(3)]
+    slopes = tuple(slope for slope, _ in slopes_found if slope is not None)
+    errors = tuple(error for _, error in slopes_found if error is not None)
     if len(slopes) != 3 or len(errors) != 3:
         return None, None
     return slopes, errors

@@ -56,7 +56,7 @@ def run_protocol(
     output: Path,
     plots: Path | None,
 ) -> None:
-    """Knock each scene's camera, ask every estimator, print tables, write JSON and plots.
+    """Offset each scene's camera, run every estimator, print tables, write JSON and plots.
 
     The JSON grows as cases end, so an interrupted evaluation keeps what it has.
 

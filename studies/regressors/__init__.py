@@ -1,1 +1,1 @@
-"""Regressors trained for many cases, and their calibration."""
+"""Regressors trained for many cases: their calibration, and the weights that they start from."""

@@ -69,7 +69,7 @@ def learn_calibration(
 def _by_site(
     network: PoseRegressor, plan: TrainingPlan, walks: Walks, site_idx: npt.NDArray[np.int64]
 ) -> list[tuple[int, TrackPredictions]]:
-    """What the network says of each site's walks, for sites with enough of them."""
+    """Predictions of the network for each site's walks, for sites with enough of them."""
     windows = Windows(
         uv=walks.uv, lengths=walks.lengths, owner_idx=np.arange(len(walks), dtype=np.int64)
     )

@@ -1,1 +1,1 @@
-"""What the service would serve, offline: windows, batches, their outcomes, long replays."""
+"""Offline runs of what the service would serve: windows, outcomes, long replays, parts off."""

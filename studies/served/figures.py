@@ -1,4 +1,4 @@
-"""What many served outcomes come to: errors, coverage, slopes, by whatever they are grouped."""
+"""Figures of many served outcomes: errors, coverage, slopes, by whatever they are grouped."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class ParameterFigures:
 
     `identifiable` is the share of cases that determine it; the others are of those. The median and
     the 90th percentile of the error, the share of 90 % intervals that hold the truth, the largest
-    error in standard deviations, the slope of estimated against true drift with its standard error,
+    error in standard deviations, the slope of known against true drift with its standard error,
     where it was moved. None where there is nothing to tell it by.
     """
 
@@ -37,7 +37,7 @@ class Figures:
 
     `beyond` counts cases with an identifiable parameter more than 5 standard deviations off,
     `sound` is the share of parameters that are covered or declared, `cut` the share of cases with a
-    window that was cut though nothing moved, `failed` of those in which nothing was estimated.
+    window that was cut though nothing moved, `failed` of those in which nothing was known.
     """
 
     cases: int
@@ -57,12 +57,12 @@ class Figures:
 
 def figures_of(outcomes: Sequence[ServedOutcome]) -> Figures:
     """The figures of at least one outcome."""
-    told = [outcome for outcome in outcomes if outcome.parameters]
-    columns = [[outcome.parameters[place] for outcome in told] for place in range(len(PARAMETERS))]
-    every = [parameter for outcome in told for parameter in outcome.parameters]
+    known = [outcome for outcome in outcomes if outcome.parameters]
+    columns = [[outcome.parameters[place] for outcome in known] for place in range(len(PARAMETERS))]
+    every = [parameter for outcome in known for parameter in outcome.parameters]
     rotation = np.array([outcome.rotation_deg for outcome in outcomes])
     height = np.array([outcome.height_error for outcome in outcomes])
-    worst = [max((n.off_sd for n in o.parameters if n.identifiable), default=0.0) for o in told]
+    worst = [max((n.off_sd for n in o.parameters if n.identifiable), default=0.0) for o in known]
     return Figures(
         cases=len(outcomes),
         reference_tracks=float(np.mean([outcome.reference_tracks for outcome in outcomes])),

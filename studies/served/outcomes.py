@@ -1,4 +1,4 @@
-"""What was served of a case beside the truth: each parameter, and how surely."""
+"""Outcomes of what was served of a case beside the truth: each parameter, and how surely."""
 
 import math
 import time
@@ -30,7 +30,7 @@ class ParameterOutcome:
 
     @property
     def covered(self) -> bool:
-        """Whether the 90 % interval holds the truth."""
+        """True where the 90 % interval holds the truth."""
         return abs(self.error) <= Z90 * self.sd
 
     @property
@@ -63,7 +63,7 @@ class ServedOutcome:
 
 
 def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> ServedOutcome:
-    """What the service would serve of a case after its last batch; None: its site is not known."""
+    """Served outcome of a case after its last batch; a site of None is not known."""
     started = time.monotonic()
     failure = "" if site is not None else "the reference tells nothing"
     last, cuts = None, 0

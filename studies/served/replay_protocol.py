@@ -39,7 +39,7 @@ _LONGEST_S = 300.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProtocolReplay:
-    """What a service served of a case, beside the truth.
+    """Outcome of a case that a service served, beside the truth.
 
     `lost_tops` is how many known upper edges no box could carry.
     """
@@ -247,7 +247,7 @@ def _wait(
 
 
 def _covers(pose: dict[str, Any], newest_s: float) -> bool:
-    """Whether an estimate after the reference has the newest track in it."""
+    """True where an estimate after the reference has the newest track in it."""
     if not pose["to"]:
         return False
     return datetime.fromisoformat(pose["to"]).timestamp() >= newest_s - 1e-3

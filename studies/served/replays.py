@@ -17,13 +17,13 @@ from models.pose import (
     DriftLimits,
     SecondLook,
     Trajectory,
+    alarm_chart_result,
     drift_of,
     learn_site,
     observe,
-    read_alarm_chart,
 )
 from models.reasons import TracksCode
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import by_end
 from studies.protocol.partings import first_seen
@@ -37,7 +37,7 @@ _MEASURED_AFTER = 250  # tracks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayPlan:
-    """How a recording is replayed: its windows, and what an alarm goes by."""
+    """Plan of a recording's replay: its windows, and what an alarm goes by."""
 
     window: Window
     limits: DriftLimits
@@ -46,7 +46,7 @@ class ReplayPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """What was seen while a camera stood where it was.
+    """Summary of a time in which a camera stood where it was.
 
     `tracks` came, of which after `alarm_after` there was the first alarm; None where there was
     none. Shares are of the `looks`: with the map in use, with paths that are said to have changed.
@@ -82,7 +82,7 @@ class ReplayOutcome:
 
 
 def replay(
-    scene: Scene, knock: Knock | None, seed: int, reference_tracks: int, plan: ReplayPlan
+    scene: Scene, knock: PoseOffset | None, seed: int, reference_tracks: int, plan: ReplayPlan
 ) -> ReplayOutcome:
     """Replay a recording after a reference of so many tracks, moved at a drawn moment by a knock.
 
@@ -142,14 +142,14 @@ def _watch(
     found: list[_Watched] = []
     drifted: tuple[str, ...] = ()
 
-    def asked() -> SecondLook:
+    def second_look() -> SecondLook:
         return SecondLook(limits=plan.limits, drifting=bool(drifted))
 
-    for look in looks(tracks, site, plan.window, asked):
+    for look in looks(tracks, site, plan.window, second_look):
         finding = look.finding
-        reading = read_alarm_chart(look.seen, site, rate, first=finding.first)
+        result = alarm_chart_result(look.seen, site, rate, first=finding.first)
         earlier = None if finding.earlier is None else drift_of(finding.earlier, finding.prior)
-        verdict = judge(finding.drift, plan.limits, drifted, reading, earlier)
+        verdict = judge(finding.drift, plan.limits, drifted, result, earlier)
         drifted = verdict.drifted
         found.append(_Watched(look=look, alarm=verdict.drifting))
     return found
@@ -159,7 +159,7 @@ def _stretch(
     watched: Sequence[_Watched], since: int, tracks: int, prior: CameraPose, truth: CameraPose
 ) -> Stretch:
     parameters = [parameters_beside(each.look.finding, prior, truth) for each in watched]
-    told = [[n.identifiable for n in each] for each in parameters]
+    known = [[n.identifiable for n in each] for each in parameters]
     covered = [[n.identifiable and n.covered for n in each] for each in parameters]
     reasons = [reason_of(each.look.finding) for each in watched]
     alarms = (each.look.tracks - since for each in watched if each.alarm)
@@ -169,7 +169,7 @@ def _stretch(
         alarm_after=next(alarms, None),
         mapped=_share([each.look.finding.fused.registered for each in watched]),
         paths_changed=_share([reason == TracksCode.PATHS_CHANGED for reason in reasons]),
-        identifiable=_counts(told),
+        identifiable=_counts(known),
         covered=_counts(covered),
         worst_sd=max(
             (n.off_sd for each in parameters for n in each if n.identifiable), default=0.0

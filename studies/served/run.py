@@ -16,7 +16,7 @@ from studies.runs import process_pool, with_bar
 from studies.served.outcome_file import OutcomeFile
 from studies.served.replays import ReplayPlan
 from studies.served.tables import BETWEEN, all_tables
-from studies.served.tasks import Found, Table, Task, tasks_of, work
+from studies.served.tasks import CaseResult, Table, Task, tasks_of, work
 from studies.served.windows import Window
 
 
@@ -51,39 +51,41 @@ def run_served(
         limits=drift_limits(settings),
         alarms_a_year=settings.false_alarms_per_year,
     )
-    failures: list[Found] = []
+    failures: list[CaseResult] = []
     if tasks:
         failures = _work_off(tasks, plan, processes, kept, console)
-    said = all_tables(kept.heading, kept.found.values())
-    console.print(said, markup=False, highlight=False, soft_wrap=True)
+    text = all_tables(kept.heading, kept.found.values())
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
     if page is not None:
-        write_between(page, BETWEEN, said)
+        write_between(page, BETWEEN, text)
     console.print(f"{output} has all; {time.monotonic() - started:.0f} s")
     if failures:
         first = failures[0]
-        raise CalibrationError(f"{len(failures)} failed; the first, {first.asked}: {first.failure}")
+        raise CalibrationError(
+            f"{len(failures)} failed; the first, {first.case_id}: {first.failure}"
+        )
 
 
 def _left(tasks: Sequence[Task], kept: OutcomeFile) -> list[Task]:
-    """What is not in the output yet."""
+    """Tasks that are not in the output yet."""
     found = []
     for task in tasks:
-        asked = tuple(each for each in task.asked if each not in kept.found)
-        if asked:
-            found.append(Task(folder=task.folder, camera=task.camera, asked=asked))
+        case_ids = tuple(each for each in task.case_ids if each not in kept.found)
+        if case_ids:
+            found.append(Task(folder=task.folder, camera=task.camera, case_ids=case_ids))
     return found
 
 
 def _work_off(
     tasks: Sequence[Task], plan: ReplayPlan, processes: int, kept: OutcomeFile, console: Console
-) -> list[Found]:
+) -> list[CaseResult]:
     """Store outcomes as tasks end; returns those that failed."""
-    failures: list[Found] = []
+    failures: list[CaseResult] = []
     calls = [partial(work, task, plan) for task in tasks]
     pool = process_pool(processes)
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     try:
-        cases = [len(task.asked) for task in tasks]
+        cases = [len(task.case_ids) for task in tasks]
         for found in with_bar(pool, calls, console, cases=cases):
             kept.add(found)
             failures += [each for each in found if each.failure]

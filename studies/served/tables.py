@@ -8,7 +8,7 @@ from studies.pages import markers
 from studies.served.figures import Figures, ParameterFigures, figures_of
 from studies.served.outcomes import ServedOutcome
 from studies.served.replays import ReplayOutcome
-from studies.served.tasks import ALONE, MOVES, Asked, Found, Table
+from studies.served.tasks import ALONE, MOVES, CaseId, CaseResult, Table
 
 BETWEEN = markers("protocol", "python -m studies protocol --write")
 _KNOCKS = {
@@ -32,28 +32,28 @@ _SHOWN = (
 )
 
 
-def all_tables(heading: Heading, found: Iterable[Found]) -> str:
+def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
     """Every table that there is something for, under a line that says whence."""
     rows = list(found)
-    seeds = sorted({each.asked.seed for each in rows})
-    batches = sorted({each.asked.batch for each in rows})
-    said = [
+    seeds = sorted({each.case_id.seed for each in rows})
+    batches = sorted({each.case_id.batch for each in rows})
+    tables = [
         f"{len(rows)} cases and replays, seeds {_listed(seeds)}, in batches of {_listed(batches)}; "
         f"begun {heading.begun}, code {heading.code}, {heading.cores} cores of "
         f"{heading.processor}. Medians (90th percentiles); pan is the heading."
     ]
-    cases = [(e.asked, e.outcome) for e in rows if isinstance(e.outcome, ServedOutcome)]
-    replays = [(e.asked, e.outcome) for e in rows if isinstance(e.outcome, ReplayOutcome)]
-    if any(asked.table in (Table.TIME, Table.PEOPLE) for asked, _ in cases):
-        said += [_knock_table(cases), _scene_table(cases)]
-    if any(asked.table == Table.FAULTS for asked, _ in cases):
-        said.append(_fault_table(cases))
+    cases = [(e.case_id, e.outcome) for e in rows if isinstance(e.outcome, ServedOutcome)]
+    replays = [(e.case_id, e.outcome) for e in rows if isinstance(e.outcome, ReplayOutcome)]
+    if any(case_id.table in (Table.TIME, Table.PEOPLE) for case_id, _ in cases):
+        tables += [_knock_table(cases), _scene_table(cases)]
+    if any(case_id.table == Table.FAULTS for case_id, _ in cases):
+        tables.append(_fault_table(cases))
     if replays:
-        said.append(_replay_table(replays))
-    return "\n".join(f"{each.rstrip()}\n" for each in said)
+        tables.append(_replay_table(replays))
+    return "\n".join(f"{each.rstrip()}\n" for each in tables)
 
 
-_Cases = Sequence[tuple[Asked, ServedOutcome]]
+_Cases = Sequence[tuple[CaseId, ServedOutcome]]
 
 
 def _knock_table(cases: _Cases) -> str:
@@ -68,9 +68,9 @@ def _knock_table(cases: _Cases) -> str:
                     if a.table == table and a.knock == knock and _size(a) == size
                 ]
                 if own:
-                    said = figures_of(own)
+                    figures = figures_of(own)
                     title = f"{name}; {words}{_of_size(size)}"
-                    lines.append(_row(title, said.cases, *_cells(said), _slopes(said)))
+                    lines.append(_row(title, figures.cases, *_cells(figures), _slopes(figures)))
     return "**By what was moved**, over all scenes:\n\n" + "\n".join(lines)
 
 
@@ -89,9 +89,9 @@ def _scene_table(cases: _Cases) -> str:
                     and a.knock in knocks
                 ]
                 if own:
-                    said = figures_of(own)
-                    title = f"{scene} ({said.reference_tracks:.0f}, {said.seen_tracks:.0f})"
-                    lines.append(_row(title, f"{kind}; {words}", said.cases, *_cells(said)))
+                    figures = figures_of(own)
+                    title = f"{scene} ({figures.reference_tracks:.0f}, {figures.seen_tracks:.0f})"
+                    lines.append(_row(title, f"{kind}; {words}", figures.cases, *_cells(figures)))
     return "**By scene**:\n\n" + "\n".join(lines)
 
 
@@ -108,15 +108,21 @@ def _fault_table(cases: _Cases) -> str:
         for knock in ("still", "pan"):
             some = [o for a, o in own if a.fault == fault and a.knock == knock]
             if some:
-                said = figures_of(some)
+                figures = figures_of(some)
                 name = f"{fault} ({FAULTS[fault].words})" if fault else "none"
                 lines.append(
-                    _row(name, _KNOCKS[knock], said.cases, *_cells(said), f"{said.sound:.0%}")
+                    _row(
+                        name,
+                        _KNOCKS[knock],
+                        figures.cases,
+                        *_cells(figures),
+                        f"{figures.sound:.0%}",
+                    )
                 )
     return f"**Faults**, later people of {', '.join(scenes)}:\n\n" + "\n".join(lines)
 
 
-def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
+def _replay_table(replays: Sequence[tuple[CaseId, ReplayOutcome]]) -> str:
     lines = _head(
         "camera", "moved", "seed", "reference tracks", "still: tracks", "map in use",
         "“paths have changed”", "cuts", "alarm after", "covers: tilt, roll, height, pan",
@@ -124,12 +130,13 @@ def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
         "250 tracks on: error (sd) of tilt, roll, pan, deg",
     )  # fmt: skip
     order = {move: place for place, move in enumerate(MOVES)}
-    for asked, told in sorted(
+    for case_id, outcome in sorted(
         replays, key=lambda each: (each[0].scene, order[each[0].knock], each[0].seed)
     ):
-        before, after = told.before, told.after
+        before, after = outcome.before, outcome.after
         cells = [
-            asked.scene, _MOVES[asked.knock], asked.seed, told.reference_tracks, before.tracks,
+            case_id.scene, _MOVES[case_id.knock], case_id.seed, outcome.reference_tracks,
+            before.tracks,
             f"{before.mapped:.0%}", f"{before.paths_changed:.0%}", before.cuts,
             _after(before.alarm_after),
             ", ".join(
@@ -144,29 +151,29 @@ def _replay_table(replays: Sequence[tuple[Asked, ReplayOutcome]]) -> str:
             cells += [after.tracks, _after(after.alarm_after), f"{after.mapped:.0%}"]
             cells.append(
                 "too few came"
-                if told.measured is None
+                if outcome.measured is None
                 else ", ".join(
                     f"{n.error:+.2f} ({n.sd:.2f})" if n.identifiable else "not identifiable"
-                    for n in (told.measured[0], told.measured[1], told.measured[3])
+                    for n in (outcome.measured[0], outcome.measured[1], outcome.measured[3])
                 )
             )
         lines.append(_row(*cells))
     return "**Long recordings in their order**, a map that never grows:\n\n" + "\n".join(lines)
 
 
-def _cells(said: Figures) -> list[str]:
-    tilt, roll, height, pan = said.parameters
+def _cells(figures: Figures) -> list[str]:
+    tilt, roll, height, pan = figures.parameters
     errors = ", ".join(_or_dash(each.error, "{:.2f}") for each in (tilt, roll, pan))
     every = (tilt, roll, height, pan)
-    told = min(each.identifiable for each in every)
+    least = min(each.identifiable for each in every)
     return [
-        f"{said.rotation_deg:.2f} ({said.rotation_p90_deg:.1f})",
-        f"{100 * said.height_error:.1f} % ({100 * said.height_error_p90:.0f})",
+        f"{figures.rotation_deg:.2f} ({figures.rotation_p90_deg:.1f})",
+        f"{100 * figures.height_error:.1f} % ({100 * figures.height_error_p90:.0f})",
         errors,
         ", ".join(_or_dash(_percent(each), "{:.0f}") for each in every) + " %",
-        "all" if told == 1 else ", ".join(f"{each.identifiable:.0%}" for each in every),
-        str(said.beyond),
-        f"{said.cut:.0%}",
+        "all" if least == 1 else ", ".join(f"{each.identifiable:.0%}" for each in every),
+        str(figures.beyond),
+        f"{figures.cut:.0%}",
     ]
 
 
@@ -174,8 +181,8 @@ def _percent(parameter: ParameterFigures) -> float | None:
     return None if parameter.covered is None else 100 * parameter.covered
 
 
-def _slopes(said: Figures) -> str:
-    return ", ".join(_or_dash(each.slope, "{:.2f}") for each in said.parameters)
+def _slopes(figures: Figures) -> str:
+    return ", ".join(_or_dash(each.slope, "{:.2f}") for each in figures.parameters)
 
 
 def _or_dash(value: float | None, form: str) -> str:
@@ -189,12 +196,12 @@ def _after(tracks: int | None) -> str:
 _Size = tuple[int | None, int | None]
 
 
-def _size(asked: Asked) -> _Size:
-    return asked.reference, asked.seen if asked.reference is not None else None
+def _size(case_id: CaseId) -> _Size:
+    return case_id.reference, case_id.seen if case_id.reference is not None else None
 
 
 def _sizes(cases: _Cases, table: Table) -> list[_Size]:
-    found = {_size(asked) for asked, _ in cases if asked.table == table}
+    found = {_size(case_id) for case_id, _ in cases if case_id.table == table}
     return sorted(found, key=lambda size: size[0] or 0)
 
 

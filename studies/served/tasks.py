@@ -1,4 +1,4 @@
-"""What `protocol` asks: cases and replays of recordings, each with a name of its own."""
+"""Tasks of `protocol`: cases and replays of recordings, each with a name of its own."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.pose import CameraSite, learn_site, observe
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.scenes import Scene
 from studies.faults.catalogue import FAULTS
 from studies.protocol.cases import PANNED, RANGES, draw_case
@@ -42,8 +42,8 @@ _WINDOW = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """One case or replay: what its outcome is stored under."""
+class CaseId:
+    """Name of one case or replay, under which its outcome is stored."""
 
     table: Table
     scene: str
@@ -61,14 +61,14 @@ class Task:
 
     folder: Path
     camera: int
-    asked: tuple[Asked, ...]
+    case_ids: tuple[CaseId, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """What came of one that was asked; `failure` is an error that nobody foresaw."""
+class CaseResult:
+    """Result of one case or replay; `failure` is an error that nobody foresaw."""
 
-    asked: Asked
+    case_id: CaseId
     outcome: ServedOutcome | ReplayOutcome | None
     failure: str = ""
 
@@ -95,46 +95,46 @@ def tasks_of(
         for camera, scene in enumerate(load_recording(folder))
     ]
     return [
-        Task(folder=folder, camera=camera, asked=asked)
+        Task(folder=folder, camera=camera, case_ids=case_ids)
         for table in tables
         for folder, camera, name, tracks in cameras
-        for asked in _asked(table, name, tracks > _LONG, seeds, batch, faults)
+        for case_ids in _case_ids(table, name, tracks > _LONG, seeds, batch, faults)
     ]
 
 
-def work(task: Task, plan: ReplayPlan) -> list[Found]:
-    """What comes of a task, each part by itself: what fails is told and stops no other."""
+def work(task: Task, plan: ReplayPlan) -> list[CaseResult]:
+    """Results of a task, each part by itself: what fails is recorded and stops no other."""
     scene = _cameras(task.folder)[task.camera]
     found = []
     sites: dict[int, CameraSite | None] = {}
-    for asked in task.asked:
+    for case_id in task.case_ids:
         try:
             outcome = (
-                _replayed(scene, asked, plan)
-                if asked.table == Table.REPLAYS
-                else _served(scene, asked, plan, sites)
+                _replayed(scene, case_id, plan)
+                if case_id.table == Table.REPLAYS
+                else _served(scene, case_id, plan, sites)
             )
-            found.append(Found(asked=asked, outcome=outcome))
+            found.append(CaseResult(case_id=case_id, outcome=outcome))
         except Exception as error:
-            found.append(Found(asked=asked, outcome=None, failure=repr(error)))
+            found.append(CaseResult(case_id=case_id, outcome=None, failure=repr(error)))
     return found
 
 
-def _asked(
+def _case_ids(
     table: Table,
     scene: str,
     long: bool,
     seeds: Sequence[int],
     batch: int,
     faults: Sequence[str],
-) -> Iterator[tuple[Asked, ...]]:
-    """What is asked of a camera in a table, in parts that share a reference."""
+) -> Iterator[tuple[CaseId, ...]]:
+    """Cases of a camera in a table, in parts that share a reference."""
     if table == Table.REPLAYS:
         if not long:
             return
         for seed in seeds:
             for move in MOVES if seed == seeds[0] else MOVES[1:]:  # nothing is drawn while still
-                asked = Asked(
+                case_id = CaseId(
                     table=table,
                     scene=scene,
                     seed=seed,
@@ -142,7 +142,7 @@ def _asked(
                     batch=batch,
                     reference=_SIZES[-1][0],
                 )
-                yield (asked,)
+                yield (case_id,)
         return
     sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
     names = [""] if table != Table.FAULTS else ["", *faults]
@@ -152,7 +152,7 @@ def _asked(
                 # Of halves in time nothing is drawn but the knock and the fault.
                 drawn = table == Table.PEOPLE or long or bool(fault) or seed == seeds[0]
                 yield tuple(
-                    Asked(
+                    CaseId(
                         table=table, scene=scene, seed=seed, knock=knock, batch=batch,
                         fault=fault, reference=reference, seen=seen,
                     )
@@ -162,15 +162,15 @@ def _asked(
 
 
 def _served(
-    scene: Scene, asked: Asked, plan: ReplayPlan, sites: dict[int, CameraSite | None]
+    scene: Scene, case_id: CaseId, plan: ReplayPlan, sites: dict[int, CameraSite | None]
 ) -> ServedOutcome:
     parting = Parting(
-        split=Split.PEOPLE if asked.table == Table.PEOPLE else Split.TIME,
-        reference_tracks=asked.reference,
-        seen_tracks=asked.seen,
+        split=Split.PEOPLE if case_id.table == Table.PEOPLE else Split.TIME,
+        reference_tracks=case_id.reference,
+        seen_tracks=case_id.seen,
     )
-    fault = FAULTS[asked.fault] if asked.fault else None
-    case = draw_case(scene, asked.seed, RANGES[asked.knock], parting, fault)
+    fault = FAULTS[case_id.fault] if case_id.fault else None
+    case = draw_case(scene, case_id.seed, RANGES[case_id.knock], parting, fault)
     if 0 not in sites:  # the tracks before the knock are the same whatever the knock
         known = observe(case.reference, case.intrinsics, case.prior_pose)
         try:
@@ -180,20 +180,20 @@ def _served(
     return serve_case(case, sites[0], plan.window)
 
 
-def _replayed(scene: Scene, asked: Asked, plan: ReplayPlan) -> ReplayOutcome:
-    rng = np.random.default_rng([asked.seed, 1])
-    knock: Knock | None = None
-    if asked.knock == "pan-2":
-        knock = Knock(heading_rad=float(rng.choice([-1, 1]) * np.radians(2)))
-    elif asked.knock == "pan":
+def _replayed(scene: Scene, case_id: CaseId, plan: ReplayPlan) -> ReplayOutcome:
+    rng = np.random.default_rng([case_id.seed, 1])
+    knock: PoseOffset | None = None
+    if case_id.knock == "pan-2":
+        knock = PoseOffset(heading_rad=float(rng.choice([-1, 1]) * np.radians(2)))
+    elif case_id.knock == "pan":
         tilt, roll, log_height, heading = rng.uniform(-1, 1, 4)
-        knock = Knock(
+        knock = PoseOffset(
             tilt_rad=tilt * PANNED.tilt_rad,
             roll_rad=roll * PANNED.roll_rad,
             log_height=log_height * PANNED.log_height,
             heading_rad=heading * PANNED.heading_rad,
         )
-    return replay(scene, knock, asked.seed, asked.reference or _SIZES[-1][0], plan)
+    return replay(scene, knock, case_id.seed, case_id.reference or _SIZES[-1][0], plan)
 
 
 @lru_cache(maxsize=1)

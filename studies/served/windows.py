@@ -22,7 +22,7 @@ _DAY_S = 86_400.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """What an estimate is made of: the newest tracks, of so many days; and how often it is made.
+    """Window of an estimate: the newest tracks, of so many days; and how often it is made.
 
     After each batch of `batch` tracks; of None, once they all are there.
     """

@@ -19,7 +19,7 @@ _MOST_DRAWS = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRange:
-    """What cameras are drawn from; even between two ends, heights evenly in their log.
+    """Ranges of drawn cameras; even between two ends, heights evenly in their log.
 
     `view_rad` is the angle that the picture is wide, `bent` by how much of its distance from the
     middle its left edge is moved by distortion; `roll_sd_rad` is a standard deviation.

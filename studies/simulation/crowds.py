@@ -1,4 +1,4 @@
-"""What is drawn of sites and of the people who walk there: lanes, ways and pace."""
+"""Random sites and the people who walk there: lanes, ways and pace."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from models.simulation.walkers import WalkConfig
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlowConfig:
-    """How sites differ from one another; every range is drawn from once for each site.
+    """Ranges of the differences between sites; every one is drawn from once for each site.
 
     The site's mean speed is the assumed one times exp N(0, `site_speed_log_sd`); its speed also
     changes with place, by N(0, `speed_slope_log_sd_per_m`) along x and along y. A lane runs
@@ -47,7 +47,7 @@ class FlowConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedSites:
-    """What stays of sites (S,): their lanes (S, L), ways and pace."""
+    """Sites (S,) as they stay: their lanes (S, L), ways and pace."""
 
     lanes: npt.NDArray[np.int64]
     lane_point_m: Array  # (S, L, 2)

@@ -1,4 +1,4 @@
-"""What trackers and passers-by do to windows: switched people, hidden feet, riders, rounding."""
+"""Faults of trackers and passers-by in windows: switched people, hidden feet, riders, rounding."""
 
 from dataclasses import dataclass, replace
 

@@ -145,7 +145,7 @@ def _try_walks(
 def _stays(
     intrinsics: Intrinsics, sites: SimulatedSites, site_idx: npt.NDArray[np.int64], path: Array
 ) -> npt.NDArray[np.bool_]:
-    """Which paths (B, T, 2), NaN at their ends, keep to the ground of their site."""
+    """Mask of paths (B, T, 2), NaN at their ends, that keep to the ground of their site."""
     stays = ~sites.bounded[site_idx]
     rows = np.flatnonzero(~stays)
     view = sites.bounds.take(site_idx[rows])

@@ -106,7 +106,7 @@ def walk_days(
 
 
 def draw_mixes(lanes: int, habits: HabitConfig, rng: np.random.Generator) -> Array:
-    """How people share lanes (2, parts, lanes), on weekdays and weekends, by parts of the day."""
+    """Lane shares (2, parts, lanes) of people, on weekdays and weekends, by parts of the day."""
     return rng.dirichlet(np.full(lanes, habits.mixing), (2, len(habits.parts)))
 
 

@@ -19,7 +19,7 @@ _USUAL_M = 1.7  # of people whose top is not in view: their head is not either
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadConfig:
-    """How heads stand over feet; angles in radians, `jitter` a share of the stature.
+    """Positions of heads over feet; angles in radians, `jitter` a share of the stature.
 
     `person_sd_rad` is how people differ in their lean to either side, `forward_rad` how far they
     lean the way they walk, `bias_rad` how far a detector puts every head to the right in the

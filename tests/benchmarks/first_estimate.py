@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
@@ -71,7 +71,7 @@ def _measure(service: RunningService, seed: int) -> tuple[float, np.ndarray, np.
     rng = np.random.default_rng(seed)
     tilt, roll = rng.uniform(-_ANGLE_RAD, _ANGLE_RAD, 2)
     log_height = rng.uniform(-_LOG_HEIGHT, _LOG_HEIGHT)
-    knock = Knock(tilt_rad=tilt, roll_rad=roll, log_height=log_height)
+    knock = PoseOffset(tilt_rad=tilt, roll_rad=roll, log_height=log_height)
     truth, config = knock.apply(PRIOR), SiteConfig()
     walks = by_end(walk_site(LENS, truth, draw_lanes(LENS, truth, config, rng), config, FULL, rng))
     camera_id = f"new-{seed}"

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations
 from models.tracks.observing import observe
@@ -15,7 +15,7 @@ from models.tracks.trajectory import Trajectory
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(18), roll_rad=math.radians(1))
-KNOCKED = Knock(
+KNOCKED = PoseOffset(
     tilt_rad=math.radians(5), roll_rad=math.radians(-4), log_height=math.log(1.08)
 ).apply(PRIOR)  # fmt: skip
 

@@ -16,7 +16,7 @@ from models.pose import (
     observe,
     warm_start,
 )
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -28,8 +28,8 @@ LONG = SCENES.parent / "long"
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 WINDOW, STEP = 160, 10
 SAME = 0.05  # of a standard deviation
-SMALL = Knock(tilt_rad=math.radians(1), heading_rad=math.radians(-1))
-LARGE = Knock(
+SMALL = PoseOffset(tilt_rad=math.radians(1), heading_rad=math.radians(-1))
+LARGE = PoseOffset(
     tilt_rad=math.radians(3),
     roll_rad=math.radians(-2),
     heading_rad=math.radians(-5),
@@ -48,7 +48,7 @@ def knocked(tracks, lens, pose, knock, share=None):
     if knock is None:
         return list(tracks)
     first = 0 if share is None else int(share * len(tracks))
-    moved = [knock_trajectory(track, lens, pose, knock.apply(pose)) for track in tracks[first:]]
+    moved = [offset_trajectory(track, lens, pose, knock.apply(pose)) for track in tracks[first:]]
     return by_end([*tracks[:first], *(track for track in moved if track and track.long_enough)])
 
 

@@ -14,11 +14,11 @@ from models.paths.reference import candidate_of
 from models.pose import (
     AlarmRate,
     SecondLook,
+    alarm_chart_result,
     assume_site,
     estimate_pose,
     learn_site,
     observe,
-    read_alarm_chart,
 )
 from models.pose.change_point import find_change
 from models.pose.fusion import by_speeds_alone
@@ -79,29 +79,29 @@ def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
     found = estimate_pose(still, site)
     assert (found.change_idx, found.first) == (None, 0)
     assert abs(found.drift.by.tilt_rad) < np.radians(1)
-    assert not read_alarm_chart(still, site, ONE_A_YEAR).moved
+    assert not alarm_chart_result(still, site, ONE_A_YEAR).moved
 
 
 def test_the_chart_alarms_at_the_rate_that_is_allowed(site, window):
-    reading = read_alarm_chart(window, site, ONE_A_YEAR)
-    assert reading.moved
-    assert reading.track_idx == pytest.approx(60, abs=12)
-    often = read_alarm_chart(window, site, replace(ONE_A_YEAR, alarms_a_year=100.0))
-    assert often.level < reading.level
+    result = alarm_chart_result(window, site, ONE_A_YEAR)
+    assert result.moved
+    assert result.track_idx == pytest.approx(60, abs=12)
+    often = alarm_chart_result(window, site, replace(ONE_A_YEAR, alarms_a_year=100.0))
+    assert often.level < result.level
 
 
 def test_the_chart_asks_those_after_the_change_who_count_or_else_all_who_do(site, window):
     counted = np.ones(window.tracks, dtype=bool)
     counted[:40] = False
-    late = read_alarm_chart(window, site, ONE_A_YEAR, counted=counted, first=70)
-    alone = read_alarm_chart(of_tracks(window, np.arange(70, 120)), site, ONE_A_YEAR)
+    late = alarm_chart_result(window, site, ONE_A_YEAR, counted=counted, first=70)
+    alone = alarm_chart_result(of_tracks(window, np.arange(70, 120)), site, ONE_A_YEAR)
     assert late == replace(alone, track_idx=alone.track_idx + 70)
     # Ten tracks after the change are too few: all that count are asked.
-    few = read_alarm_chart(window, site, ONE_A_YEAR, counted=counted, first=110)
-    assert few == read_alarm_chart(window, site, ONE_A_YEAR, counted=counted)
+    few = alarm_chart_result(window, site, ONE_A_YEAR, counted=counted, first=110)
+    assert few == alarm_chart_result(window, site, ONE_A_YEAR, counted=counted)
     assert few.track_idx >= 40
     nobody = np.zeros(window.tracks, dtype=bool)
-    assert read_alarm_chart(window, site, ONE_A_YEAR, counted=nobody) is None
+    assert alarm_chart_result(window, site, ONE_A_YEAR, counted=nobody) is None
 
 
 def test_the_second_look_leaves_the_newest_people_out_where_a_verdict_may_change(site, tracks):
@@ -142,7 +142,7 @@ def test_few_people_make_no_map_and_fewer_no_site(tracks):
     assert (few.flow, few.chart) == (None, None)
     found = estimate_pose(seen(tracks[2]), few)
     assert not found.fused.registered
-    assert read_alarm_chart(seen(tracks[2]), few, ONE_A_YEAR) is None
+    assert alarm_chart_result(seen(tracks[2]), few, ONE_A_YEAR) is None
     with pytest.raises(TooFewTrajectoriesError, match="at least 5"):
         learn_site(seen(tracks[0][:3]), LENS, PRIOR)
 
@@ -202,7 +202,7 @@ def refusals(site, tracks):
     return {
         "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
         "estimate_pose": lambda: estimate_pose(mixed, site),
-        "read_alarm_chart": lambda: read_alarm_chart(mixed, site, ONE_A_YEAR),
+        "alarm_chart_result": lambda: alarm_chart_result(mixed, site, ONE_A_YEAR),
         "score_groups": lambda: score_groups(mixed, site.usual(site.flow, site.chart)),
         "find_change": lambda: find_change(mixed, PRIOR, site.speed_reference),
         "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speed_reference, folds, 0),
@@ -214,7 +214,7 @@ def refusals(site, tracks):
     [
         "learn_site",
         "estimate_pose",
-        "read_alarm_chart",
+        "alarm_chart_result",
         "score_groups",
         "find_change",
         "learn_chart",

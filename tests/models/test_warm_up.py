@@ -14,7 +14,7 @@ ROOT = Path(models.__path__[0]).parent
 ASK = """
 import gc
 from models.compiled import _Compiled
-from models.pose import AlarmRate, estimate_pose, learn_site, observe, read_alarm_chart
+from models.pose import AlarmRate, estimate_pose, learn_site, observe, alarm_chart_result
 from models.pose.warm_up import warm_up
 from models.tracks.trajectory import by_end
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
@@ -29,7 +29,7 @@ known, after = tracks_of(5, (PRIOR, 30), (KNOCKED, 20))
 site = learn_site(observe(by_end(known), LENS, PRIOR), LENS, PRIOR)
 window = observe(by_end(after), LENS, PRIOR)
 estimate_pose(window, site)
-read_alarm_chart(window, site, AlarmRate(alarms_a_year=1.0, tracks_a_year=1e4))
+alarm_chart_result(window, site, AlarmRate(alarms_a_year=1.0, tracks_a_year=1e4))
 print(len(before) > 20, kinds() == before)
 """
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.geometry.ground import ground_from_pixel
-from models.monitoring.chart import KNOCKS, DriftChart, Knocked, ratios_of
+from models.monitoring.chart import OFFSET_GRID, DriftChart, GridOffset, ratios_of
 from models.monitoring.group_scores import SCORES
 from models.monitoring.verdict import DriftLimits
 from models.simulation.simulated_site import SiteConfig, draw_lanes
@@ -17,7 +17,7 @@ from studies.alarms.results import (
     AlarmResults,
     Delay,
     by_knock,
-    knocks_of,
+    offsets_of,
     rate_interval,
     share_within,
 )
@@ -36,8 +36,8 @@ EVEN = HabitConfig(
 @pytest.fixture
 def watch():
     """One knock, of the heading, moves the last of independent scores by 2; the level is 10."""
-    responses = np.zeros((SCORES, len(KNOCKS)))
-    responses[-1, KNOCKS.index(Knocked(parameter=3, size=math.radians(6)))] = 2.0
+    responses = np.zeros((SCORES, len(OFFSET_GRID)))
+    responses[-1, OFFSET_GRID.index(GridOffset(parameter=3, size=math.radians(6)))] = 2.0
     chart = DriftChart(
         speed_reference=None,
         middle=np.zeros(SCORES),
@@ -90,7 +90,7 @@ def test_delays_are_by_knock_and_never_is_not_within():
 
 
 def test_knocks_have_the_angle_that_is_asked():
-    found = knocks_of([5.0, 2.0], np.random.default_rng(0))
+    found = offsets_of([5.0, 2.0], np.random.default_rng(0))
     assert [(asked.angle_deg, asked.pan) for asked, _ in found] == [
         (5.0, False), (5.0, True), (2.0, False), (2.0, True)
     ]  # fmt: skip

@@ -8,8 +8,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.scenes import Scene, SceneTrack
-from studies.base_model.base_study import BaseOutcome, together, told
-from studies.protocol.base_runs import base_model
+from studies.base_model.base_study import BaseOutcome, report_lines, together
 from studies.protocol.cases import (
     HALVES_OF_PEOPLE,
     KNOCKED,
@@ -17,6 +16,7 @@ from studies.protocol.cases import (
     ProtocolCase,
     draw_case,
 )
+from studies.protocol.estimators import base_model
 from studies.protocol.learned import Learned
 
 
@@ -67,7 +67,7 @@ def test_windows_are_counted_once_whatever_their_cases():
         outcome("a", "base model", -1.2, 3.0), outcome("a", "fused", 2.0, 2.0),
         outcome("b", "base model", 3.0, 1.0), outcome("b", "fused", 2.0, 2.0),
     ]  # fmt: skip
-    lines = list(told(found))
+    lines = list(report_lines(found))
     assert "nearer than fused in 1 (angle) and 1 (height) of 2 windows" in lines[2]
     assert "base model" in lines[0]
     assert "3 cases" in lines[0]

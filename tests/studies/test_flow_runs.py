@@ -13,8 +13,8 @@ from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
 from studies.protocol.cases import ProtocolCase, judge_answer
+from studies.protocol.estimators import joint, joint_feet
 from studies.protocol.flow_runs import fused, registration
-from studies.protocol.joint_runs import joint, joint_feet
 from studies.protocol.learned import learn_case
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 

@@ -11,11 +11,9 @@ from models.simulation.simulated_site import (
     Lane,
     SiteConfig,
     draw_lanes,
-    draw_new_lane,
-    walk_changed,
 )
-from studies.paths.flow_study import study_site
-from studies.paths.simulated_site import draw_simulated_site
+from studies.paths.flow_study import draw_new_lane, study_site, walk_changed
+from studies.simulation.simulated_site import draw_simulated_site
 from tests.models.sites import LENS, PRIOR
 
 QUIET = SiteConfig(noise_px=0.0, standing_share=0.0, aside_m=0.0)

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from models.errors import ShapeError
 from models.geometry.ground import ground_from_pixel
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from studies.recordings import load_recording
 
 LENS = {
@@ -72,9 +72,9 @@ def test_cameras_before_people_on_the_ground_see_them_where_they_are(hall):
 def test_a_pan_brings_people_into_the_picture_who_were_beside_it(hall):
     camera = load_recording(hall)[0]
     track = camera.tracks[0].trajectory
-    still = knock_trajectory(track, camera.intrinsics, camera.true_pose, camera.true_pose)
-    panned = Knock(heading_rad=math.radians(8)).apply(camera.true_pose)
-    turned = knock_trajectory(track, camera.intrinsics, camera.true_pose, panned)
+    still = offset_trajectory(track, camera.intrinsics, camera.true_pose, camera.true_pose)
+    panned = PoseOffset(heading_rad=math.radians(8)).apply(camera.true_pose)
+    turned = offset_trajectory(track, camera.intrinsics, camera.true_pose, panned)
     assert still is not None
     assert turned is not None
     # 14 m ahead the picture ends about 13 m to the right; turned by 8 deg, at 17 and more: nobody

@@ -8,7 +8,7 @@ import pytest
 
 from models.errors import ShapeError
 from models.geometry.ground import pixel_from_ground
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import load_scene
@@ -83,16 +83,16 @@ def track(tmp_path, lens, pose):
 
 
 def test_no_knock_changes_nothing(lens, pose, track):
-    same_again = knock_trajectory(track, lens, pose, Knock().apply(pose))
+    same_again = offset_trajectory(track, lens, pose, PoseOffset().apply(pose))
     np.testing.assert_allclose(same_again.uv, track.uv, atol=1e-6)
 
 
 def test_a_knock_and_back_is_where_it_was(lens, pose, track):
-    knocked = Knock(tilt_rad=0.02, roll_rad=-0.02, log_height=0.05).apply(pose)
+    knocked = PoseOffset(tilt_rad=0.02, roll_rad=-0.02, log_height=0.05).apply(pose)
     assert knocked.height_m == pytest.approx(pose.height_m * math.exp(0.05))
-    seen = knock_trajectory(track, lens, pose, knocked)
+    seen = offset_trajectory(track, lens, pose, knocked)
     assert np.abs(seen.uv[0] - track.uv[0]).max() > 5
-    back = knock_trajectory(seen, lens, knocked, pose)
+    back = offset_trajectory(seen, lens, knocked, pose)
     rows = np.isin(track.time_s, back.time_s)
     np.testing.assert_allclose(back.uv, track.uv[rows], atol=1e-6)
 
@@ -101,10 +101,10 @@ def test_only_the_longest_run_inside_the_image_is_seen(lens, pose):
     v = np.array([700.0, 690, 680, 600, 700, 500, 510, 520, 530, 540, 715, 550])
     track = Trajectory(time_s=np.arange(12.0), uv=np.stack([np.full(12, 640.0), v], 1))
     # Looking up by 3.5 deg moves feet down by about 70 px: those below 650 leave the picture.
-    seen = knock_trajectory(track, lens, pose, replace(pose, tilt_rad=pose.tilt_rad - 0.061))
+    seen = offset_trajectory(track, lens, pose, replace(pose, tilt_rad=pose.tilt_rad - 0.061))
     assert seen.time_s.tolist() == [5, 6, 7, 8, 9]
     sky = replace(pose, tilt_rad=-1.0)
-    assert knock_trajectory(track, lens, pose, sky) is None
+    assert offset_trajectory(track, lens, pose, sky) is None
 
 
 def test_who_walks_behind_a_camera_that_was_turned_is_seen_before(lens, pose):
@@ -123,7 +123,7 @@ def test_who_walks_behind_a_camera_that_was_turned_is_seen_before(lens, pose):
     assert before.all()
     assert not after.all()
     track = Trajectory(time_s=np.arange(21.0), uv=uv)
-    seen = knock_trajectory(track, lens, pose, turned)
+    seen = offset_trajectory(track, lens, pose, turned)
     assert 2 <= seen.time_s.size < after.sum()
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.monitoring.chart import KNOCKS, DriftChart
+from models.monitoring.chart import OFFSET_GRID, DriftChart
 from models.monitoring.group_scores import SCORES
 from models.pose import assume_site, observe
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.scenes import Scene, SceneTrack
-from studies.changes import still_days as study
-from studies.changes.still_days import MOVES, StillDay, habits_of, told
+from studies.alarms import still_days as study
+from studies.alarms.still_days import MOVES, StillDay, habits_of, report_lines
 from tests.models.sites import LENS, PRIOR
 
 A_UNIT = 50.0  # of scores, for a radian and for a log
@@ -35,8 +35,8 @@ def scene() -> Scene:
 
 def chart_of_five(scene: Scene) -> DriftChart:
     """One whose first five scores tell tilt, roll, height, heading and pace, with a noise of 1."""
-    responses = np.zeros((SCORES, len(KNOCKS)))
-    for number, knock in enumerate(KNOCKS):
+    responses = np.zeros((SCORES, len(OFFSET_GRID)))
+    for number, knock in enumerate(OFFSET_GRID):
         responses[knock.parameter, number] = A_UNIT * knock.size
     walks = [track.trajectory for track in scene.tracks[:20]]
     return DriftChart(
@@ -82,12 +82,12 @@ def test_what_is_told_counts_alarms_and_names_delays():
         begin=0,
         tracks=700,
         excess=0.5,
-        knock_idx=0,
+        offset_idx=0,
         alarm_after=None,
         habits=np.array([math.radians(0.1), math.radians(0.2), 0.01, math.radians(0.3), 0.04]),
         delays={move: [10.0, 20.0, 30.0, np.inf] for move in MOVES},
     )
-    lines = list(told([day, replace(day, alarm_after=650, excess=1.5)]))
+    lines = list(report_lines([day, replace(day, alarm_after=650, excess=1.5)]))
     assert "0.10, 0.20, 1.00, 0.30, 4.00" in lines[0]
     assert "alarms: 1 of 2, while still" in lines
     assert "pan +2 deg: 30 walking groups in the median, inf in 80 %" in lines

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.pose.change_point import FEWEST_BESIDE, find_change
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -14,7 +14,7 @@ from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
 from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
 
-SLIGHT = Knock(tilt_rad=math.radians(1.5), roll_rad=0.0, log_height=0.0).apply(PRIOR)
+SLIGHT = PoseOffset(tilt_rad=math.radians(1.5), roll_rad=0.0, log_height=0.0).apply(PRIOR)
 
 
 @pytest.fixture(scope="module")

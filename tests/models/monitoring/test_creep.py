@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.errors import CheckpointError
-from models.monitoring.creep import read_creep
+from models.monitoring.creep import creep_result, posterior_mean_turns
 from models.monitoring.creep_log import (
     DAY_S,
     NUMBERS,
@@ -18,12 +18,11 @@ from models.monitoring.creep_log import (
     noise_of,
     weeks_of,
 )
-from models.monitoring.creep_posterior import believed_turns
-from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
 from models.monitoring.group_scores import score_groups
+from models.monitoring.serialization import creep_log_from_bytes, creep_log_to_bytes
 from models.pose import begin_creep_log, learn_site, log_creep, observe, without_creep
 from models.serialization import flattened
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.trajectory import by_end
 from tests.models.sites import LENS, PRIOR, tracks_of
 
@@ -68,7 +67,7 @@ def ramp(log, number, deg_a_month):
 @pytest.mark.parametrize("deg_a_month", [0.5, -1.0])
 def test_a_ramp_is_told_with_its_number_way_and_size(number, deg_a_month):
     log = blank(int(2.5 / abs(deg_a_month) * MONTH_DAYS))
-    creep = read_creep(with_moves(log, ramp(log, number, deg_a_month)), A_YEAR)
+    creep = creep_result(with_moves(log, ramp(log, number, deg_a_month)), A_YEAR)
     assert creep.moved
     assert creep.parameter == number
     assert math.degrees(creep.by) == pytest.approx(math.copysign(2.5, deg_a_month), rel=0.1)
@@ -79,7 +78,7 @@ def test_a_late_ramp_is_said_to_have_begun_late():
     log = blank(200)
     late = replace(log, since_day=20_140.0)
     turned = np.where(log.day_idx[:, None] >= 20_140, ramp(late, 3, 1.0), 0.0)
-    creep = read_creep(with_moves(log, turned), A_YEAR)
+    creep = creep_result(with_moves(log, turned), A_YEAR)
     assert creep.moved
     assert creep.since_day == pytest.approx(20_140, abs=15)
 
@@ -87,9 +86,9 @@ def test_a_late_ramp_is_said_to_have_begun_late():
 def test_still_cameras_are_called_creeping_as_rarely_as_is_allowed():
     rng = np.random.default_rng(5)
     logs = [drawn(blank(180), rng) for _ in range(200)]
-    told = sum(read_creep(log, A_YEAR).moved for log in logs)
+    told = sum(creep_result(log, A_YEAR).moved for log in logs)
     assert told <= 8  # one look at each, half a year in: 4 % at the most, were all looks one
-    often = sum(read_creep(log, 100.0).moved for log in logs)
+    often = sum(creep_result(log, 100.0).moved for log in logs)
     assert often > 60
 
 
@@ -98,30 +97,30 @@ def test_neither_height_nor_pace_creeps():
     for number in (2, 4):
         turned = np.zeros((150, NUMBERS))
         turned[:, number] = np.linspace(0, 0.1, 150)
-        assert not read_creep(with_moves(log, turned), A_YEAR).moved
+        assert not creep_result(with_moves(log, turned), A_YEAR).moved
 
 
 def test_few_people_say_nothing_and_only_whole_days_since_a_time_count():
     log = blank(60)
-    assert read_creep(blank(3), A_YEAR) is None
+    assert creep_result(blank(3), A_YEAR) is None
     turned = ramp(log, 0, 3.0)
-    assert read_creep(with_moves(log, turned), A_YEAR).moved
+    assert creep_result(with_moves(log, turned), A_YEAR).moved
     from_s = (20_000 + 57) * DAY_S
-    assert read_creep(with_moves(log, turned), A_YEAR, from_s) is None
+    assert creep_result(with_moves(log, turned), A_YEAR, from_s) is None
     assert weeks_of(log, from_s - 30 * DAY_S + 1).groups.sum() == 18 * 32
 
 
 def test_a_turn_is_believed_once_it_is_clear_and_a_still_camera_is_left_alone():
     log = blank(120)
     days = np.array([20_010.0, 20_060.0, 20_119.0])
-    crept = believed_turns(with_moves(log, ramp(log, 3, 1.0)), days)
+    crept = posterior_mean_turns(with_moves(log, ramp(log, 3, 1.0)), days)
     true = np.radians((days - 20_000) / MONTH_DAYS)
     assert_allclose(crept[:, 3], true, atol=math.radians(0.5))
     assert np.abs(crept[:, :3]).max() < math.radians(0.05)
     rng = np.random.default_rng(2)
-    still = np.array([believed_turns(drawn(log, rng), days) for _ in range(50)])
+    still = np.array([posterior_mean_turns(drawn(log, rng), days) for _ in range(50)])
     assert np.median(np.abs(still)) < math.radians(0.01)
-    assert not believed_turns(blank(2), days).any()
+    assert not posterior_mean_turns(blank(2), days).any()
 
 
 @pytest.fixture(scope="module")
@@ -151,10 +150,10 @@ def test_a_log_is_the_same_however_its_days_came(first):
 def test_a_turned_camera_pulls_its_log_that_way(first):
     site, _, later = first
     for name, number in (("tilt_rad", 0), ("heading_rad", 3)):
-        knocked = Knock(
+        knocked = PoseOffset(
             **{"tilt_rad": 0.0, "roll_rad": 0.0, "log_height": 0.0, name: math.radians(2)}
         ).apply(PRIOR)
-        seen = [knock_trajectory(track, LENS, PRIOR, knocked) for track in later]
+        seen = [offset_trajectory(track, LENS, PRIOR, knocked) for track in later]
         seen = [track for track in seen if track is not None and track.long_enough]
         log = log_creep(begin_creep_log(site, 0.0), observe(by_end(seen), LENS, PRIOR), site)
         pull = log.pulls.sum(axis=0) * np.sqrt(np.diag(np.linalg.inv(log.information)))
@@ -169,10 +168,10 @@ def test_tracks_without_their_turn_are_seen_as_from_the_prior_pose(first):
     site, known, later = first
     log = blank(120)
     log = with_moves(log, ramp(log, 3, 1.0))
-    turn = believed_turns(log, np.array([20_100.0]))[0]
+    turn = posterior_mean_turns(log, np.array([20_100.0]))[0]
     stood = replace(PRIOR, heading_rad=PRIOR.heading_rad + turn[3])
     track = replace(known[0], time_s=known[0].time_s - known[0].time_s[-1] + 20_100.0 * DAY_S)
-    seen = knock_trajectory(track, LENS, PRIOR, stood)
+    seen = offset_trajectory(track, LENS, PRIOR, stood)
     (back,) = without_creep([seen], LENS, PRIOR, log)
     assert np.abs(seen.uv[0] - track.uv[0]).max() > 5
     same = np.isin(track.time_s, back.time_s)

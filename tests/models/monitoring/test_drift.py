@@ -6,9 +6,9 @@ import pytest
 
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
-from models.monitoring.chart import Reading
-from models.monitoring.clock import clock_fault
+from models.monitoring.chart import ChartResult
 from models.monitoring.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
+from models.monitoring.verdict_reasons import clock_fault
 from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
@@ -132,8 +132,8 @@ def test_the_second_look_is_asked_for_where_a_verdict_may_change():
     assert not asks_again(drift(1.5), LIMITS, drifting=True)
 
 
-def reading(statistic, parameter=3):
-    return Reading(
+def charted(statistic, parameter=3):
+    return ChartResult(
         statistic=statistic,
         level=10.0,
         parameter=parameter,
@@ -145,17 +145,17 @@ def reading(statistic, parameter=3):
 
 
 def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
-    alarmed = judge(drift(), LIMITS, (), reading(10.5))
+    alarmed = judge(drift(), LIMITS, (), charted(10.5))
     assert (alarmed.drifted, alarmed.streak) == (("heading",), 1)
-    verdict = judge(drift(5), LIMITS, (), reading(10.5))
+    verdict = judge(drift(5), LIMITS, (), charted(10.5))
     assert verdict.drifted == ("tilt",)  # the pose says better which
-    assert not judge(drift(), LIMITS, (), reading(9.5)).drifting
+    assert not judge(drift(), LIMITS, (), charted(9.5)).drifting
     for statistic, holds in ((7.5, True), (6.5, False)):
-        still = judge(drift(), LIMITS, alarmed.drifted, reading(statistic), drift())
+        still = judge(drift(), LIMITS, alarmed.drifted, charted(statistic), drift())
         assert still.drifting == holds
-    assert judge(drift(), LIMITS, alarmed.drifted, reading(6.5), drift(1.5)).drifting
+    assert judge(drift(), LIMITS, alarmed.drifted, charted(6.5), drift(1.5)).drifting
     unknown = drift(unidentifiable=THREE)
-    assert judge(unknown, LIMITS, (), reading(10.5)).drifting
+    assert judge(unknown, LIMITS, (), charted(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():

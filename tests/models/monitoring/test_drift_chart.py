@@ -10,19 +10,19 @@ from models.errors import CheckpointError
 from models.monitoring import chart_learning
 from models.monitoring.chart import (
     CLOCK,
-    KNOCKS,
-    LENGTHS,
+    OFFSET_GRID,
     DriftChart,
-    Knocked,
+    GridOffset,
     highest,
     ratios_of,
     trace,
 )
-from models.monitoring.chart import read_chart as read_chart_by
+from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
-from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
-from models.monitoring.clock import may_be_clock
+from models.monitoring.config import LENGTHS
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
+from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
+from models.monitoring.verdict_reasons import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import candidate_of, learn_flow
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
@@ -38,8 +38,8 @@ CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = 1000 / 36_500  # a run is 1000 walking groups: of 100 a day
 
 
-def read_chart(chart, scores, alarms):
-    return read_chart_by(chart, scores, alarms, calm_ratio=0.7, calm_groups=12)
+def chart_result(chart, scores, alarms):
+    return chart_result_by(chart, scores, alarms, calm_ratio=0.7, calm_groups=12)
 
 
 def feet(tracks):
@@ -77,7 +77,7 @@ def turned(**by):
 def plain(walking_groups=1e9, responses=None, typical=0.0):
     """A chart of independent scores of unit variance; one knock moves one of them by one."""
     if responses is None:
-        responses = np.zeros((SCORES, len(KNOCKS)))
+        responses = np.zeros((SCORES, len(OFFSET_GRID)))
     return DriftChart(
         speed_reference=None,
         middle=np.zeros(SCORES),
@@ -93,8 +93,8 @@ def plain(walking_groups=1e9, responses=None, typical=0.0):
 
 def far_heading():
     """A chart that knows one knock alone: 6 deg of heading adds 1 to the last score."""
-    responses = np.zeros((SCORES, len(KNOCKS)))
-    responses[-1, KNOCKS.index(Knocked(parameter=3, size=math.radians(6)))] = 1.0
+    responses = np.zeros((SCORES, len(OFFSET_GRID)))
+    responses[-1, OFFSET_GRID.index(GridOffset(parameter=3, size=math.radians(6)))] = 1.0
     return responses
 
 
@@ -104,7 +104,7 @@ def test_the_ratio_is_that_of_a_shift_by_hand():
     apart[:, -1] = 1.5
     path = trace(ratios_of(plain(responses=far_heading())), apart)
     assert path.statistic[-1] == pytest.approx(18.0)
-    assert KNOCKS[path.knock_idx[-1]].parameter == 3
+    assert OFFSET_GRID[path.offset_idx[-1]].parameter == 3
     # A reference of 16 walking groups, counted one and a half times, is more unsure than they are.
     path = trace(ratios_of(plain(walking_groups=16.0, responses=far_heading())), apart)
     assert path.statistic[-1] == pytest.approx(18.0 / 2.5)
@@ -144,12 +144,12 @@ def test_the_newest_groups_count_and_say_since_when():
     chart = plain(responses=far_heading())
     values = np.zeros((100, SCORES))
     values[70:, -1] = 2.0
-    reading = read_chart(chart, GroupScores(values=values, last=np.arange(100) * 3), ONE_A_YEAR)
-    assert (reading.parameter, reading.sign, reading.moved) == (3, 1, True)
-    assert reading.walking_groups in LENGTHS
-    assert reading.track_idx == pytest.approx(210, abs=15)
+    result = chart_result(chart, GroupScores(values=values, last=np.arange(100) * 3), ONE_A_YEAR)
+    assert (result.parameter, result.sign, result.moved) == (3, 1, True)
+    assert result.walking_groups in LENGTHS
+    assert result.track_idx == pytest.approx(210, abs=15)
     few = GroupScores(values=values[:15], last=np.arange(15))
-    assert read_chart(chart, few, ONE_A_YEAR) is None
+    assert chart_result(chart, few, ONE_A_YEAR) is None
 
 
 def test_it_matters_not_after_which_group_it_is_read():
@@ -163,7 +163,7 @@ def test_it_matters_not_after_which_group_it_is_read():
     fell = first + int(np.flatnonzero(path.statistic[first:] < 0.7 * level)[0])
 
     def read(count):
-        return read_chart(
+        return chart_result(
             chart, GroupScores(values=values[:count], last=np.arange(count)), ONE_A_YEAR
         )
 
@@ -179,10 +179,10 @@ def test_it_matters_not_after_which_group_it_is_read():
 def test_no_group_counts_for_more_than_five_of_its_kind():
     values = np.zeros((60, SCORES))
     values[-1, -1] = 1e6
-    reading = read_chart(
+    result = chart_result(
         plain(responses=far_heading()), GroupScores(values=values, last=np.arange(60)), ONE_A_YEAR
     )
-    assert not reading.moved
+    assert not result.moved
 
 
 def test_rarer_alarms_need_more_and_few_groups_too():
@@ -208,7 +208,7 @@ def test_bytes_give_the_chart_back_and_others_are_refused(learned):
     )
     with pytest.raises(CheckpointError):
         chart_from_bytes(b"no chart")
-    with pytest.raises(CheckpointError, match="knocks"):
+    with pytest.raises(CheckpointError, match="offsets are needed"):
         chart_from_bytes(chart_to_bytes(replace(chart, responses=chart.responses[:, :5])))
 
 
@@ -225,9 +225,11 @@ def test_bytes_give_the_chart_back_and_others_are_refused(learned):
 )
 def test_a_knock_is_found_with_its_sign_within_sixty_tracks(lanes, learned, move, parameter, sign):
     chart, usual = learned
-    reading = read_chart(chart, score_groups(walk(lanes, turned(**move), 60, 5), usual), ONE_A_YEAR)
-    assert reading.moved
-    assert (reading.parameter, reading.sign) == (parameter, sign)
+    result = chart_result(
+        chart, score_groups(walk(lanes, turned(**move), 60, 5), usual), ONE_A_YEAR
+    )
+    assert result.moved
+    assert (result.parameter, result.sign) == (parameter, sign)
 
 
 def test_a_still_camera_is_not_taken_for_moved(lanes, learned):
@@ -241,8 +243,8 @@ def test_people_in_the_rain_are_not_a_knock(lanes, learned):
     """Everybody 4 % faster for 300 people: the height is in doubt, and no alarm."""
     chart, usual = learned
     rainy = replace(CONFIG, speed_mean_mps=CONFIG.speed_mean_mps * 1.04)
-    reading = read_chart(chart, score_groups(walk(lanes, PRIOR, 300, 8, rainy), usual), ONE_A_YEAR)
-    assert not reading.moved
+    result = chart_result(chart, score_groups(walk(lanes, PRIOR, 300, 8, rainy), usual), ONE_A_YEAR)
+    assert not result.moved
 
 
 def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
@@ -250,11 +252,11 @@ def test_a_scale_waits_until_it_can_be_called_the_clock(lanes, learned):
     chart, usual = learned
     fast = walk_site(LENS, PRIOR, lanes, CONFIG, 150, np.random.default_rng(9))
     slow = feet([replace(t, time_s=t.time_s[0] + (t.time_s - t.time_s[0]) * 1.2) for t in fast])
-    reading = read_chart(chart, score_groups(slow, usual), ONE_A_YEAR)
-    assert reading.moved
-    assert (reading.parameter, reading.sign) == (CLOCK, 1)
-    assert not may_be_clock(reading)  # by now a pose can tell
-    early = read_chart(chart, score_groups(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
+    result = chart_result(chart, score_groups(slow, usual), ONE_A_YEAR)
+    assert result.moved
+    assert (result.parameter, result.sign) == (CLOCK, 1)
+    assert not may_be_clock(result)  # by now a pose can tell
+    early = chart_result(chart, score_groups(of_tracks(slow, np.arange(20)), usual), ONE_A_YEAR)
     assert may_be_clock(early)
 
 
@@ -266,10 +268,10 @@ def test_in_a_crowd_answers_are_learned_of_so_many_groups(lanes):
     site = learn_speed_reference(crowd, PRIOR, WalkConfig(), 0)
     first = fold_maps(crowd, LENS, AT, 0).each[0]
     for wanted in (5, 10, 15, 20):
-        asked = chart_learning._asked(crowd, PRIOR, site, first, wanted)
-        assert len(asked.still) > 20
-        assert len(asked.before) == wanted
-        assert asked.knocked.shape == (len(KNOCKS), wanted, SCORES)
+        scores = chart_learning._fold_scores(crowd, PRIOR, site, first, wanted)
+        assert len(scores.still) > 20
+        assert len(scores.before) == wanted
+        assert scores.offset.shape == (len(OFFSET_GRID), wanted, SCORES)
 
 
 @pytest.mark.parametrize(("groups", "together"), [(1000, 24), (100, 9), (13, 2)])

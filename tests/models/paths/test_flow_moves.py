@@ -16,8 +16,6 @@ from models.simulation.simulated_site import (
     Lane,
     SiteConfig,
     draw_lanes,
-    draw_new_lane,
-    walk_changed,
     walk_site,
 )
 from models.simulation.walkers import WalkConfig
@@ -25,6 +23,7 @@ from models.tracks.observing import observe
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
+from studies.paths.flow_study import draw_new_lane, walk_changed
 from tests.models.sites import LENS, PRIOR
 
 AT = candidate_of(PRIOR)

@@ -8,7 +8,7 @@ import pytest
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.upright import tops_seen
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.linking import count_walks, link_pieces, walks_of
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory
@@ -85,7 +85,7 @@ def test_who_might_be_either_is_neither():
 
 
 def test_pieces_are_linked_after_a_knock_too():
-    knocked = Knock(
+    knocked = PoseOffset(
         tilt_rad=math.radians(8), roll_rad=math.radians(-6), log_height=0.15, heading_rad=0.2
     ).apply(PRIOR)
     pieces = [walk(0, 3, pose=knocked), walk(4, 6, pose=knocked), walk(7.5, 10, pose=knocked)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.geometry.plane_parameters import plane_parameters_of
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
@@ -21,7 +21,7 @@ def test_intervals_cover_and_errors_fall_as_their_bound_does():
     errors, sds, bounds = np.zeros((3, SITES, 2, 3))
     for site in range(SITES):
         tilt, roll, log_height = np.random.default_rng([9, site]).uniform(-1, 1, 3)
-        knocked = Knock(
+        knocked = PoseOffset(
             tilt_rad=math.radians(8) * tilt,
             roll_rad=math.radians(8) * roll,
             log_height=0.15 * log_height,

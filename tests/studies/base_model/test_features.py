@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.levelled import moved_by
 from models.geometry.pose import CameraPose
 from studies.base_model.features import (
     FEATURES,
@@ -19,6 +18,7 @@ from studies.base_model.features import (
     segment_features,
     walking,
 )
+from studies.base_model.offsets import moved_by
 from studies.base_model.segments import Segments
 from studies.simulation.cameras import CameraRange, draw_camera
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.pose import CameraSite, DriftLimits, Trajectory, learn_site, observe
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import by_end
@@ -126,7 +126,7 @@ def test_a_replay_tells_before_from_after_a_move():
     assert still.before.tracks == 170
     assert still.before.looks == 6
     assert still.before.alarm_after is None
-    moved = replay(scene, Knock(tilt_rad=math.radians(5)), 0, 120, plan)
+    moved = replay(scene, PoseOffset(tilt_rad=math.radians(5)), 0, 120, plan)
     assert moved.before.tracks < still.before.tracks
     assert moved.after is not None
     assert moved.after.alarm_after is not None

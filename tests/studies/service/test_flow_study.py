@@ -7,18 +7,18 @@ import pytest
 from rich.console import Console
 
 from models.reasons import Reason, TracksCode
-from models.simulation.pose_offset import Knock
-from studies.paths.flow_study import ChangedResult, KnockedResult, SiteResults
-from studies.paths.run import changed_table, knocked_table
+from models.simulation.pose_offset import PoseOffset
+from studies.paths.flow_study import ChangedResult, OffsetResult, SiteResults
+from studies.paths.flow_tables import changed_table, knocked_table
 from tests.service.commands.test_replay import surefoot
 
 
 def site(number: int, error_deg: float, *, off_deg: float) -> SiteResults:
     return SiteResults(
         site=number,
-        knock=Knock(),
+        knock=PoseOffset(),
         knocked=(
-            KnockedResult(
+            OffsetResult(
                 tracks=25,
                 errors=(error_deg, -error_deg, 2 * error_deg, error_deg / 100),
                 covered=(True, True, error_deg < 2, True),

@@ -4,9 +4,8 @@ from io import StringIO
 
 from rich.console import Console
 
-from studies.protocol.bar import BARS
 from studies.protocol.report import Overall, SceneFigures
-from studies.protocol.tables import TABLE_WIDTH, overall_table, scene_table
+from studies.protocol.tables import BARS, TABLE_WIDTH, overall_table, scene_table
 
 
 def printed(table) -> str:

@@ -17,7 +17,7 @@ from studies.served.outcome_file import OutcomeFile
 from studies.served.outcomes import ParameterOutcome, ServedOutcome
 from studies.served.replays import ReplayOutcome, Stretch
 from studies.served.tables import BETWEEN, all_tables
-from studies.served.tasks import Asked, Found, Table, tasks_of
+from studies.served.tasks import CaseId, CaseResult, Table, tasks_of
 from tests.studies.test_partings import scene_of
 
 NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True)
@@ -45,32 +45,34 @@ REPLAYED = ReplayOutcome(
     measured=SERVED.parameters,
     seconds=9.0,
 )
-ASKED = Asked(table=Table.TIME, scene="made-up", seed=0, knock="still", batch=50, seen=400)
-REPLAY = replace(ASKED, table=Table.REPLAYS, knock="pan-2", reference=1000, seen=None)
+CASE = CaseId(table=Table.TIME, scene="made-up", seed=0, knock="still", batch=50, seen=400)
+REPLAY = replace(CASE, table=Table.REPLAYS, knock="pan-2", reference=1000, seen=None)
 
 
 def test_outcomes_are_read_again_as_they_were(tmp_path):
     path = tmp_path / "p.jsonl"
     kept = OutcomeFile(path)
-    kept.add([Found(asked=ASKED, outcome=SERVED), Found(asked=REPLAY, outcome=REPLAYED)])
-    kept.add([Found(asked=replace(ASKED, seed=1), outcome=None, failure="LinAlgError()")])
+    kept.add(
+        [CaseResult(case_id=CASE, outcome=SERVED), CaseResult(case_id=REPLAY, outcome=REPLAYED)]
+    )
+    kept.add([CaseResult(case_id=replace(CASE, seed=1), outcome=None, failure="LinAlgError()")])
     again = OutcomeFile(path)
     assert again.found == {
-        ASKED: Found(asked=ASKED, outcome=SERVED),
-        REPLAY: Found(asked=REPLAY, outcome=REPLAYED),
+        CASE: CaseResult(case_id=CASE, outcome=SERVED),
+        REPLAY: CaseResult(case_id=REPLAY, outcome=REPLAYED),
     }
     assert again.heading == kept.heading
 
 
 def test_a_line_that_was_cut_off_is_forgotten_and_the_next_is_whole(tmp_path):
     path = tmp_path / "p.jsonl"
-    OutcomeFile(path).add([Found(asked=ASKED, outcome=SERVED)])
+    OutcomeFile(path).add([CaseResult(case_id=CASE, outcome=SERVED)])
     with path.open("a") as file:
         file.write('{"asked": {"table": "ti')
     kept = OutcomeFile(path)
-    assert set(kept.found) == {ASKED}
-    kept.add([Found(asked=REPLAY, outcome=REPLAYED)])
-    assert set(OutcomeFile(path).found) == {ASKED, REPLAY}
+    assert set(kept.found) == {CASE}
+    kept.add([CaseResult(case_id=REPLAY, outcome=REPLAYED)])
+    assert set(OutcomeFile(path).found) == {CASE, REPLAY}
 
 
 def test_outcomes_of_other_code_and_other_files_are_refused(tmp_path):
@@ -87,11 +89,11 @@ def test_outcomes_of_other_code_and_other_files_are_refused(tmp_path):
 
 def test_tables_say_what_outcomes_come_to(tmp_path):
     kept = OutcomeFile(tmp_path / "p.jsonl")
-    fault = replace(ASKED, table=Table.FAULTS, fault="fragments")
+    fault = replace(CASE, table=Table.FAULTS, fault="fragments")
     rows = [
-        Found(asked=ASKED, outcome=SERVED),
-        Found(asked=fault, outcome=SERVED),
-        Found(asked=REPLAY, outcome=REPLAYED),
+        CaseResult(case_id=CASE, outcome=SERVED),
+        CaseResult(case_id=fault, outcome=SERVED),
+        CaseResult(case_id=REPLAY, outcome=REPLAYED),
     ]
     said = all_tables(kept.heading, rows)
     cells = "0.75 (0.8) | 1.2 % (1) | 0.25, 1.00, 0.25 | 100, 0, 100, 100 % | all | 0 | 100% |"
@@ -149,9 +151,9 @@ def test_tasks_share_their_reference_and_name_what_is_unknown(tmp_path):
     ask = {"tables": [Table.TIME], "seeds": [0, 1], "batch": 50, "faults": []}
     tasks = tasks_of([folder], **ask)
     # Halves in time are the same with every seed: a still camera is one case, not two.
-    assert [len(task.asked) for task in tasks] == [7, 6]
-    assert {each.seed for each in tasks[1].asked} == {1}
-    assert len({each for task in tasks for each in task.asked}) == 13
+    assert [len(task.case_ids) for task in tasks] == [7, 6]
+    assert {each.seed for each in tasks[1].case_ids} == {1}
+    assert len({each for task in tasks for each in task.case_ids}) == 13
     assert tasks_of([folder], **{**ask, "tables": [Table.REPLAYS]}) == []  # too short
     with pytest.raises(ShapeError, match="got 'rain'"):
         tasks_of([folder], **{**ask, "faults": ["rain"]})

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.pose import estimate_pose, learn_site, observe
 from models.quantiles import Z90
-from models.simulation.pose_offset import Knock, knock_trajectory
+from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.head_foot import observe_heads
 from models.tracks.trajectory import by_end
 from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
@@ -168,9 +168,9 @@ def test_heads_go_with_their_people_when_the_camera_is_knocked():
     (tracks,) = tracks_of(6, (PRIOR, 5), boxes=True)
     rng = np.random.default_rng(6)
     (track, *_) = with_heads(tracks, LENS, PRIOR, LEANING, rng)
-    moved = Knock(tilt_rad=0.05, roll_rad=0.04, heading_rad=0.1).apply(PRIOR)
-    seen = knock_trajectory(track, LENS, PRIOR, moved)
-    back = knock_trajectory(seen, LENS, moved, PRIOR)
+    moved = PoseOffset(tilt_rad=0.05, roll_rad=0.04, heading_rad=0.1).apply(PRIOR)
+    seen = offset_trajectory(track, LENS, PRIOR, moved)
+    back = offset_trajectory(seen, LENS, moved, PRIOR)
     kept = np.isin(track.time_s, back.time_s)
     known = np.isfinite(back.head_uv[:, 0])
     assert known.sum() > 3

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from models.geometry.pose_parameters import PoseParameters
-from models.monitoring.chart import CLOCK, Reading
+from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
-from models.monitoring.verdict_reasons import reason_of_drift, reason_of_reading
+from models.monitoring.verdict_reasons import reason_of_chart, reason_of_drift
 from models.reasons import Reason, TracksCode
 from service.reason_words import group_in_words, in_words
 from service.reasons import (
@@ -212,7 +212,7 @@ def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():
 
 @pytest.mark.parametrize(("number", "name"), [(0, "tilt"), (2, "height"), (CLOCK, "times")])
 def test_a_suspicious_reading_is_a_reason(number, name):
-    reading = Reading(
+    chart = ChartResult(
         statistic=9.0,
         level=8.0,
         parameter=number,
@@ -221,7 +221,7 @@ def test_a_suspicious_reading_is_a_reason(number, name):
         track_idx=3,
         suspicious=True,
     )
-    reason = reason_of_reading(reading)
+    reason = reason_of_chart(chart)
     assert reason is not None
     assert (reason.code, reason.values["number"]) == (T.CHART, name)
-    assert reason_of_reading(replace(reading, suspicious=False)) is None
+    assert reason_of_chart(replace(chart, suspicious=False)) is None

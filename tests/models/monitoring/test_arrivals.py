@@ -7,15 +7,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.monitoring.arrivals import (
-    Rhythm,
+    ArrivalProcess,
     SilenceRule,
     chance_of_silence,
     delay_of,
     expected_tracks,
     judge_silence,
-    learn_rhythm,
+    learn_arrivals,
 )
-from studies.alarms.rhythm_study import describe, study_rhythm
+from studies.alarms.arrivals_study import describe, study_rhythm
 
 RULE = SilenceRule(false_per_year=1.0, least_s=600.0, limit_s=86_400.0)
 DAY_CELLS, WEEKEND_CELLS = np.arange(24), np.arange(24, 48)
@@ -23,7 +23,7 @@ DAY_CELLS, WEEKEND_CELLS = np.arange(24), np.arange(24, 48)
 
 def rhythm(rates=None, burst=1.0, shape=10.0):
     rates = tuple(rates if rates is not None else [2.0] * 48)
-    return Rhythm(rates=rates, burst=burst, shape=shape, usual_gap_s=60.0, days=14)
+    return ArrivalProcess(rates=rates, burst=burst, shape=shape, usual_gap_s=60.0, days=14)
 
 
 def days(weekday, weekend, weeks):
@@ -35,7 +35,7 @@ def days(weekday, weekend, weeks):
 
 def learned(counts, cells, known=None, times_s=()):
     known = np.ones(len(counts), dtype=bool) if known is None else known
-    return learn_rhythm(counts, cells, known, 0, np.array(times_s, dtype=float))
+    return learn_arrivals(counts, cells, known, 0, np.array(times_s, dtype=float))
 
 
 def test_groups_of_a_year():
@@ -180,7 +180,7 @@ def test_how_late_tracks_come(latest_s, delay_s):
 def test_what_is_no_rhythm_is_refused(change):
     numbers = {"rates": (1.0,) * 48, "burst": 1.0, "shape": 1.0, "usual_gap_s": 1.0, "days": 7}
     with pytest.raises(ValueError, match=next(iter(change))):
-        Rhythm(**{**numbers, **change})
+        ArrivalProcess(**{**numbers, **change})
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The offset of a regressor at a site: what a reference takes off, and what stays unknown."""
+"""The offset of an estimator on a site, taken off by its reference."""
 
 import math
 
@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.plane_parameters import PlaneEstimate, plane_parameters_of
 from models.geometry.pose import CameraPose
-from studies.regressors.site_offset import SITE_BIAS_SD, without_offset
+from studies.protocol.regressors import SITE_BIAS_SD, without_offset
 
 PRIOR = CameraPose(height_m=5, tilt_rad=0.2, roll_rad=-0.05)
 

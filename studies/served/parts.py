@@ -15,10 +15,10 @@ from rich.console import Console
 from models.monitoring.verdict import DriftLimits
 from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
-from studies.parts.catalogue import PARTS
 from studies.runs import with_bar
 from studies.served.figures import Figures, figures_of
 from studies.served.outcomes import ServedOutcome
+from studies.served.parts_catalogue import PARTS
 from studies.served.replays import ReplayPlan
 from studies.served.tasks import Table, tasks_of, work
 from studies.served.windows import Window
@@ -93,12 +93,14 @@ def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartF
     begun_s, rows = time.process_time(), []
     with nullcontext() if part == WHOLE else PARTS[part].switched_off():
         for task in tasks:
-            rows += [each for each in work(task, _PLAN) if each.asked.fault == fault]
+            rows += [each for each in work(task, _PLAN) if each.case_id.fault == fault]
     served = [row for row in rows if isinstance(row.outcome, ServedOutcome)]
     outcomes = [row.outcome for row in served if isinstance(row.outcome, ServedOutcome)]
-    still = figures_of([o for r, o in zip(served, outcomes, strict=True) if _stands(r.asked.knock)])
+    still = figures_of(
+        [o for r, o in zip(served, outcomes, strict=True) if _stands(r.case_id.knock)]
+    )
     moved = figures_of(
-        [o for r, o in zip(served, outcomes, strict=True) if not _stands(r.asked.knock)]
+        [o for r, o in zip(served, outcomes, strict=True) if not _stands(r.case_id.knock)]
     )
     own = [n for outcome in outcomes for n in outcome.parameters if n.identifiable]
     return PartFigures(

@@ -26,7 +26,7 @@ _USUAL_SHARE = 0.7  # of cameras, at the usual sampling step
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartPlan:
-    """How starting weights are trained: what is drawn, for how long, and the seed.
+    """Plan of a training of starting weights: what is drawn, for how long, and the seed.
 
     People walk at a mean pace between `speed_mean_mps`, which each camera knows, and differ by a
     standard deviation between `speed_sd_mps`, which none does.

@@ -5,8 +5,8 @@ import numpy as np
 from hypothesis import given
 from numpy.testing import assert_allclose
 
-from models.geometry.levelled import level_from_camera, moved_by, offset_between
 from models.geometry.pose import CameraPose
+from studies.base_model.offsets import moved_by, offset_between
 from tests.strategies import poses
 
 
@@ -30,5 +30,5 @@ def test_a_move_and_its_offset_are_one(pose: CameraPose):
 
 
 def test_rays_are_levelled(pose: CameraPose):
-    ahead = level_from_camera(pose) @ np.array([0.0, 0.0, 1.0])
+    ahead = pose.level_from_camera @ np.array([0.0, 0.0, 1.0])
     assert_allclose(ahead, [0.0, cos(radians(22)), -sin(radians(22))], atol=1e-12)

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.monitoring.chart import KNOCKS, RUN, DriftChart, Ratios, ratios_of, slope_of, trace
+from models.monitoring.chart import OFFSET_GRID, DriftChart, Ratios, ratios_of, slope_of, trace
+from models.monitoring.config import RUN
 from models.monitoring.group_scores import score_groups, scores_at
 from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
@@ -50,27 +51,27 @@ MOVES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StillDay:
-    """What a chart made of people before a camera that stands.
+    """Chart of people before a camera that stands.
 
-    `excess` is the highest statistic in units of the level, by a knock of the grid with
-    `knock_idx`; the first alarm was after `alarm_after` tracks, None where there was none. `habits`
-    (5,) are standard deviations of tilt, roll, log height, heading and log pace among blocks of 100
-    walking groups, beyond chance. `delays` are how many walking groups each move took at each of
-    some moments; infinite where it took more than were waited for.
+    `excess` is the highest statistic in units of the level, by an offset of the grid,
+    `offset_idx`; the first alarm was after `alarm_after` tracks, None where there was none.
+    `habits` (5,) are standard deviations of tilt, roll, log height, heading and log pace among
+    blocks of 100 walking groups, beyond chance. `delays` are how many walking groups each move
+    took at each of some moments; infinite where it took more than were waited for.
     """
 
     camera: str
     begin: int
     tracks: int
     excess: float
-    knock_idx: int
+    offset_idx: int
     alarm_after: int | None
     habits: Array
     delays: dict[str, list[float]]
 
 
 def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
-    """What becomes of a camera after references that begin with one person or another."""
+    """Charts of a camera after references that begin with one person or another."""
     prior, lens = scene.true_pose, scene.intrinsics
     tracks = [track.trajectory for track in first_seen(scene, scene.tracks, prior, None)]
     tracks.sort(key=lambda track: float(track.time_s[0]))
@@ -105,7 +106,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
             begin=begin,
             tracks=len(rest),
             excess=float(path.statistic[highest]) / level,
-            knock_idx=int(path.knock_idx[highest]),
+            offset_idx=int(path.offset_idx[highest]),
             alarm_after=int(scores.last[over[0]]) if over.size else None,
             habits=habits_of(chart, apart),
             delays=delays,
@@ -113,7 +114,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
 
 
 def _delays(ratios: Ratios, still: Array, moved: Array, level: float) -> Iterator[float]:
-    """How many walking groups a move takes at some moments, after others before a still camera."""
+    """Delays of a move at some moments, in walking groups after others before a still camera."""
     for begin in np.linspace(0, max(len(moved) - _WAIT, 0), _MOMENTS).astype(int):
         lead = still[max(begin - _LEAD, 0) : begin]
         both = np.concatenate([lead, moved[begin : begin + _WAIT]])
@@ -122,7 +123,7 @@ def _delays(ratios: Ratios, still: Array, moved: Array, level: float) -> Iterato
 
 
 def habits_of(chart: DriftChart, apart: Array) -> Array:
-    """How much blocks of 100 walking groups move (5,) among one another, beyond chance.
+    """Variances (5,) of blocks of 100 walking groups among one another, as moves, beyond chance.
 
     Source: Laird and Ware 1982, the variances of random effects by EM.
 
@@ -142,14 +143,14 @@ def habits_of(chart: DriftChart, apart: Array) -> Array:
     return np.asarray(np.sqrt(variance))
 
 
-def told(days: Sequence[StillDay]) -> Iterator[str]:
+def report_lines(days: Sequence[StillDay]) -> Iterator[str]:
     """Lines: each reference; alarms among all; habits; delays."""
     for day in days:
-        knock = KNOCKS[day.knock_idx]
+        offset = OFFSET_GRID[day.offset_idx]
         habits = ", ".join(f"{each:.2f}" for each in day.habits * _PERCENT_OR_DEG)
         yield (
             f"{day.camera:20} from {day.begin:4}, {day.tracks:4} tracks: "
-            f"highest {day.excess:.2f} of the level ({_NUMBERS[knock.parameter]}), "
+            f"highest {day.excess:.2f} of the level ({_NUMBERS[offset.parameter]}), "
             f"alarm after {day.alarm_after}; habits {habits} (deg, deg, %, deg, %)"
         )
     alarms = sum(day.alarm_after is not None for day in days)
@@ -178,4 +179,4 @@ def main(arguments: Sequence[str]) -> None:
         for scene in load_recording(folder):
             days += still_days(scene, chosen.alarms_a_year)
             sys.stderr.write(f"{scene.scene_id} is done\n")
-    sys.stdout.write("\n".join(told(days)) + "\n")
+    sys.stdout.write("\n".join(report_lines(days)) + "\n")

@@ -46,7 +46,7 @@ class Part:
 
     @property
     def lines(self) -> int:
-        """How many lines would go with it."""
+        """Lines that would go with it."""
         return sum(_lines(each) for each in self.source)
 
     @contextmanager
@@ -121,11 +121,11 @@ PARTS: dict[str, Part] = {
         words="how freely speeds vary by place is chosen by halves",
         off=(
             (
-                "models.walking.reference.learning:as_free_as_told",
+                "models.walking.reference.learning:_cross_validated",
                 lambda observations, prior, blank, seed: blank,
             ),
         ),
-        source=("models/walking/reference/freedom.py",),
+        source=("models.walking.reference.learning:_cross_validated",),
     ),
     "bandwidths": Part(
         words="the map's bandwidths are chosen by people left out",

@@ -15,13 +15,13 @@ import numpy as np
 
 from models.geometry.rotation import Array
 from models.monitoring.arrivals import (
-    Rhythm,
+    ArrivalProcess,
     SilenceRule,
     SilenceVerdict,
     delay_of,
     expected_tracks,
     judge_silence,
-    learn_rhythm,
+    learn_arrivals,
 )
 
 RULE = SilenceRule(false_per_year=1.0, least_s=600.0, limit_s=86_400.0)
@@ -50,7 +50,7 @@ class YearResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Year:
-    """When tracks ended, in order, and when each was stored."""
+    """Times at which tracks ended, in order, and at which each was stored."""
 
     ended_s: Array
     received_s: Array
@@ -71,10 +71,10 @@ def _study_year(rng: np.random.Generator) -> YearResult:
     false_alerts, noticed_h = 0, []
     outage_days = rng.choice(np.arange(_FIRST_DAYS, _DAYS - 3), 12, replace=False)
     for day in range(_FIRST_DAYS, _DAYS):
-        rhythm, delay_s = _learned(year, cells, day)
-        false_alerts += _false_alerts(year, cells, rhythm, delay_s, day)
+        process, delay_s = _learned(year, cells, day)
+        false_alerts += _false_alerts(year, cells, process, delay_s, day)
         if day in outage_days and day % 7 < 5 and not year.quiet_days[day]:
-            noticed_h.append(_noticed_h(year, cells, rhythm, delay_s, (day + 0.5) * _DAY_S))
+            noticed_h.append(_noticed_h(year, cells, process, delay_s, (day + 0.5) * _DAY_S))
     return YearResult(
         kind=kind,
         posts=posts,
@@ -84,66 +84,73 @@ def _study_year(rng: np.random.Generator) -> YearResult:
     )
 
 
-def _learned(year: _Year, cells: np.ndarray, day: int) -> tuple[Rhythm, float]:
-    """What is known at a day's beginning."""
+def _learned(year: _Year, cells: np.ndarray, day: int) -> tuple[ArrivalProcess, float]:
+    """Arrival model and delay that are known at a day's beginning."""
     now_s, first_day = day * _DAY_S, max(day - _PAST_DAYS, 0)
     stored = (year.received_s <= now_s) & (year.received_s > first_day * _DAY_S)
     ended_s = year.ended_s[stored]
     first, last = 24 * first_day, int(ended_s.max() // _HOUR_S)
     counts = np.bincount((ended_s // _HOUR_S).astype(int), minlength=last + 1)[first:last]
     known = np.ones(len(counts), dtype=bool)
-    rhythm = learn_rhythm(counts.astype(float), cells[first:last], known, first, ended_s)
+    process = learn_arrivals(counts.astype(float), cells[first:last], known, first, ended_s)
     lags_s, days = (
         year.received_s[stored] - ended_s,
         (year.received_s[stored] // _DAY_S).astype(int),
     )
     latest = np.full(day + 1, -np.inf)
     np.maximum.at(latest, days, lags_s)
-    return rhythm, delay_of(latest[np.isfinite(latest)])
+    return process, delay_of(latest[np.isfinite(latest)])
 
 
-def _false_alerts(year: _Year, cells: np.ndarray, rhythm: Rhythm, delay_s: float, day: int) -> int:
+def _false_alerts(
+    year: _Year, cells: np.ndarray, process: ArrivalProcess, delay_s: float, day: int
+) -> int:
     """Alerts about the silences that end on a day; the longest moment of each is its last."""
     begin, end = np.searchsorted(year.received_s, [day * _DAY_S, (day + 1) * _DAY_S])
     ends_s = np.maximum.accumulate(year.ended_s[: end + 1])[max(begin - 1, 0) :]
     received_s = year.received_s[max(begin - 1, 0) : end + 1]
     silent_s = np.minimum(received_s[1:] - delay_s - ends_s[:-1], np.diff(received_s))
     return sum(
-        _alerts(year, cells, rhythm, ends_s[n], received_s[n + 1] - delay_s, silent_s[n])
+        _alerts(year, cells, process, ends_s[n], received_s[n + 1] - delay_s, silent_s[n])
         for n in np.flatnonzero(silent_s >= RULE.least_s)
     )
 
 
 def _noticed_h(
-    year: _Year, cells: np.ndarray, rhythm: Rhythm, delay_s: float, at_s: float
+    year: _Year, cells: np.ndarray, process: ArrivalProcess, delay_s: float, at_s: float
 ) -> float:
-    """How long nothing comes, from a time on, until that is an alert; what was seen is posted."""
+    """Hours of nothing from a time on until that is an alert; what was seen is posted."""
     last_s = year.ended_s[np.searchsorted(year.ended_s, at_s) - 1]
     for minutes in range(1, 60 * 60):
         until_s = at_s + 60 * minutes - delay_s
-        if _alerts(year, cells, rhythm, last_s, until_s, until_s - last_s):
+        if _alerts(year, cells, process, last_s, until_s, until_s - last_s):
             return minutes / 60
     return np.inf
 
 
 def _alerts(
-    year: _Year, cells: np.ndarray, rhythm: Rhythm, last_s: float, until_s: float, silent_s: float
+    year: _Year,
+    cells: np.ndarray,
+    process: ArrivalProcess,
+    last_s: float,
+    until_s: float,
+    silent_s: float,
 ) -> bool:
     before = np.searchsorted(year.ended_s, [last_s - _LOOK_BACK_S, last_s], side="right")
     verdict = judge_silence(
-        rhythm,
+        process,
         RULE,
-        missed=_expected(rhythm, cells, last_s, until_s),
+        missed=_expected(process, cells, last_s, until_s),
         silent_s=silent_s,
         seen=float(np.diff(before)[0]),
-        expected=_expected(rhythm, cells, last_s - _LOOK_BACK_S, last_s),
+        expected=_expected(process, cells, last_s - _LOOK_BACK_S, last_s),
     )
     return verdict is not SilenceVerdict.USUAL
 
 
-def _expected(rhythm: Rhythm, cells: np.ndarray, from_s: float, to_s: float) -> float:
+def _expected(process: ArrivalProcess, cells: np.ndarray, from_s: float, to_s: float) -> float:
     first, last = max(int(from_s // _HOUR_S), 0), int(to_s // _HOUR_S) + 1
-    return expected_tracks(rhythm, cells[first:last], first, from_s, to_s)
+    return expected_tracks(process, cells[first:last], first, from_s, to_s)
 
 
 def _simulate(rng: np.random.Generator, kind: str, posts: str, noon: float) -> _Year:
@@ -191,7 +198,7 @@ def _profile(kind: str, weekend: bool) -> Array:
 
 
 def _received(rng: np.random.Generator, posts: str, ended_s: Array) -> Array:
-    """When each track is stored, in order, by how they are posted."""
+    """Times at which each track is stored, in order, by how they are posted."""
     live_s = ended_s + rng.exponential(2, len(ended_s))
     if posts == "hourly":
         late_s = rng.exponential(90, _DAYS * 24 + 2)

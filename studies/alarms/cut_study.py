@@ -22,7 +22,7 @@ import numpy as np
 from models.geometry.pose import CameraPose
 from models.pose import CameraSite, learn_site, observe
 from models.pose.change_search import search_change
-from models.simulation.pose_offset import Knock
+from models.simulation.pose_offset import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory, by_end
 from studies.protocol.partings import HALVES_IN_TIME, first_seen, part_people
@@ -32,9 +32,9 @@ _REFERENCE, _WINDOW, _AFTER = 1000, 400, 40
 _FEWEST = 24  # tracks of a window: there are twelve on either side of a cut
 _FAR, _FAR_LOG, _TURN = math.radians(8), 0.15, math.radians(5)
 TURNS = {
-    "tilt": Knock(tilt_rad=_TURN),
-    "roll": Knock(roll_rad=_TURN),
-    "pan": Knock(heading_rad=_TURN),
+    "tilt": PoseOffset(tilt_rad=_TURN),
+    "roll": PoseOffset(roll_rad=_TURN),
+    "pan": PoseOffset(heading_rad=_TURN),
 }
 
 
@@ -90,10 +90,10 @@ def _looked_at(
     )
 
 
-def _knock(rng: np.random.Generator) -> Knock:
+def _knock(rng: np.random.Generator) -> PoseOffset:
     tilt, roll, pan = rng.uniform(-_FAR, _FAR, 3)
     log_height = rng.uniform(-_FAR_LOG, _FAR_LOG)
-    return Knock(tilt_rad=tilt, roll_rad=roll, heading_rad=pan, log_height=log_height)
+    return PoseOffset(tilt_rad=tilt, roll_rad=roll, heading_rad=pan, log_height=log_height)
 
 
 def _drawn(
@@ -110,7 +110,7 @@ def _seen(scene: Scene, people: Sequence[SceneTrack], pose: CameraPose) -> list[
     return by_end(track.trajectory for track in first_seen(scene, people, pose, None))
 
 
-def _told(outcomes: Sequence[CutOutcome]) -> Iterator[str]:
+def _report_lines(outcomes: Sequence[CutOutcome]) -> Iterator[str]:
     for done in ("still", "knocked before"):
         each = [one for one in outcomes if one.done == done]
         cuts = [f"{one.scene} ({one.tracks})" for one in each if one.cut is not None]
@@ -148,5 +148,5 @@ def main(arguments: Sequence[str]) -> None:
     with Pool(chosen.processes) as pool:
         work = partial(_outcomes_of, chosen.windows, chosen.turns, chosen.seed)
         found = [one for each in pool.imap(work, places, chunksize=1) for one in each]
-    for line in _told(found):
+    for line in _report_lines(found):
         print(line)  # noqa: T201

@@ -11,8 +11,8 @@ from models.errors import CheckpointError
 from models.regression.checkpoint import START, starting_network
 from models.regression.network import network_for
 from models.regression.recipe import DEFAULT, PAPER
-from studies.start_weights.making import held_out_figures, making_of, store_start
-from studies.start_weights.rounds import StartPlan, StartTraining
+from studies.regressors.start_training import StartPlan, StartTraining
+from studies.regressors.start_weights import held_out_figures, making_of, store_start
 
 SMALL = StartPlan(seed=3, rounds=2, cameras=3, walks_each=30, batch=30)
 

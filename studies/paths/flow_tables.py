@@ -70,7 +70,7 @@ def knocked_table(found: Sequence[SiteResults]) -> Table:
 
 
 def changed_table(found: Sequence[SiteResults]) -> Table:
-    """How far a still camera's pose moves when half of the people take a new path."""
+    """Table of a still camera's drift when half of the people take a new path."""
     table = Table(
         title="still, half on a new path: median angles (90th percentile; largest), deg",
         title_justify="left",

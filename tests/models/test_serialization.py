@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from safetensors.numpy import load
 
 from models.errors import CheckpointError
-from models.serialization import Format, flattened, pack, restored, stored_as, under, unpack
+from models.serialization import Format, flattened, from_bytes, restored, stored_as, to_bytes, under
 
 FORM = Format(name="site", version=3)
 VALUES = {
@@ -48,7 +48,7 @@ class Renamed:
 
 
 def test_what_is_packed_comes_back_to_the_bit():
-    found = unpack(FORM, pack(FORM, VALUES))
+    found = from_bytes(FORM, to_bytes(FORM, VALUES))
     assert set(found) == set(VALUES)
     for name, value in VALUES.items():
         assert_array_equal(found[name], value)
@@ -60,11 +60,11 @@ def test_what_is_packed_comes_back_to_the_bit():
 
 
 def test_the_same_values_make_the_same_bytes_in_any_order():
-    assert pack(FORM, dict(reversed(VALUES.items()))) == pack(FORM, VALUES)
+    assert to_bytes(FORM, dict(reversed(VALUES.items()))) == to_bytes(FORM, VALUES)
 
 
 def test_bytes_are_a_safetensors_file_under_gzip():
-    raw = gzip.decompress(pack(FORM, VALUES))
+    raw = gzip.decompress(to_bytes(FORM, VALUES))
     assert_array_equal(load(raw)["turned"], VALUES["turned"])
     header = json.loads(raw[8 : 8 + int.from_bytes(raw[:8], "little")])
     said = json.loads(header["__metadata__"]["surefoot"])
@@ -77,25 +77,25 @@ def test_bytes_are_a_safetensors_file_under_gzip():
         b"",
         b"nothing",
         b"PK\x03\x04 of an earlier release",
-        pack(FORM, VALUES)[:-9],
+        to_bytes(FORM, VALUES)[:-9],
         gzip.compress(b"", mtime=0),
         gzip.compress(b"\xff" * 99, mtime=0),
         gzip.compress(
             b"\x02" + b"\x00" * 7 + b"{}", mtime=0
         ),  # a safetensors file with nothing in it
-        bytes(byte ^ (n == 200) for n, byte in enumerate(pack(FORM, VALUES))),
+        bytes(byte ^ (n == 200) for n, byte in enumerate(to_bytes(FORM, VALUES))),
     ],
 )
 def test_what_is_damaged_is_named_so(wrong):
     with pytest.raises(CheckpointError, match="^site: not readable"):
-        unpack(FORM, wrong)
+        from_bytes(FORM, wrong)
 
 
 @pytest.mark.parametrize("other", [Format(name="site", version=2), Format(name="flow", version=3)])
 def test_another_format_or_version_is_named_so(other):
     needed = f"^format: {other.name} {other.version} is needed, got site 3$"
     with pytest.raises(CheckpointError, match=needed):
-        unpack(other, pack(FORM, VALUES))
+        from_bytes(other, to_bytes(FORM, VALUES))
 
 
 def test_dataclasses_in_dataclasses_have_dotted_names():

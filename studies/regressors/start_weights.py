@@ -20,8 +20,8 @@ import torch
 from models.geometry.rotation import angle_between
 from models.regression.checkpoint import START, START_FORMAT
 from models.regression.network import PoseRegressor, pose_from_output
-from models.serialization import pack
-from studies.start_weights.rounds import StartPlan, StartTraining
+from models.serialization import to_bytes
+from studies.regressors.start_training import StartPlan, StartTraining
 
 
 def held_out_figures(network: PoseRegressor, plan: StartPlan) -> dict[str, Any]:
@@ -47,14 +47,14 @@ def store_start(network: PoseRegressor, path: Path, making: Mapping[str, Any]) -
     arrays = {
         name: np.asarray(value).astype(np.float16) for name, value in network.state_dict().items()
     }
-    data = pack(START_FORMAT, arrays)
+    data = to_bytes(START_FORMAT, arrays)
     path.write_bytes(data)
     record = {**making, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
     making_of(path).write_text(json.dumps(record, indent=2) + "\n")
 
 
 def making_of(path: Path) -> Path:
-    """Where it says how a file of weights was made."""
+    """Path of the record of how a file of weights was made."""
     return path.with_name("start.json")
 
 

@@ -4,8 +4,8 @@ import pytest
 
 from models.tracks import walks
 from studies.faults.catalogue import FAULTS
-from studies.parts.catalogue import PARTS
-from studies.parts.run import WHOLE, PartFigures, table_of
+from studies.served.parts import WHOLE, PartFigures, table_of
+from studies.served.parts_catalogue import PARTS
 
 
 @pytest.mark.parametrize("name", PARTS)

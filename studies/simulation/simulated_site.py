@@ -74,7 +74,7 @@ def draw_simulated_site(rng: np.random.Generator) -> SimulatedSite:
 
 
 def learn_simulated_site(simulated: SimulatedSite, reference: Observations) -> LearnedSite:
-    """What reference tracks of a place tell.
+    """Site learned of reference tracks.
 
     Raises:
         TooFewTrajectoriesError: fewer than 12 people walk.
@@ -95,7 +95,7 @@ def learn_simulated_site(simulated: SimulatedSite, reference: Observations) -> L
 def seen_from(
     simulated: SimulatedSite, pose: CameraPose, count: int, rng: np.random.Generator
 ) -> Observations:
-    """What is read of `count` tracks of a simulated site's people, the camera at a pose.
+    """Observations of `count` tracks of a simulated site's people, the camera at a pose.
 
     Raises:
         DegenerateGeometryError: hardly any walk is seen from the pose.
@@ -107,7 +107,7 @@ def seen_from(
 def observe_feet(
     tracks: Sequence[Trajectory], intrinsics: Intrinsics, prior: CameraPose
 ) -> Observations:
-    """What is read of simulated feet, in the order that the service sees: of the tracks' ends.
+    """Observations of simulated feet, in the order that the service sees: of the tracks' ends.
 
     Simulated boxes are truer than any detector's, and left out.
     """

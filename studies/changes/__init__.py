@@ -1,1 +1,0 @@
-"""Windows and days without a move: what the change search and the alarm chart make of them."""

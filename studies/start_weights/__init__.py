@@ -1,1 +1,0 @@
-"""Making of the weights that every training begins with."""
