@@ -12,7 +12,7 @@ EDGES = (
     "service/api/trainings.py",
     "service/pages/",
     "service/formats/degrees.py",
-    "service/reason_words.py",
+    "service/wording/",
     "service/reasons.py",  # as they are told to clients
 )
 # Who tells people otherwise than by schemas and pages: by events and webhooks, and on a

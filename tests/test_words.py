@@ -47,7 +47,6 @@ OTHERS = {
     ("api/poses.py", "pose"): "a tag of the API's description",
     ("api/sources.py", "tracks"): "a tag of the API's description",
     ("api/tracks.py", "tracks"): "a tag and a field of the API's description",
-    ("api/alerts_schemas.py", "drift"): "the name of a field",
     ("api/metrics.py", "firing"): "part of a metric's name",
     ("api/metrics.py", "pending"): "the name of a field",
     ("api/metrics.py", "silenced"): "part of a metric's name",
@@ -58,8 +57,8 @@ OTHERS = {
     ("store/tables/alerts.py", "source"): "the name of a column",
     ("store/tables/tracks.py", "source"): "the name of a column",
     ("store/tables/tracks.py", "tracks"): "the name of a table",
-    ("pages/plausibility.py", "critical"): "a tone, defined there",
-    ("pages/plausibility.py", "warning"): "a tone, defined there",
+    ("wording/typed_pose.py", "critical"): "a tone, defined there",
+    ("wording/typed_pose.py", "warning"): "a tone, defined there",
 }
 
 

@@ -30,6 +30,7 @@ from service.store.operation import activity, events
 from service.store.tables.activity import ActivityRecord
 from service.store.tables.alerts import AlertRecord
 from service.store.tracks import tracks
+from service.wording.reasons import in_words
 
 _KEPT_AS = {
     AlertActivity.OPENED: Activity.ALERT_OPENED,
@@ -258,7 +259,7 @@ def _keep_activity(
         text=note,
         details={
             "severity": record.severity,
-            "reason": record.reason,
+            "reason": in_words(record.reasons),
             "reason_code": record.reason_code,
         },
     )

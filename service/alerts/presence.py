@@ -22,6 +22,7 @@ from service.settings import Settings
 from service.store import alerts
 from service.store.tracks import tracks
 from service.windows.attendance import attendance_of
+from service.wording.alerts import TRACKS_COME_AGAIN
 
 _HOUR_S = 3600.0
 _LOOK_BACK_S = 3 * _HOUR_S  # the level of the day is told by these hours before a silence
@@ -83,9 +84,9 @@ def watch_presence(
         received_at = tracks.newest_received_at(session, camera_id)
         if received_at is not None and received_at > firing.opened_at:
             end_alert(
-                session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note="tracks come again"
+                session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note=TRACKS_COME_AGAIN
             )
-            return "tracks come again"
+            return TRACKS_COME_AGAIN
     silence = silence_of(session, settings, camera_id, now)
     if silence is None or silence.severity is None:
         return None

@@ -14,6 +14,7 @@ from service.settings import Settings
 from service.store import alerts, cameras
 from service.store.tables.cameras import CameraRecord
 from service.store.tracks import unseen
+from service.wording.alerts import ESTIMATED_AGAIN
 
 # Who closed the alert knows; if nothing is better by then, it is told again.
 _ANSWERED = timedelta(hours=1)
@@ -59,7 +60,7 @@ class StaleWatch:
                         camera.id,
                         AlertKind.STALE,
                         Outcome.CLEARED,
-                        note="it is looked at again",
+                        note=ESTIMATED_AGAIN,
                     )
                     found[camera.id] = "ended"
             elif reason is not None and camera.id not in firing and not _answered(session, camera):

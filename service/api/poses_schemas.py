@@ -11,11 +11,13 @@ from service.api.fields import Body, ReasonCode, ReasonValues, Who
 from service.api.geometry_schemas import PoseOut
 from service.cameras.poses import PoseView
 from service.enums import PoseState, ReferenceState
-from service.estimation.drift_words import FIELDS
 from service.formats.degrees import in_degrees
 from service.reasons import code_of, values_of
 from service.store.packing import identifiable_drift, identifiable_sd
 from service.store.tables.estimates import EstimateRecord
+
+# The parameters of a pose as fields of JSON.
+FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 
 
 class AcceptBody(Body):

@@ -9,16 +9,16 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
 from service.cameras.cameras import no_camera, require_camera
-from service.cameras.standing import Standing, standings
-from service.cameras.state_words import reasons_of
+from service.cameras.status import CameraStatus, camera_statuses
+from service.cameras.status_reasons import reasons_of
 from service.enums import PoseState
-from service.reason_words import in_words
 from service.reasons import Reasons
 from service.settings import Settings
 from service.store import cameras, estimates, fleet
 from service.store.packing import intrinsics_of, pose_of_prior
 from service.store.tables.estimates import EstimateRecord
 from service.windows.references import tracks_so_far
+from service.wording.reasons import in_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ class PoseView:
     """What is served of a camera's pose, and how the camera stands."""
 
     camera_id: str
-    standing: Standing
+    status: CameraStatus
     reasons: Reasons
     pose: CameraPose
     reference: ReferenceView
@@ -46,7 +46,7 @@ class PoseView:
     @property
     def state(self) -> PoseState:
         """How the camera stands, in a word."""
-        return self.standing.state
+        return self.status.state
 
     @property
     def reason(self) -> str:
@@ -56,12 +56,12 @@ class PoseView:
     @property
     def estimate(self) -> EstimateRecord | None:
         """What the pose is of; it may tell nothing yet."""
-        return self.standing.estimate
+        return self.status.estimate
 
     @property
     def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
-        return self.standing.identifiable
+        return self.status.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -74,16 +74,16 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     if set_up is None:
         raise no_camera(camera_id)
     camera, prior, model_id = set_up
-    standing = standings(session, settings, (camera_id,))[camera_id]
-    record = standing.reference
+    status = camera_statuses(session, settings, (camera_id,))[camera_id]
+    record = status.reference
     counts = {}
     if record.ready_at is None:
-        attended = {camera_id: standing.attended.spans}
+        attended = {camera_id: status.attended.spans}
         counts = fleet.learning_counts(session, (camera_id,), attended)
     so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
-    reasons = reasons_of(session, settings, standing, so_far)
+    reasons = reasons_of(session, settings, status, so_far)
     pose = pose_of_prior(prior)
-    estimate = standing.estimate
+    estimate = status.estimate
     if estimate is not None:
         pose = replace(
             pose,
@@ -102,10 +102,10 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
     why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
-    served = (standing.state.value, why, pose, estimate_id, reference, model_id, lens)
+    served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
-        standing=standing,
+        status=status,
         reasons=reasons,
         pose=pose,
         reference=reference,

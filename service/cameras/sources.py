@@ -35,6 +35,7 @@ from service.windows.references import (
 )
 from service.windows.requests import request_estimate
 from service.windows.stillness import doubts
+from service.wording.alerts import ONE_SOURCE_POSTS, source_change
 
 _HOUR_S = 3600.0
 
@@ -152,9 +153,7 @@ def watch_sources(
     silent_for = timedelta(hours=settings.source_silent_h)
     posting = [record for record in others if now - record.last_seen_at < silent_for]
     if not posting:
-        end_alert(
-            session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note="only one source posts"
-        )
+        end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=ONE_SOURCE_POSTS)
         return None
     if all(record.told_at is not None for record in posting):
         return None
@@ -214,7 +213,7 @@ def _count(
     former = None if last is None else sources.find(session, camera_id, last)
     if former is not None:
         former.told_at = None  # should it come back, it is new again
-    words = f"{record.name} instead of {last}"
+    words = source_change(record.name, last)
     end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=f"now counts: {words}")
     note(session, Activity.SOURCE_USED, by=by, camera_id=camera_id, text=words)
     request_estimate(session, queue, camera_id)

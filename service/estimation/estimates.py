@@ -36,6 +36,7 @@ from service.store.tables.estimates import EstimateRecord
 from service.store.tables.references import SiteReferenceRecord
 from service.training.ranges import train_at_edge
 from service.windows.references import is_overtaken, made_against
+from service.wording.alerts import fired_as
 
 
 def save_estimate(
@@ -166,7 +167,7 @@ def _alert(
     if is_clock:
         kind, other = other, kind
     if other in firing:
-        end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
+        end_alert(session, camera_id, other, Outcome.CLEARED, note=fired_as(kind))
     if drift.identifiable or charted:
         reasons = record.reasons if clock is None else (clock,)
         open_alert(session, settings, camera_id, kind, severity, body, since, reasons=reasons)

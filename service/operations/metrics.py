@@ -6,9 +6,8 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
-from service.cameras.standing import Standing, standings
+from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import AlertKind, PoseState, Severity, TrainingState
-from service.notifications.outbox import is_silenced
 from service.settings import Settings
 from service.store import cameras, metrics, webhooks
 from service.store.operation import events
@@ -80,13 +79,13 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
     }
     workers = metrics.workers(session)
     return Metrics(
-        cameras=_cameras(standings(session, settings)),
+        cameras=_cameras(camera_statuses(session, settings)),
         alerts=tuple(
             AlertMetrics(
                 camera_id=alert.camera_id or "",
                 kind=alert.kind,
                 severity=alert.severity,
-                silenced=is_silenced(alert, now),
+                silenced=alert.is_silenced(now),
                 grouped=alert.group_id is not None,
             )
             for alert in metrics.firing(session)
@@ -102,7 +101,7 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
     )
 
 
-def _cameras(standing: dict[str, Standing]) -> tuple[CameraMetrics, ...]:
+def _cameras(status: dict[str, CameraStatus]) -> tuple[CameraMetrics, ...]:
     return tuple(
         CameraMetrics(
             camera_id=camera_id,
@@ -110,7 +109,7 @@ def _cameras(standing: dict[str, Standing]) -> tuple[CameraMetrics, ...]:
             last_track_s=each.last_track_s,
             drift=None if each.estimate is None else each.estimate.drift,
         )
-        for camera_id, each in standing.items()
+        for camera_id, each in status.items()
     )
 
 

@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.pages.wording.words import ago
+from service.wording.times import ago
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.running import served
 from tests.service.fleet_bench import Fleet, afternoon

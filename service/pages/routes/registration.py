@@ -24,7 +24,7 @@ from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.drawings.preview import tried_ground_svg
-from service.pages.plausibility import judge_pose, judge_tracks, worst_first
+from service.wording.typed_pose import judge_pose, judge_tracks, worst_first
 
 router = APIRouter(include_in_schema=False)
 

@@ -11,11 +11,11 @@ from sqlalchemy import delete
 
 from service.alerts.arrival_rates import compute_rhythm, load_arrivals, rhythm_of, save_rhythm
 from service.alerts.presence import silence_of, watch_presence
-from service.reason_words import in_words
 from service.settings import Settings
 from service.store import rhythms
 from service.store.packing import pack
 from service.store.tables.tracks import TrackRecord
+from service.wording.reasons import in_words
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
 from service.workers.upkeep.arrival_rates import run_rhythms

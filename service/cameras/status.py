@@ -15,7 +15,6 @@ from sqlalchemy.orm import Session
 from service.alerts.arrival_rates import CameraRhythm, unpacked
 from service.alerts.presence import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
-from service.notifications.outbox import is_silenced
 from service.settings import Settings
 from service.store import fleet, metrics
 from service.store.alerts import POSE_KINDS
@@ -64,7 +63,7 @@ class CameraFacts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class CameraStatus:
     """How a camera stands. `alerts` are all that fire, what needs a person most first.
 
     `estimate` is what is served, maybe nothing identifiable; None where the prior pose is. It is
@@ -96,9 +95,9 @@ class Standing:
         return () if self.estimate is None else tuple(self.estimate.identifiable)
 
 
-def standings(
+def camera_statuses(
     session: Session, settings: Settings, ids: Collection[str] | None = None
-) -> dict[str, Standing]:
+) -> dict[str, CameraStatus]:
     """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
     now = datetime.now(UTC)
     newest = metrics.newest(session, ids)
@@ -131,11 +130,11 @@ def standings(
                 moments=tuple(_moments(attending, firing[camera_id])),
             ),
         )
-        found[camera_id] = standing_of(facts, now)
+        found[camera_id] = status_of(facts, now)
     return found
 
 
-def standing_of(facts: CameraFacts, now: datetime) -> Standing:
+def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
     """How a camera stands, by what is known of it."""
     reference = facts.reference
     estimate = _counting(facts, now)
@@ -156,7 +155,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
         state = estimate.state
     else:
         state = PoseState.OK
-    return Standing(
+    return CameraStatus(
         camera_id=reference.camera_id,
         state=state,
         since=_since(state, facts, alerts, cause),
@@ -229,7 +228,7 @@ def _urgency(alert: AlertRecord, now: datetime) -> tuple[bool, bool, datetime]:
 
 def waits(alert: AlertRecord, now: datetime) -> bool:
     """Whether nobody has taken an alert up, and no group speaks for it."""
-    return not (alert.acknowledged_by or is_silenced(alert, now) or alert.group_id is not None)
+    return not (alert.acknowledged_by or alert.is_silenced(now) or alert.group_id is not None)
 
 
 def alert_since(alert: AlertRecord) -> datetime:

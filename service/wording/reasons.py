@@ -1,4 +1,4 @@
-"""Reasons in words: all that is said to people of why something is so is said here."""
+"""Reasons in words: why a state is what it is, an alert fired, a part is missing."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
