@@ -3,8 +3,8 @@
 from alembic import context
 
 from service.settings import Settings
-from service.store.database.store import engine_for
-from service.store.tables.record import Record, UtcDateTime, Word
+from service.store.engines.store import engine_for
+from service.store.record import Record, UtcDateTime, Word
 
 
 def _ours(obj: object, name: str | None, kind: str, reflected: bool, compare_to: object) -> bool:

@@ -17,8 +17,8 @@ from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store.database.store import savepoint
-from service.store.operation import engine_jobs
+from service.store import engine_jobs
+from service.store.engines.store import savepoint
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.

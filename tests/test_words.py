@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import CheckConstraint
 
 from service import enums
-from service.store.tables.record import Record, Word
+from service.store.record import Record, Word
 from tests.stores.databases import only_sqlite
 from tests.test_architecture import ROOT, sources
 
@@ -52,11 +52,10 @@ OTHERS = {
     ("api/metrics.py", "silenced"): "part of a metric's name",
     ("api/webhooks.py", "pending"): "the name of a field",
     ("commands/serve.py", "warning"): "uvicorn's log level",
-    ("store/sqlite/files.py", "ok"): "what SQLite's quick_check answers",
-    ("store/tables/__init__.py", "tracks"): "the name of a table",
-    ("store/tables/alerts.py", "source"): "the name of a column",
-    ("store/tables/tracks.py", "source"): "the name of a column",
-    ("store/tables/tracks.py", "tracks"): "the name of a table",
+    ("store/engines/files.py", "ok"): "what SQLite's quick_check answers",
+    ("store/alerts.py", "source"): "the name of a column",
+    ("store/stored_tracks.py", "source"): "the name of a column",
+    ("store/stored_tracks.py", "tracks"): "the name of a table",
     ("wording/typed_pose.py", "critical"): "a tone, defined there",
     ("wording/typed_pose.py", "warning"): "a tone, defined there",
 }

@@ -24,12 +24,9 @@ from service.errors import ConflictError, NotFoundError
 from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import alerts, maintenance
-from service.store.alerts import AlertFilter
-from service.store.operation import activity, events
-from service.store.tables.activity import ActivityRecord
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
+from service.store import activity, alerts, events, maintenance, tracks
+from service.store.activity import ActivityRecord
+from service.store.alerts import AlertFilter, AlertRecord
 from service.wording.reasons import in_words
 
 _KEPT_AS = {

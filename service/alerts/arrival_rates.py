@@ -12,8 +12,7 @@ from sqlalchemy.orm import Session
 from models.monitoring.arrivals import Rhythm, delay_of, learn_rhythm
 from service.enums import AlertKind, Outcome
 from service.settings import Settings
-from service.store import alerts, cameras, rhythms
-from service.store.tracks import tracks
+from service.store import alerts, cameras, rhythms, tracks
 
 _PAST_DAYS = 28
 _HOUR_S = 3600

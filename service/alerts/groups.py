@@ -11,10 +11,9 @@ from models.reasons import Reason
 from service.enums import AlertKind, AlertSource, AlertState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts
-from service.store.database.store import also_about
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
+from service.store import alerts, tracks
+from service.store.alerts import AlertRecord
+from service.store.engines.store import also_about
 
 # What a group is called, and which alerts of cameras can have its cause.
 _CAUSES = {

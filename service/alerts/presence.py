@@ -19,8 +19,7 @@ from service.alerts.arrival_rates import CameraRhythm, cells_of, rhythm_of
 from service.enums import AlertKind, AlertSource, Outcome, Severity
 from service.reasons import Reasons, ServiceCode
 from service.settings import Settings
-from service.store import alerts
-from service.store.tracks import tracks
+from service.store import alerts, tracks
 from service.windows.attendance import attendance_of
 from service.wording.alerts import TRACKS_COME_AGAIN
 

@@ -11,9 +11,8 @@ from service.alerts.alerts import end_alert, open_alert
 from service.enums import AlertActivity, AlertKind, AlertSource, Outcome, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts, cameras
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import unseen
+from service.store import alerts, cameras, tracks
+from service.store.cameras import CameraRecord
 from service.wording.alerts import ESTIMATED_AGAIN
 
 # Who closed the alert knows; if nothing is better by then, it is told again.
@@ -41,7 +40,7 @@ class StaleWatch:
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
         """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
         now_s = time.monotonic()
-        oldest = unseen.since(session)
+        oldest = tracks.unseen_since(session)
         self._waiting = {
             camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
         }

@@ -13,8 +13,8 @@ from service.cameras.poses import PoseView
 from service.enums import PoseState, ReferenceState
 from service.formats.degrees import in_degrees
 from service.reasons import code_of, values_of
-from service.store.packing import identifiable_drift, identifiable_sd
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
+from service.store.serialization import identifiable_drift, identifiable_sd
 
 # The parameters of a pose as fields of JSON.
 FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 from service.api.fields import Body, Who
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.enums import TrainingState
-from service.store.tables.trainings import TrainingRecord
+from service.store.trainings import TrainingRecord
 from service.training import trainings
 
 

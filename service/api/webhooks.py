@@ -12,7 +12,7 @@ from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
 from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
 from service.reasons import code_of
-from service.store.tables.deliveries import WebhookRecord
+from service.store.webhooks import WebhookRecord
 from service.wording.reasons import in_words
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]

@@ -19,12 +19,11 @@ from service.errors import (
 )
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import cameras, references, trainings
+from service.store import cameras, references, tracks, trainings
+from service.store.access import name_in
 from service.store.alerts import AlertFilter
-from service.store.operation.actor import name_in
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.cameras import CameraRecord, PriorPoseRecord
-from service.store.tracks import tracks
+from service.store.cameras import CameraRecord, PriorPoseRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 from service.training.trainings import stop_trainings
 from service.training.unasked import train_by_itself
 from service.windows.references import begin_reference

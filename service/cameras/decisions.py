@@ -15,9 +15,8 @@ from service.enums import Activity, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import alerts
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
+from service.store import alerts, tracks
+from service.store.alerts import AlertRecord
 from service.windows.references import begin_reference, keep_answer
 from service.windows.requests import request_estimate
 

@@ -15,7 +15,7 @@ from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
 from service.settings import Settings
 from service.store import alerts, maintenance
-from service.store.tables.attendance import MaintenanceRecord
+from service.store.maintenance import MaintenanceRecord
 from service.windows.references import forget_streak
 from service.windows.requests import request_estimate
 

@@ -15,8 +15,8 @@ from service.enums import PoseState
 from service.reasons import Reasons
 from service.settings import Settings
 from service.store import cameras, estimates, fleet
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 from service.windows.references import tracks_so_far
 from service.wording.reasons import in_words
 

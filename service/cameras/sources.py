@@ -20,11 +20,10 @@ from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.job_queue import JobQueue
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, references
-from service.store.database.store import joined
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import SourceRecord
-from service.store.tracks import sources
+from service.store import alerts, cameras, estimates, references, sources
+from service.store.engines.store import joined
+from service.store.references import SiteReferenceRecord
+from service.store.sources import SourceRecord
 from service.windows.attendance import attendance_of
 from service.windows.references import (
     begin_reference,

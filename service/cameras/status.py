@@ -17,11 +17,10 @@ from service.alerts.presence import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.settings import Settings
 from service.store import fleet, metrics
-from service.store.alerts import POSE_KINDS
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
+from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.references import SiteReferenceRecord
 from service.windows.attendance import Attendance, attendance_by
 from service.windows.references import made_against
 

@@ -12,9 +12,8 @@ from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.settings import Settings
-from service.store import maintenance
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tracks import windows
+from service.store import maintenance, windows
+from service.store.maintenance import MaintenanceRecord
 from service.windows.references import wanted_tracks, window_beside
 
 

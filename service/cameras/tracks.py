@@ -10,11 +10,10 @@ from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
-from service.store import references
+from service.store import references, tracks
 from service.store.cameras import Picture
-from service.store.database.store import joined
-from service.store.packing import pack
-from service.store.tracks import tracks
+from service.store.engines.store import joined
+from service.store.serialization import pack
 from service.windows.requests import request_estimate
 
 

@@ -18,7 +18,7 @@ from service.api.middleware.reach import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
 from service.workers.processes.listener import listen

@@ -12,8 +12,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.sqlite.file_lock import FileLock
+from service.store.engines.sqlite import FileLock
+from service.store.engines.store import Store
 from service.workers import engine
 from service.workers.context import JobContext
 from service.workers.in_hand import UPKEEP, InHand

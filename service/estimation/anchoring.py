@@ -25,11 +25,11 @@ from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.estimation.paths import LearnedPaths
 from service.settings import Settings
-from service.store import cameras, flow_maps, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import AnchorRecord, SiteReferenceRecord
-from service.store.tracks import windows
-from service.store.tracks.windows import WindowBounds
+from service.store import cameras, flow_maps, references, windows
+from service.store.flow_maps import AnchorRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.windows import WindowBounds
 from service.windows.references import window_of
 from service.windows.unpacked import Unpacked
 

@@ -29,11 +29,10 @@ from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
 from service.reasons import ServiceCode, some
 from service.settings import Settings
-from service.store import cameras, estimates, references
-from service.store.operation import events
-from service.store.packing import identifiable_drift
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
+from service.store import cameras, estimates, events, references
+from service.store.estimates import EstimateRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import identifiable_drift
 from service.training.ranges import train_at_edge
 from service.windows.references import is_overtaken, made_against
 from service.wording.alerts import fired_as

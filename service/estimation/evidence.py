@@ -18,15 +18,23 @@ from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references, trainings
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import PredictionRecord
-from service.store.tables.trainings import ModelRecord
-from service.store.tracks import predictions as stored_predictions
-from service.store.tracks import tracks, windows
-from service.store.tracks.stored import StoredTrack
+from service.store import (
+    alerts,
+    cameras,
+    estimates,
+    flow_maps,
+    references,
+    tracks,
+    trainings,
+    windows,
+)
+from service.store import predictions as stored_predictions
+from service.store.cameras import CameraRecord
+from service.store.predictions import PredictionRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.stored_tracks import StoredTrack
+from service.store.trainings import ModelRecord
 from service.windows.people import until_so_many
 from service.windows.references import made_against, window_of
 from service.windows.unpacked import Unpacked

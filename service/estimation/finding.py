@@ -38,7 +38,7 @@ from service.estimation.evidence import Evidence, KeptPose, SeenTrack
 from service.estimation.lacks import Lacks
 from service.estimation.last_poses import basis_of, begin_of, kept_of
 from service.reasons import Reasons
-from service.store.tables.tracks import PredictionRecord
+from service.store.predictions import PredictionRecord
 from service.windows.people import MOST_PIECES
 
 

@@ -22,10 +22,10 @@ from models.walking.serialization import reference_from_bytes
 from service.estimation.anchoring import Anchor, anchor_of, keep_anchor
 from service.estimation.paths import LearnedPaths, paths_of
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
-from service.store.tracks import tracks, windows
+from service.store import alerts, cameras, estimates, flow_maps, references, tracks, windows
+from service.store.flow_maps import FlowMapRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 from service.windows.attendance import Attendance, attendance_of
 from service.windows.references import is_outdated, made_against, window_beside, window_of
 from service.windows.stillness import Doubt, doubts, still_bounds

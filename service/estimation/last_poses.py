@@ -11,7 +11,7 @@ from models.errors import CheckpointError
 from models.pose import LastPose, last_pose_from_bytes, last_pose_to_bytes
 from service.estimation.evidence import Evidence, KeptPose
 from service.store import flow_maps
-from service.store.tables.references import LastPoseRecord
+from service.store.flow_maps import LastPoseRecord
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:

@@ -23,10 +23,9 @@ from service.estimation.evidence import walk_of
 from service.estimation.paths import LearnedPaths, paths_of
 from service.reasons import some
 from service.settings import Settings
-from service.store import cameras, maintenance, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import FlowMapRecord
-from service.store.tracks import windows
+from service.store import cameras, maintenance, references, windows
+from service.store.flow_maps import FlowMapRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 from service.windows.attendance import attendance_of
 from service.windows.people import until_so_many
 from service.windows.references import wanted_tracks

@@ -15,7 +15,7 @@ from service.notifications.send import Outcome
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 GONE = 410
 # A receiver that answers so means this message, not itself: others need not wait for it.

@@ -15,8 +15,8 @@ from service.enums import DeliveryState, MessageType
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
+from service.store.alerts import AlertRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 _ALERT_FIELDS = (

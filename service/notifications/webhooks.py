@@ -20,7 +20,7 @@ from service.notifications.signing import new_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 OLD_SECRET_STAYS = timedelta(hours=24)

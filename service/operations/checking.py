@@ -23,9 +23,9 @@ from service.notifications.sealing import sealer_of
 from service.operations.manifest import hash_file
 from service.operations.placing import READY
 from service.settings import Settings
-from service.store.database.revisions import known_revisions, require_known
-from service.store.sqlite import files
-from service.store.sqlite.faults import telling_of_database
+from service.store.engines import files
+from service.store.engines.failures import telling_of_database
+from service.store.engines.revisions import known_revisions, require_known
 
 _LEAST_FREE = 200e6
 _HOUR_S = 3600.0

@@ -16,17 +16,14 @@ from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.settings import Settings
-from service.store import alerts, cameras, maintenance, trainings
-from service.store.alerts import AlertFilter
-from service.store.operation import activity, events
-from service.store.packing import trajectory_of
+from service.store import activity, alerts, cameras, events, maintenance, tracks, trainings
+from service.store.activity import ActivityRecord
+from service.store.alerts import AlertFilter, AlertRecord
+from service.store.cameras import PriorPoseRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.serialization import trajectory_of
 from service.store.snapshots import SnapshotFacts
-from service.store.tables.activity import ActivityRecord
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.cameras import PriorPoseRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks import tracks
+from service.store.trainings import TrainingRecord
 from service.wording.camera import CameraFacts
 
 _TRACKS = 120  # more are a carpet

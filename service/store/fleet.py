@@ -22,17 +22,15 @@ from sqlalchemy.orm import Session, aliased
 
 from models.monitoring.verdict import DriftLimits
 from service.enums import AlertState
-from service.store.database.dialects import contains_word, largest
-from service.store.metrics import Ids, among, among_given, given, newest_of
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks.counting import Spans
-from service.store.trainings import UNFINISHED
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord, newest_of
+from service.store.engines.dialects import contains_word, largest
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.metrics import Ids, among, among_given, given
+from service.store.references import SiteReferenceRecord
+from service.store.stored_tracks import Spans, TrackRecord
+from service.store.trainings import UNFINISHED, TrainingRecord
 
 
 def names(session: Session, ids: Ids) -> list[tuple[str, str]]:

@@ -21,17 +21,17 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.enums import AlertState, DeliveryState, TrainingState
-from service.store.database.dialects import as_json
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.deliveries import DeliveryRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.operation import WorkerRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks.counting import of_counting_source
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord, newest_of
+from service.store.engines.dialects import as_json
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.references import SiteReferenceRecord
+from service.store.rhythms import RhythmRecord
+from service.store.stored_tracks import TrackRecord, of_counting_source
+from service.store.trainings import TrainingRecord
+from service.store.webhooks import DeliveryRecord
+from service.store.workers import WorkerRecord
 
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None
@@ -178,15 +178,3 @@ def among_given(column: InstrumentedAttribute[Any], *, some: bool) -> ColumnElem
 def given(ids: Ids) -> dict[str, list[str]]:
     """What such a statement is executed with."""
     return {} if ids is None else {_IDS: list(ids)}
-
-
-def newest_of(
-    column: InstrumentedAttribute[Any], camera_id: InstrumentedAttribute[str]
-) -> ColumnElement[Any]:
-    """The largest value of a column among what is stored of each camera: a lookup in an index."""
-    return (
-        select(func.max(column))
-        .where(camera_id == CameraRecord.id)
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )

@@ -1,15 +1,76 @@
-"""Statements on references."""
+"""References: what is usual at a site while its camera is at its prior pose."""
 
 from collections.abc import Sequence
+from datetime import datetime
 
-from sqlalchemy import Connection, Select, bindparam, exists, func, select, update
-from sqlalchemy.orm import Session, aliased, defer
+from sqlalchemy import (
+    BindParameter,
+    Connection,
+    Index,
+    LargeBinary,
+    Select,
+    bindparam,
+    exists,
+    func,
+    select,
+    update,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, defer, mapped_column
 
-from service.store.database.deleting import delete_some
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
+from service.enums import (
+    Answer,
+    Origin,
+)
+from service.reasons import Reasons
+from service.store.estimates import EstimateRecord
+from service.store.record import Record, camera_key, delete_some, foreign_key, one_of
 
+
+class SiteReferenceRecord(Record):
+    """What estimators say while a camera is known to be at its prior pose; the newest counts.
+
+    It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
+    is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
+    said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
+    Later, `window_from_s` is when the first track after the newest change of the camera ended, and
+    `changed_s` when it started. `answer` is what a person said last of how the camera stands:
+    estimates of before `answered_at` say nothing of it any more.
+    """
+
+    __tablename__ = "site_references"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    origin: Mapped[Origin]
+    source: Mapped[str | None]
+    requested_by: Mapped[str | None]
+    from_s: Mapped[float | None]
+    to_s: Mapped[float | None]
+    wanted: Mapped[int]
+    tracks: Mapped[int]
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    walking_speed_mps: Mapped[float | None]
+    doubts: Mapped[Reasons]
+    window_from_s: Mapped[float | None]
+    changed_s: Mapped[float | None]
+    answer: Mapped[Answer | None]
+    answered_by: Mapped[str | None]
+    answered_at: Mapped[datetime | None]
+    created_at: Mapped[datetime]
+    ready_at: Mapped[datetime | None]
+
+    __table_args__ = (
+        one_of("origin", Origin),
+        one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
+        Index(None, "camera_id", "id"),
+    )
+
+
+# Made once: each alias has columns of its own, which take a millisecond to make.
 _Reference = aliased(SiteReferenceRecord)
+# A camera by its id, by that of an enclosing query, or by a value that is given later.
+CameraId = str | InstrumentedAttribute[str] | BindParameter[str]
 _NEWEST_OF_ONE = select(func.max(_Reference.id)).where(_Reference.camera_id == bindparam("camera"))
 _OF_SOURCE = (
     update(SiteReferenceRecord.__table__)  # type: ignore[arg-type]
@@ -24,6 +85,21 @@ _OF_SOURCE = (
 def be_of_source(connection: Connection, camera_id: str, name: str) -> None:
     """Have the reference that counts be of a source, if it is of none yet."""
     connection.execute(_OF_SOURCE, {"camera": camera_id, "name": name})
+
+
+def counting_source(camera_id: CameraId) -> Select[str | None]:
+    """The source of a camera's newest reference."""
+    newest = (
+        select(_Reference.source)
+        .where(_Reference.camera_id == camera_id)
+        .order_by(_Reference.id.desc())
+        .limit(1)
+    )
+    return (
+        newest.correlate(camera_id.class_)
+        if isinstance(camera_id, InstrumentedAttribute)
+        else newest
+    )
 
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:

@@ -7,9 +7,8 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store import references, trainings
-from service.store.tracks import predictions, tracks
-from service.store.tracks.stored import StoredTrack
+from service.store import predictions, references, tracks, trainings
+from service.store.stored_tracks import StoredTrack
 from service.windows.references import window_of
 
 

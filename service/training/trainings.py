@@ -17,12 +17,10 @@ from service.enums import Activity, EventType, TrainingState
 from service.errors import ConflictError, NotFoundError
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import cameras, trainings
-from service.store.operation import events
-from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
-from service.store.tables.cameras import PriorPoseRecord
-from service.store.tables.trainings import ModelRecord, TrainingRecord
-from service.store.tracks import tracks
+from service.store import cameras, events, tracks, trainings
+from service.store.cameras import PriorPoseRecord
+from service.store.serialization import intrinsics_of, pose_of_prior, trajectory_of
+from service.store.trainings import ModelRecord, TrainingRecord
 from service.windows.requests import request_estimate
 
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.

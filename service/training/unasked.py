@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import CameraPose
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store.tables.trainings import TrainingRecord
+from service.store.trainings import TrainingRecord
 from service.training.trainings import queue_training
 
 

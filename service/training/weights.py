@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from models.regression.weights_files import weights_path
 from service.settings import Settings
 from service.store import trainings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 log = logging.getLogger("surefoot.jobs")
 

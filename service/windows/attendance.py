@@ -7,7 +7,7 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from service.store import maintenance
-from service.store.tables.attendance import MaintenanceRecord
+from service.store.maintenance import MaintenanceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,9 +5,8 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy.orm import Session
 
 from service.reasons import Reasons
-from service.store import cameras
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import tracks
+from service.store import cameras, tracks
+from service.store.cameras import CameraRecord
 from service.windows.waiting import lies_ahead
 
 LONGEST_REST_S = 600.0

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import link_pieces
-from service.store.tracks.stored import StoredTrack
+from service.store.stored_tracks import StoredTrack
 from service.windows.unpacked import Unpacked
 
 _SPARE = 40

@@ -7,11 +7,10 @@ from sqlalchemy.orm import Session
 
 from service.enums import Answer, Origin
 from service.settings import Settings
-from service.store import cameras, estimates, references
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tracks import tracks
-from service.store.tracks.windows import WindowBounds
+from service.store import cameras, estimates, references, tracks
+from service.store.estimates import EstimateRecord
+from service.store.references import SiteReferenceRecord
+from service.store.windows import WindowBounds
 from service.windows.attendance import Attendance, attendance_of
 
 

@@ -8,9 +8,9 @@ from sqlalchemy.orm import Session
 from service.enums import Outcome
 from service.settings import Settings
 from service.store import alerts
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tracks.windows import StillBounds
+from service.store.alerts import AlertRecord
+from service.store.references import SiteReferenceRecord
+from service.store.windows import StillBounds
 from service.windows.attendance import Attendance
 
 _DAY_S = 86_400.0

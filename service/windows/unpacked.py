@@ -4,8 +4,8 @@ from datetime import datetime
 
 from models.geometry.intrinsics import Intrinsics
 from models.tracks.trajectory import Trajectory
-from service.store.packing import seen_of, trajectory_of
-from service.store.tracks.stored import StoredTrack
+from service.store.serialization import seen_of, trajectory_of
+from service.store.stored_tracks import StoredTrack
 
 # The store may give a deleted track's number to a new one.
 _Track = tuple[int, datetime]

@@ -8,9 +8,8 @@ from models.monitoring.verdict import Drift
 from models.reasons import Reason
 from service.enums import AlertKind, PoseState
 from service.reasons import ServiceCode
-from service.store.alerts import POSE_KINDS
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.estimates import EstimateRecord
+from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.estimates import EstimateRecord
 from service.wording.alerts import KINDS
 from service.wording.moves import drift_words, moved_words, sure_words
 from service.wording.reasons import in_words

@@ -10,7 +10,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 
 # Operators say pan. Height is told apart.
 NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.training.steps import StepWatch
 from service.workers.growth_rests import GrowthRests, GrowthTurns
 from service.workers.in_hand import InHand

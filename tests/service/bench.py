@@ -16,9 +16,8 @@ from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.finding import Finding, asked_enough
 from service.job_queue import JobQueue
 from service.reasons import as_said
-from service.store import references, trainings
-from service.store.database.store import Store
-from service.store.operation import events
+from service.store import events, references, trainings
+from service.store.engines.store import Store
 from service.training.trainings import begin_training, publish_model
 from tests.conftest import track
 

@@ -27,9 +27,8 @@ from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.learning import LearnedReference, load_reference_period, save_reference
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import trainings
-from service.store.database.store import Store
-from service.store.tracks import tracks
+from service.store import tracks, trainings
+from service.store.engines.store import Store
 from service.training.trainings import begin_training, end_training, publish_model
 from service.windows.looking import begin_look, end_look
 from service.workers.context import JobContext

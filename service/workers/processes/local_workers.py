@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.workforce import WORKERS, note_trouble, worker_name
 

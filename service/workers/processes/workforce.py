@@ -8,8 +8,8 @@ from datetime import timedelta
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store.database.clock import now_in
-from service.store.operation import workers
+from service.store import workers
+from service.store.engines.dialects import now_in
 
 WORKERS = "workers/"  # what is written about
 _FORGET_LOST = timedelta(days=7)

@@ -9,9 +9,18 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, maintenance, references, trainings, webhooks
-from service.store.operation import activity, events
-from service.store.tracks import sizes, tracks
+from service.store import (
+    activity,
+    alerts,
+    cameras,
+    estimates,
+    events,
+    maintenance,
+    references,
+    tracks,
+    trainings,
+    webhooks,
+)
 
 BITE = 500  # rows: posts wait for the write lock no longer than these take
 _KEPT_MODELS = 2
@@ -38,7 +47,7 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
     if most_bytes:
         yield Limit(
             name="tracks_by_size",
-            bite=lambda session: sizes.forget_tracks(session, camera_id, most_bytes, BITE),
+            bite=lambda session: tracks.forget_tracks(session, camera_id, most_bytes, BITE),
         )
     yield Limit(
         name="maintenance_windows",

@@ -13,9 +13,8 @@ from service.cameras.sources import watch_sources
 from service.enums import TrainingState
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import cameras, references, trainings
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import predictions, tracks
+from service.store import cameras, predictions, references, tracks, trainings
+from service.store.cameras import CameraRecord
 from service.training.lost_trainings import requeue_lost
 from service.training.steps import StepWatch
 from service.training.unasked import train_by_itself

@@ -2,7 +2,7 @@
 
 import logging
 
-from service.store.sqlite import files
+from service.store.engines import files
 from service.workers.context import JobContext
 from service.workers.in_hand import UPKEEP
 from service.workers.upkeep import limits, reconciliation

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from service.alerts.staleness import StaleWatch
 from service.data_dir import ROUNDS
-from service.store.database.store import Lock
+from service.store.engines.store import Lock
 from service.workers import engine
 from service.workers.context import JobContext
 from service.workers.in_hand import UPKEEP

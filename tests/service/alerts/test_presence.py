@@ -13,8 +13,8 @@ from service.alerts.arrival_rates import compute_rhythm, load_arrivals, rhythm_o
 from service.alerts.presence import silence_of, watch_presence
 from service.settings import Settings
 from service.store import rhythms
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from service.wording.reasons import in_words
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation

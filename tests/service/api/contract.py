@@ -29,11 +29,11 @@ from service.notifications.webhooks import WebhookSpec
 from service.settings import Settings
 from service.store import cameras as stored_cameras
 from service.store import snapshots
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.cameras import SnapshotRecord
-from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
-from service.store.tables.trainings import TrainingRecord
+from service.store.alerts import AlertRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.snapshots import SnapshotRecord
+from service.store.trainings import TrainingRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.training import trainings
 from service.workers.processes.workforce import register_worker
 from tests.conftest import CAMERA, track

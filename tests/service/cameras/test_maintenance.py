@@ -9,8 +9,7 @@ from service.estimation.growth import load_growth, save_growth
 from service.estimation.learning import load_reference_period
 from service.estimation.paths import LearnedPaths
 from service.reasons import as_said
-from service.store import maintenance, references
-from service.store.tracks import tracks, windows
+from service.store import maintenance, references, tracks, windows
 from service.windows.references import window_of
 from service.workers.upkeep.limits import limits_of_camera
 from tests.conftest import track

@@ -4,8 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store import references
-from service.store.tracks import sources, tracks
+from service.store import references, sources, tracks
 from service.workers.upkeep import reconciliation
 from service.workers.upkeep.limits import limits_of_camera
 from tests.conftest import CAMERA, track

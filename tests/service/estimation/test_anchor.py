@@ -16,7 +16,7 @@ from service.estimation.anchoring import (
 )
 from service.estimation.growth import load_growth
 from service.store import flow_maps, references
-from service.store.tables.references import AnchorRecord
+from service.store.flow_maps import AnchorRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
 

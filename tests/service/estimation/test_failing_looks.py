@@ -11,9 +11,10 @@ from models.errors import CheckpointError
 from service.alerts.staleness import StaleWatch
 from service.reasons import ServiceCode
 from service.store import flow_maps, references, trainings
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
+from service.store.cameras import CameraRecord
+from service.store.flow_maps import FlowMapRecord
+from service.store.references import SiteReferenceRecord
+from service.store.stored_tracks import TrackRecord
 from service.training.trainings import begin_training, publish_model
 from service.windows.looking import rest_after_s
 from service.windows.requests import request_estimate

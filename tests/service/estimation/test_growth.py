@@ -17,9 +17,9 @@ from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.paths import LearnedPaths
 from service.store import alerts, flow_maps, references
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import FlowMapRecord
-from service.store.tables.tracks import TrackRecord
+from service.store.estimates import EstimateRecord
+from service.store.flow_maps import FlowMapRecord
+from service.store.stored_tracks import TrackRecord
 from tests.conftest import CAMERA
 from tests.service.estimation.answered import put_back
 from tests.service.street import KNOCKED, PRIOR, Street

@@ -7,8 +7,8 @@ import pytest
 
 from models.pose import count_walks
 from models.tracks.trajectory import Trajectory
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from service.windows.people import until_so_many
 from service.windows.unpacked import Unpacked
 from tests.conftest import CAMERA

@@ -2,7 +2,7 @@ import os
 import sqlite3
 
 from service.job_queue import JobQueue
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.processes.workforce import register_worker
 from tests.conftest import CAMERA
 from tests.service.conftest import problem

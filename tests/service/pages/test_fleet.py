@@ -11,7 +11,7 @@ from service.cameras.poses import view_pose
 from service.estimation.limits import drift_limits
 from service.pages import fleet as use_cases
 from service.store import fleet as statements
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 from service.wording.moves import height_change
 from service.wording.times import ago, duration
 from tests.service.bench import moved

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import text
 
 from service.job_queue import JobQueue
-from service.store.database.store import Store, engine_for
+from service.store.engines.store import Store, engine_for
 from service.workers.context import JobContext
 from service.workers.upkeep.limits import BITE
 from service.workers.upkeep.retention import run_retention

@@ -6,7 +6,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 from service.wording.moves import angle_half_width_deg, moved_words, signed
 from service.wording.times import next_morning, when
 

@@ -6,9 +6,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from service.store import webhooks
-from service.store.database.store import Store
-from service.store.operation import workers
+from service.store import webhooks, workers
+from service.store.engines.store import Store
 from service.windows.waiting import lies_ahead
 from service.workers.processes.workforce import register_worker
 from service.workers.upkeep.housekeeping import ClockWatch, follow_clock_since_last_run

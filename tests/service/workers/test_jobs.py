@@ -52,7 +52,7 @@ from dbos import DBOS
 
 from service.job_queue import ESTIMATE_JOB, ESTIMATE_QUEUE, JobQueue, engine_config
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 settings = Settings()
 store = Store(settings)

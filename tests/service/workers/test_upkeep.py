@@ -10,11 +10,10 @@ from models.geometry.pose import CameraPose
 from service.cameras.cameras import add_prior_pose
 from service.cameras.tracks import receive_tracks
 from service.formats.track import Batch, Clock, Limits, read_track
-from service.store import cameras, trainings
-from service.store.database.store import Store
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import tracks, windows
-from service.store.tracks.windows import WindowBounds
+from service.store import cameras, tracks, trainings, windows
+from service.store.cameras import CameraRecord
+from service.store.engines.store import Store
+from service.store.windows import WindowBounds
 from service.training.steps import StepWatch
 from service.training.trainings import (
     begin_training,

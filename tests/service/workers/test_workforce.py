@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from service.store.database.store import Store
-from service.store.operation import workers
+from service.store import workers
+from service.store.engines.store import Store
 from service.workers.in_hand import InHand
 from service.workers.processes.local_workers import pause_s
 from service.workers.processes.workforce import Watch, heartbeat, note_trouble, register_worker

@@ -1,0 +1,151 @@
+"""Records of the store: what all tables share.
+
+Angles are radians, times aware UTC; times of tracks are seconds since the epoch.
+"""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any, ClassVar
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    CheckConstraint,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Integer,
+    MetaData,
+    Select,
+    String,
+    TypeDecorator,
+    delete,
+)
+from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute, Session, mapped_column
+
+from service import enums
+from service.reasons import Reasons, from_json, to_json
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+_STORED: tuple[type[StrEnum], ...] = (
+    enums.Activity,
+    enums.AlertKind,
+    enums.AlertSource,
+    enums.AlertState,
+    enums.Answer,
+    enums.DeliveryState,
+    enums.EventType,
+    enums.MessageType,
+    enums.Origin,
+    enums.Outcome,
+    enums.PoseState,
+    enums.Severity,
+    enums.TrainingState,
+    enums.WebhookFormat,
+)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """Aware UTC times; SQLite keeps them without their zone."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Refuse naive times; store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"time: an aware time is needed, got {value}")
+        return value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Give the zone back."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Word(TypeDecorator[StrEnum]):
+    """A word of a closed vocabulary; `one_of` has the store check it."""
+
+    impl = String
+    cache_ok = True
+
+    def __init__(self, words: type[StrEnum]) -> None:
+        super().__init__()
+        self.words = words
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        """The plain word."""
+        return None if value is None else str(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> StrEnum | None:
+        """The member of the vocabulary."""
+        return None if value is None else self.words(value)
+
+
+class ReasonsJson(TypeDecorator[Reasons]):
+    """Reasons, as JSON."""
+
+    impl = JSON
+    cache_ok = True
+
+    def process_bind_param(self, value: Reasons | None, dialect: Dialect) -> Any:
+        """A list of codes with their values."""
+        return None if value is None else to_json(value)
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Reasons | None:
+        """The reasons."""
+        return None if value is None else from_json(value)
+
+
+def one_of(column: str, words: Iterable[StrEnum]) -> CheckConstraint:
+    """The constraint that a column has one of some words, or nothing."""
+    said = ", ".join(f"'{word}'" for word in words)
+    return CheckConstraint(f"{column} IN ({said})", name=column)
+
+
+class Record(DeclarativeBase):
+    """Base of all records."""
+
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: UtcDateTime,
+        # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
+        int: BigInteger().with_variant(Integer, "sqlite"),
+        dict[str, Any]: JSON,
+        list[float]: JSON,
+        list[str]: JSON,
+        Reasons: ReasonsJson(),
+    }
+    type_annotation_map |= {words: Word(words) for words in _STORED}
+
+
+def camera_key() -> Any:
+    """A column of the camera that a row is of, and goes with."""
+    return mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
+
+
+def foreign_key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
+    """A column that names a row elsewhere, and what becomes of it with that."""
+    return mapped_column(ForeignKey(target, ondelete=gone), **options)
+
+
+def delete_some(session: Session, key: InstrumentedAttribute[Any], some: Select[Any]) -> int:
+    """Delete the rows whose keys a query gives; how many. Where it gives none, nothing is written.
+
+    Args:
+        session: of a store.
+        key: the column of the primary key.
+        some: the query, of some hundreds of keys at most.
+    """
+    keys = session.scalars(some).all()
+    if keys:
+        session.execute(delete(key.class_).where(key.in_(keys)))
+    return len(keys)
