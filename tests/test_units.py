@@ -19,7 +19,6 @@ EDGES = (
 # terminal. They take the words of `service/formats/degrees.py`.
 TELLING = {
     "service/commands/demo.py",
-    "service/commands/demo_screen.py",
     "service/commands/demo_street.py",
     "service/estimation/estimates.py",
     "service/notifications/outbox.py",

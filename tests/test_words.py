@@ -27,7 +27,7 @@ FIELDS = {
 }  # fmt: skip
 # Values that are spelled like a word of a vocabulary, and mean something else.
 OTHERS = {
-    ("operations/checking.py", "ok"): "a verdict, defined there",
+    ("operations/check.py", "ok"): "a verdict, defined there",
     ("formats/batch.py", "source"): "the name of a field",
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",

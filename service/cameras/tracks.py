@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection
 
-from service.cameras.pictures import check_picture
+from service.cameras.posts import check_picture
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.formats.track import Batch, Rejection

@@ -22,8 +22,8 @@ from service.cameras import cameras
 from service.formats.calibration_file import read_calibration
 from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
+from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
-from service.pages.drawings.preview import tried_ground_svg
 from service.wording.typed_pose import judge_pose, judge_tracks, worst_first
 
 router = APIRouter(include_in_schema=False)

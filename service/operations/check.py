@@ -1,4 +1,4 @@
-"""Look a data directory over: what is wrong in it, and what is merely left over."""
+"""A data directory looked over: what is wrong in it, and what is merely left over."""
 
 import shutil
 import stat
@@ -21,7 +21,7 @@ from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import require_openable
 from service.notifications.sealing import sealer_of
 from service.operations.manifest import hash_file
-from service.operations.placing import READY
+from service.operations.restore import READY
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
