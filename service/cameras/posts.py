@@ -1,4 +1,4 @@
-"""What a process remembers of the cameras that are posted to and looked at."""
+"""A process's memory of the cameras that are posted to and looked at."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ class StalePictureError(Exception):
 
 
 class Pictures:
-    """What a process knows of pictures. Who writes compares it with what is there by then."""
+    """Pictures as a process knows them. Who writes compares them with what is there by then."""
 
     def __init__(self) -> None:
         self._known: dict[str, Picture] = {}
@@ -57,7 +57,7 @@ class Pictures:
 
 
 def check_picture(connection: Connection, camera_id: str, read_by: Picture) -> cameras.Awaited:
-    """What tracks of a camera are awaited for, if its picture is the one that they were read by.
+    """The uses that await a camera's tracks, if its picture is the one they were read by.
 
     Raises:
         NotFoundError: there is no such camera.

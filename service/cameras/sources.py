@@ -221,7 +221,7 @@ def _count(
 def _is_silent(
     session: Session, settings: Settings, counting: SourceRecord, other: SourceRecord
 ) -> bool:
-    """Whether the source that counts has fallen silent where another has not.
+    """True if the source that counts has fallen silent where another has not.
 
     By when they post and by the times of their tracks: some post once a day.
     """
@@ -237,7 +237,7 @@ def _is_silent(
 def _is_ready(
     session: Session, settings: Settings, reference: SiteReferenceRecord, name: str
 ) -> bool:
-    """Whether a source's tracks would make a reference of a camera that is where it should be."""
+    """True if a source's tracks would make a reference of a camera that is where it should be."""
     if reference.ready_at is None:
         return True  # nobody has judged the camera by now
     if not _is_well(session, settings, reference):
@@ -249,7 +249,7 @@ def _is_ready(
 
 
 def _usable(session: Session, settings: Settings, reference: SiteReferenceRecord, name: str) -> int:
-    """How many of a source's tracks were seen while the camera was known to be still."""
+    """Count of a source's tracks that were seen while the camera was known to be still."""
     attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
     from_s = _still_from_s(session, settings, reference)
     return sources.count_from(session, reference.camera_id, name, from_s, attended.spans)
@@ -265,7 +265,7 @@ def _still_from_s(
 
 
 def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecord) -> bool:
-    """Whether the source that counts has said last that the camera is where it should be."""
+    """True if the source that counts said last that the camera is where it should be."""
     camera_id = reference.camera_id
     last = estimates.newest(session, camera_id)
     if last is None or not made_against(reference, last) or last.state != PoseState.OK:

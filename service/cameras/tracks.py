@@ -19,7 +19,7 @@ from service.windows.requests import request_estimate
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Receipt:
-    """What became of the tracks of one request."""
+    """The fate of the tracks of one request."""
 
     accepted: int
     duplicates: int

@@ -132,7 +132,7 @@ def _show(
 
 
 def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
-    """Whether the newest track is in the reference or the estimate that is shown."""
+    """True if the newest track is in the reference or the estimate that is shown."""
     pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
     alerts = http.get(
         "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}

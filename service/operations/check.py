@@ -32,7 +32,7 @@ _HOUR_S = 3600.0
 
 
 class Verdict(StrEnum):
-    """What was found of one thing."""
+    """Verdicts on one thing."""
 
     OK = "ok"
     NOTE = "note"

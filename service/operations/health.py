@@ -22,7 +22,7 @@ _NAMED_CAMERAS = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Readiness:
-    """Whether the service can do its work, and what is wrong with it.
+    """Readiness for work, and what is wrong.
 
     A camera whose looks fail is a problem that is named, but does not make the service unready:
     restarting it, or sending posts elsewhere, would harm all the others. Where most of them fail,

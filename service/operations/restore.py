@@ -45,7 +45,7 @@ _REPLACED = (DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm", KEY_FILE, f"{KEY_FI
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Restored:
-    """What was put in place, and where what was there before is now."""
+    """The backup that was put in place, and where what was there before is now."""
 
     manifest: Manifest
     replaced: Path | None
@@ -208,7 +208,7 @@ def finish_restore(folder: Path) -> Path | None:
 
 
 def _has_data(folder: Path) -> bool:
-    """Whether a folder holds a database with something in it, a key, weights or copies."""
+    """True if a folder holds a database with something in it, a key, weights or copies."""
     database = folder / DATABASE
     if database.exists() and database.stat().st_size:
         return True

@@ -41,7 +41,7 @@ class AlertStory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraPage:
-    """What the page of a camera shows. Lists are newest first, windows in their order.
+    """The contents of a camera's page. Lists are newest first, windows in their order.
 
     `alerts` are all that fire, and then those that ended last.
 

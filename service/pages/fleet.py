@@ -70,7 +70,7 @@ class FleetRow:
 
     @property
     def words(self) -> str:
-        """What it does, in one line."""
+        """The camera's doings, in one line."""
         now_s = self.now.timestamp()
         return fleet_line(
             self.state,
@@ -84,12 +84,12 @@ class FleetRow:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """What else is to be known of it at a glance."""
+        """Whatever else is to be known of it at a glance."""
         return fleet_flags(self.state, self.status.alerts, self.attended_until, self.now)
 
     @property
     def training(self) -> int | None:
-        """How much of the training that waits or is under way is done, in percent."""
+        """Progress of the training that waits or is under way, in percent."""
         record = self.unfinished
         if record is None:
             return None
@@ -97,7 +97,7 @@ class FleetRow:
 
     @property
     def share(self) -> int | None:
-        """How much of the reference is learned, in percent; None where it is ready."""
+        """Progress of the reference, in percent; None where it is ready."""
         return None if self.learned is None else round(100 * self.learned / self.wanted)
 
     @property
@@ -107,7 +107,7 @@ class FleetRow:
 
     @property
     def rank(self) -> int:
-        """How soon it needs a person: 0 at once, 7 not at all."""
+        """Urgency for a person: 0 at once, 7 not at all."""
         alerts = self.status.alerts
         if self.attended_until is not None:
             return 5
@@ -196,7 +196,7 @@ def counts_of(rows: Sequence[FleetRow]) -> list[tuple[PoseState, str, int]]:
 
 
 def _sure_drift(estimate: EstimateRecord | None) -> Drift | None:
-    """What is sure enough to be said: beyond 2 sd, or what has been found to drift."""
+    """The drift with what is sure enough to be said: beyond 2 sd, or found to drift."""
     if estimate is None or not estimate.identifiable:
         return None
     drift, drifted = estimate.drift, estimate.drifted

@@ -121,7 +121,7 @@ def fleet_line(
     wanted: int,
     silent_s: float,
 ) -> str:
-    """What a camera does, in one line of the fleet.
+    """A camera's doings, in one line of the fleet.
 
     Args:
         state: of the camera.
@@ -155,7 +155,7 @@ def fleet_line(
 def page_flags(
     lacks: Sequence[Reason], attended_until: datetime | None, clock: Clock
 ) -> Sequence[str]:
-    """What else is to be known of a camera at a glance, beside its alerts."""
+    """Flags of a camera's page, beside those of its alerts."""
     found = [
         f"Without the {str(lack.values['part']).replace('_', ' ')}"
         for lack in lacks
@@ -167,7 +167,7 @@ def page_flags(
 
 
 def page_alert_flags(alert: AlertRecord, group: AlertRecord | None, clock: Clock) -> Sequence[str]:
-    """The same of an alert that fires."""
+    """Flags of a camera's page, of an alert that fires."""
     found = []
     if alert.acknowledged_at is not None:
         found.append(f"Acknowledged by {alert.acknowledged_by}")

@@ -32,7 +32,7 @@ def in_words(reasons: Sequence[Reason]) -> str:
 
 
 def group_in_words(reasons: Sequence[Reason]) -> str:
-    """The same of a tracker's alert, beside the tracker's name."""
+    """Reasons of a tracker's alert, to stand beside the tracker's name."""
     return in_words(
         [
             Reason(code=each.code, values={**each.values, "track_source": ""})

@@ -49,7 +49,7 @@ def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> lis
 
 
 def worst_first(sayings: Sequence[Saying]) -> list[Saying]:
-    """The same, those first that somebody has to look at; then what is good to know."""
+    """Remarks in order: those first that somebody has to look at, then what is good to know."""
     order = list(Tone)
     return sorted(sayings, key=lambda saying: order.index(saying.kind))
 

@@ -60,7 +60,7 @@ def charts(accept_encoding: Annotated[str, Header()] = "") -> Response:
 
 
 def _flags(page: CameraPage, clock: Clock) -> list[str]:
-    """What else is to be known at a glance, each once, of open alerts and maintenance."""
+    """Flags of open alerts and maintenance, each once."""
     until = None if page.attended is None else page.attended.to_at
     flags = [*camera.page_flags(page.camera.record.lacks, until, clock)]
     for story in page.firing:
@@ -69,7 +69,7 @@ def _flags(page: CameraPage, clock: Clock) -> list[str]:
 
 
 def _chart_facts(page: CameraPage) -> dict[str, Any]:
-    """What charts show beside the history: prior poses, oldest first, and alerts."""
+    """Marks of the charts beside the history: prior poses, oldest first, and alerts."""
     return {
         "camera_id": page.camera.record.id,
         "priors": [

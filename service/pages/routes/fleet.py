@@ -57,7 +57,7 @@ def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse
 
 
 def _words(state: AppState) -> dict[str, Any]:
-    """What the templates say times, states and alerts with."""
+    """The words that the templates say times, states and alerts with."""
     return dict(
         clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
         states=STATES,

@@ -42,7 +42,7 @@ def show(request: Request) -> HTMLResponse:
 
 @router.post("/ui/preview")
 def preview(body: PreviewBody) -> PreviewOut:
-    """What the picture and the ground look like by a form so far, and what is to say of it."""
+    """The picture and the ground by a form so far, and remarks on it."""
     read = body.fields.read()
     typed = body.fields.model_dump()
     wrong = {error.pointer[1:]: error.reason for error in read.errors}
@@ -76,7 +76,7 @@ def preview(body: PreviewBody) -> PreviewOut:
 
 @router.post("/ui/calibration")
 def calibration(body: BodyDep) -> FilledOut:
-    """What a calibration file of OpenCV's says, for the form's fields."""
+    """The form's fields out of a calibration file of OpenCV's."""
     return FilledOut.from_value(read_calibration(body))
 
 
