@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.durations import HOUR_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.paths.likelihood import Walkers, walkers_of
@@ -20,7 +21,7 @@ FEWEST_GROUPS = 12
 _FOLDS = 4
 # Bandwidths are chosen anew of twice as many tracks, which bear finer ones, and in the next part of
 # a day, in which people may walk elsewhere: to choose takes a sixth of the time of learning a map.
-_MORE, _HOLD_S = 2, 6 * 3600.0
+_MORE, _HOLD_S = 2, 6 * HOUR_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,9 +23,9 @@ from models.pose.warm_start import (
     last_pose,
 )
 from models.tracks.observations import Observations, of_tracks
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import joint_estimate
 from models.walking.fit import Near
-from models.walking.reference.assumed import FEWEST_WALKERS
 
 _SUSPECTED = 1.0  # of the limit, by scores: it is twice that wherever a cut is confirmed
 _SUSPECT_RATE = 0.01  # of windows of a camera that stands are looked at twice

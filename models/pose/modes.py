@@ -98,7 +98,7 @@ def ends_of(
             at = peak.candidate
             told = joint_near(observations, prior, speed_reference, at, joint, told_near)
             posterior = replace(first, belief=_belief(told, prior))
-            score = told.score - joint.score
+            score = told.log_likelihood - joint.log_likelihood
             peak = posterior.climbed(peak.candidate)
         peak = replace(peak, value=peak.value + score)
         ends.append(End(peak=peak, posterior=posterior, told=told, score=score))

@@ -43,36 +43,40 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     if not known and not _enough(session, settings, source, together):
         return None
     opened = group is None
-    now = datetime.now(UTC)
-    if group is None:
-        group = AlertRecord(
-            id=secrets.token_hex(16),
-            camera_id=None,
-            camera_ids=[],
-            track_source=source,
-            kind=kind,
-            state=AlertState.FIRING,
-            source=AlertSource.GROUP,
-            severity=Severity.CRITICAL,
-            reasons=(),
-            drift={},
-            notified=False,
-            opened_at=now,
-            changed_at=None,
-            updated_at=now,
-        )
-        session.add(group)
-        session.flush()
+    group = group or _new_group(session, source, kind)
     for member in together:
         member.group_id = group.id
     members = {str(member.camera_id) for member in together}
     group.camera_ids = sorted({*(group.camera_ids or []), *members})
     began = [_began_at(member) for member in together]
     group.changed_at = min([*began, *([group.changed_at] if group.changed_at else [])])
-    group.updated_at = now
+    group.updated_at = datetime.now(UTC)
     group.reasons = (_reason(group),)
     session.flush()
     return group if opened else None
+
+
+def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
+    now = datetime.now(UTC)
+    group = AlertRecord(
+        id=secrets.token_hex(16),
+        camera_id=None,
+        camera_ids=[],
+        track_source=source,
+        kind=kind,
+        state=AlertState.FIRING,
+        source=AlertSource.GROUP,
+        severity=Severity.CRITICAL,
+        reasons=(),
+        drift={},
+        notified=False,
+        opened_at=now,
+        changed_at=None,
+        updated_at=now,
+    )
+    session.add(group)
+    session.flush()
+    return group
 
 
 def _together(

@@ -9,19 +9,19 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, Value
-from models.walking.reference.assumed import FEWEST_WALKERS
-from service.alerts.presence import silence_of
+from models.walking.config import FEWEST_WALKERS
+from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
+from service.references import tracks_so_far, wanted_tracks, window_beside
 from service.settings import Settings
 from service.store import cameras, estimates, fleet, maintenance, windows
 from service.store.estimates import EstimateRecord
 from service.store.maintenance import MaintenanceRecord
 from service.store.serialization import intrinsics_of, pose_of_prior
-from service.windows.references import tracks_so_far, wanted_tracks, window_beside
 from service.wording.reasons import in_words
 
 
@@ -163,7 +163,7 @@ def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_f
             found += _of_alerts(status)
     if not status.judged:
         found += _missing(session, settings, status, so_far)
-    silence = silence_of(session, settings, status.camera_id, now) if status.silent else None
+    silence = data_gap_of(session, settings, status.camera_id, now) if status.silent else None
     if silence is not None and status.state in (PoseState.NO_DATA, PoseState.DRIFTING):
         found += silence.reasons
     return tuple(found)

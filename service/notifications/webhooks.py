@@ -29,7 +29,7 @@ _BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WebhookSpec:
-    """What an integrator says of a webhook; its URL was checked. No kinds: all."""
+    """A webhook as an integrator wants it; its URL was checked. No kinds: all."""
 
     url: str
     name: str

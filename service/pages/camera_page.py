@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from models.geometry.misplacement import Misplacement, misplacements
 from models.tracks.trajectory import Trajectory
 from service.alerts.alerts import list_alerts
-from service.alerts.presence import Silence, silence_of
+from service.alerts.data_gaps import DataGap, data_gap_of
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
@@ -53,7 +53,7 @@ class CameraPage:
     now: datetime
     camera: CameraView
     pose: PoseView
-    silence: Silence | None
+    silence: DataGap | None
     newest_track_s: float | None
     tracks: tuple[Trajectory, ...]
     misplaced: tuple[Misplacement, ...]
@@ -136,7 +136,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         now=now,
         camera=camera,
         pose=pose,
-        silence=silence_of(session, settings, camera_id, now),
+        silence=data_gap_of(session, settings, camera_id, now),
         newest_track_s=tracks.newest_end_s(session, camera_id),
         tracks=tuple(trajectory_of(record) for record in shown),
         misplaced=misplaced,

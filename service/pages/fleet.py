@@ -13,12 +13,12 @@ from service.cameras.status import CameraStatus, alert_since, camera_statuses, w
 from service.enums import PoseState, Severity
 from service.estimation.limits import drift_limits
 from service.pages.drawings.sparkline import sparkline
+from service.references import tracks_so_far, wanted_tracks
 from service.settings import Settings
 from service.store import fleet
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.trainings import TrainingRecord
-from service.windows.references import tracks_so_far, wanted_tracks
 from service.wording.camera import STATES, fleet_flags, fleet_line
 from service.wording.times import from_seconds
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.enums import Activity, AlertKind, Outcome
 from service.store.engines.following import mark_entry, settled
-from service.store.record import Record, delete_some, one_of
+from service.store.record import Record, delete_some
 
 
 class ActivityRecord(Record):
@@ -38,9 +38,6 @@ class ActivityRecord(Record):
     details: Mapped[dict[str, Any]]
 
     __table_args__ = (
-        one_of("what", Activity),
-        one_of("kind", AlertKind),
-        one_of("outcome", Outcome),
         Index(None, "camera_id", "id"),
         Index(None, "subject_id", "id"),
         Index(None, "at"),

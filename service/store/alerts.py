@@ -16,7 +16,7 @@ from service.enums import (
     Severity,
 )
 from service.reasons import Reasons, code_of, values_of
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of
+from service.store.record import Record, camera_key, delete_some, foreign_key
 
 _IS_FIRING = f"state = '{AlertState.FIRING}'"
 
@@ -58,11 +58,6 @@ class AlertRecord(Record):
     note: Mapped[str | None]
 
     __table_args__ = (
-        one_of("kind", AlertKind),
-        one_of("state", AlertState),
-        one_of("source", AlertSource),
-        one_of("severity", Severity),
-        one_of("outcome", Outcome),
         Index(
             "uq_alerts_firing",
             "camera_id",

@@ -25,7 +25,7 @@ from service.enums import (
 from service.reasons import Reasons
 from service.store.engines.prepared import Prepared
 from service.store.estimates import EstimateRecord
-from service.store.record import Record, camera_key, delete_some, one_of
+from service.store.record import Record, camera_key, delete_some, one_of, vocabulary
 from service.store.references import SiteReferenceRecord, counting_source
 from service.store.trainings import ModelRecord, TrainingRecord
 
@@ -81,7 +81,7 @@ class PriorPoseRecord(Record):
     heading_rad: Mapped[float]
     x_m: Mapped[float]
     y_m: Mapped[float]
-    origin: Mapped[Origin]
+    origin: Mapped[Origin] = mapped_column(vocabulary(Origin, checked=False))
     trusted_by: Mapped[str | None]
     created_at: Mapped[datetime]
 

@@ -13,7 +13,7 @@ from service.enums import (
     PoseState,
 )
 from service.reasons import Reasons
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of
+from service.store.record import Record, camera_key, delete_some, foreign_key, one_of, vocabulary
 
 
 def _parameters(*columns: str) -> Any:
@@ -45,7 +45,7 @@ class EstimateRecord(Record):
     model_id: Mapped[str | None] = foreign_key("models.id", "SET NULL", index=True)
     prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
     reference_id: Mapped[int | None] = foreign_key("site_references.id", index=True)
-    state: Mapped[PoseState]
+    state: Mapped[PoseState] = mapped_column(vocabulary(PoseState, checked=False))
     reasons: Mapped[Reasons]
     identifiable: Mapped[list[str]] = mapped_column("told")  # of tilt, roll, height, heading
     height_m: Mapped[float]

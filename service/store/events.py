@@ -9,7 +9,7 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.enums import EventType
 from service.store.engines.following import mark_entry, newest_settled, settled
-from service.store.record import Record, delete_some, one_of
+from service.store.record import Record, delete_some
 
 
 class EventRecord(Record):
@@ -22,10 +22,7 @@ class EventRecord(Record):
     payload: Mapped[dict[str, Any]]
     created_at: Mapped[datetime]
 
-    __table_args__ = (
-        one_of("type", EventType),
-        {"sqlite_autoincrement": True},  # an id is never given twice
-    )
+    __table_args__ = ({"sqlite_autoincrement": True},)  # an id is never given twice
 
 
 def add(session: Session, type_: EventType, payload: dict[str, Any], now: datetime) -> None:

@@ -14,11 +14,11 @@ from sqlalchemy import (
     CheckConstraint,
     DateTime,
     Dialect,
+    Enum,
     ForeignKey,
     Integer,
     MetaData,
     Select,
-    String,
     TypeDecorator,
     delete,
 )
@@ -34,22 +34,23 @@ NAMING = {
     "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
     "pk": "pk_%(table_name)s",
 }
-_STORED: tuple[type[StrEnum], ...] = (
-    enums.Activity,
-    enums.AlertKind,
-    enums.AlertSource,
-    enums.AlertState,
-    enums.Answer,
-    enums.DeliveryState,
-    enums.EventType,
-    enums.MessageType,
-    enums.Origin,
-    enums.Outcome,
-    enums.PoseState,
-    enums.Severity,
-    enums.TrainingState,
-    enums.WebhookFormat,
-)
+# Vocabularies by the column that has their words, in whichever table.
+_STORED: dict[type[StrEnum], str] = {
+    enums.Activity: "what",
+    enums.AlertKind: "kind",
+    enums.AlertSource: "source",
+    enums.AlertState: "state",
+    enums.Answer: "answer",
+    enums.DeliveryState: "state",
+    enums.EventType: "type",
+    enums.MessageType: "type",
+    enums.Origin: "origin",
+    enums.Outcome: "outcome",
+    enums.PoseState: "state",
+    enums.Severity: "severity",
+    enums.TrainingState: "state",
+    enums.WebhookFormat: "format",
+}
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -71,25 +72,6 @@ class UtcDateTime(TypeDecorator[datetime]):
         return None if value is None else value.replace(tzinfo=UTC)
 
 
-class Word(TypeDecorator[StrEnum]):
-    """A word of a closed vocabulary; `one_of` has the store check it."""
-
-    impl = String
-    cache_ok = True
-
-    def __init__(self, words: type[StrEnum]) -> None:
-        super().__init__()
-        self.words = words
-
-    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """The plain word."""
-        return None if value is None else str(value)
-
-    def process_result_value(self, value: str | None, dialect: Dialect) -> StrEnum | None:
-        """The member of the vocabulary."""
-        return None if value is None else self.words(value)
-
-
 class ReasonsJson(TypeDecorator[Reasons]):
     """Reasons, as JSON."""
 
@@ -105,10 +87,22 @@ class ReasonsJson(TypeDecorator[Reasons]):
         return None if value is None else from_json(value)
 
 
+def vocabulary(words: type[StrEnum], *, checked: bool = True) -> Enum:
+    """The type of a column of words; `checked` has the store refuse any other."""
+    return Enum(
+        words,
+        name=_STORED[words],
+        native_enum=False,
+        create_constraint=checked,
+        length=None,
+        values_callable=lambda members: [member.value for member in members],
+    )
+
+
 def one_of(column: str, words: Iterable[StrEnum]) -> CheckConstraint:
-    """The constraint that a column has one of some words, or nothing."""
-    said = ", ".join(f"'{word}'" for word in words)
-    return CheckConstraint(f"{column} IN ({said})", name=column)
+    """The constraint of a column that has some words alone of its vocabulary."""
+    listed = ", ".join(f"'{word}'" for word in words)
+    return CheckConstraint(f"{column} IN ({listed})", name=column)
 
 
 class Record(DeclarativeBase):
@@ -124,7 +118,7 @@ class Record(DeclarativeBase):
         list[str]: JSON,
         Reasons: ReasonsJson(),
     }
-    type_annotation_map |= {words: Word(words) for words in _STORED}
+    type_annotation_map |= {words: vocabulary(words) for words in _STORED}
 
 
 def camera_key() -> Any:

@@ -23,7 +23,7 @@ from service.enums import (
 )
 from service.reasons import Reasons
 from service.store.estimates import EstimateRecord
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of
+from service.store.record import Record, camera_key, delete_some, foreign_key, one_of, vocabulary
 
 
 class SiteReferenceRecord(Record):
@@ -54,14 +54,13 @@ class SiteReferenceRecord(Record):
     doubts: Mapped[Reasons]
     window_from_s: Mapped[float | None]
     changed_s: Mapped[float | None]
-    answer: Mapped[Answer | None]
+    answer: Mapped[Answer | None] = mapped_column(vocabulary(Answer, checked=False))
     answered_by: Mapped[str | None]
     answered_at: Mapped[datetime | None]
     created_at: Mapped[datetime]
     ready_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("origin", Origin),
         one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
         Index(None, "camera_id", "id"),
     )

@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, func, select
 from sqlalchemy.orm import Session
 
+from models.durations import DAY_S
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
 from service.store.engines.prepared import Prepared
@@ -36,7 +37,7 @@ _NEWEST_END = select(func.max(TrackRecord.ended_s)).where(
     *counting(bindparam("camera", type_=String))
 )
 _NEWEST_PK = select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == bindparam("camera"))
-_DAY_S, _RECENT_S, _YEAR_S = 86_400.0, 28 * 86_400.0, 365.25 * 86_400.0
+_RECENT_S, _YEAR_S = 28 * DAY_S, 365.25 * DAY_S
 
 
 def add(connection: Connection, rows: Sequence[dict[str, Any]]) -> int:
@@ -143,7 +144,7 @@ def a_year(session: Session, camera_id: str) -> float:
             *counting(camera_id), TrackRecord.ended_s >= newest - _RECENT_S
         )
     ).one()
-    span_s = max(newest - (first or newest), _DAY_S)
+    span_s = max(newest - (first or newest), DAY_S)
     return max(float(count), 1.0) * _YEAR_S / span_s
 
 

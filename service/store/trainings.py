@@ -10,7 +10,7 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 from service.enums import (
     TrainingState,
 )
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of
+from service.store.record import Record, camera_key, delete_some, foreign_key
 
 
 class TrainingRecord(Record):
@@ -41,7 +41,6 @@ class TrainingRecord(Record):
     finished_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("state", TrainingState),
         Index(None, "camera_id", "queued_at"),
         Index(None, "state"),
     )

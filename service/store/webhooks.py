@@ -22,7 +22,7 @@ from models.reasons import Reason
 from service.enums import AlertState, DeliveryState, MessageType, WebhookFormat
 from service.reasons import Reasons
 from service.store.alerts import AlertRecord
-from service.store.record import Record, delete_some, one_of
+from service.store.record import Record, delete_some
 
 
 class WebhookRecord(Record):
@@ -53,8 +53,6 @@ class WebhookRecord(Record):
     refreshed_at: Mapped[datetime | None]  # when an Alertmanager was last told all that fires
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
-
-    __table_args__ = (one_of("format", WebhookFormat),)
 
     def disable(self, why: Reason) -> None:
         """Send nothing more to it, until a person enables it."""
@@ -87,8 +85,6 @@ class DeliveryRecord(Record):
     finished_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("type", MessageType),
-        one_of("state", DeliveryState),
         Index(None, "webhook_id", "state", "number"),
         Index(None, "state", "next_attempt_at"),
         {"sqlite_autoincrement": True},  # numbers are the order of what happened

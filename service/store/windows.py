@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Select, and_, func, select
 from sqlalchemy.orm import Session
 
+from models.durations import DAY_S
 from service.store.engines.dialects import whole
 from service.store.stored_tracks import (
     Spans,
@@ -17,8 +18,6 @@ from service.store.stored_tracks import (
     select_tracks,
     started_from,
 )
-
-_DAY_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +143,7 @@ def of_days(
 
     However many tracks and days the bounds allow; of each day no more than so many, evenly.
     """
-    day = whole(TrackRecord.ended_s / _DAY_S)
+    day = whole(TrackRecord.ended_s / DAY_S)
     place = func.row_number().over(partition_by=day, order_by=(TrackRecord.ended_s, TrackRecord.id))
     each = (
         select(
@@ -172,7 +171,7 @@ def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
     newest = session.scalar(select(func.max(TrackRecord.ended_s)).where(*inside)) or 0.0
     return (
         select(TrackRecord.id)
-        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * _DAY_S)
+        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * DAY_S)
         .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
         .limit(bounds.tracks)
     )

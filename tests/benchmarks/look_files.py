@@ -16,7 +16,6 @@ from typing import Any
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.cli import app as _  # noqa: F401 - all of the service is imported before it is counted
 from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.conftest import CAMERA, ROOT
@@ -50,7 +49,7 @@ def files_of_a_look(street: Street) -> set[str]:
     """The project's files that ran, from the root."""
     found: set[str] = set()
 
-    def note(frame: FrameType, event: str, _: Any) -> None:
+    def note(frame: FrameType, event: str, argument: Any) -> None:
         if event == "call":
             found.add(frame.f_code.co_filename)
 

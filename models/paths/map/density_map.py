@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.durations import DAY_S
 from models.geometry.rotation import Array
 from models.paths.compiled.place import Grid, looks_at, unseen_at_places
 from models.paths.map.placement import Placement
@@ -102,7 +103,7 @@ def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
     """Which of so many equal parts of a UTC day each time (M,) is in."""
     if slots == 1:
         return np.zeros(time_s.shape, dtype=np.int64)
-    return np.floor(time_s % 86_400 / 86_400 * slots).astype(np.int64) % slots
+    return np.floor(time_s % DAY_S / DAY_S * slots).astype(np.int64) % slots
 
 
 def learn_map(

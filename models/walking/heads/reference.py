@@ -1,4 +1,4 @@
-"""What is usual of heads at a site, learned while its pose is known, and how they err there.
+"""The reference of heads at a site, learned while its pose is known, and how they err there.
 
 Ours: heads whose leans follow the picture's columns more than the verticals were never seen apart
 from the feet, and are not used.
@@ -9,31 +9,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import Uprights
-from models.walking.heads.fitting import (
-    ASSUMED_SPREAD,
-    LeanSpread,
-    column_share,
-    fit_angles,
-    learn_habit,
-)
-from models.walking.mixed_model import Normal
-from models.walking.variance_inflation import (
+from models.serialization import stored_as
+from models.tracks.head_foot import HeadFootPairs
+from models.walking import config
+from models.walking.heads.fitting import LeanComponents, column_share, fit_angles, learn_habit
+from models.walking.mixed.model import Normal
+from models.walking.mixed.variance_inflation import (
     Tracks,
     shrink_offset,
     squared_ratio,
     variance_inflation,
 )
 
-FEWEST_TRACKS = 12
-_PLAUSIBLE_OFFSET = np.radians([0.5, 0.5])
-_ASSUMED_INFLATION = 1.5
-_SPREAD_ROUNDS = 12
-_MOST_COLUMN_SHARE = 0.3  # beyond doubt: more would make a knock seem smaller by as much
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerticalReference:
+class HeadReference:
     """How people's heads stand over their feet at a site.
 
     `at` (2,) is the tilt and roll that it was learned at. `habit` is what is usual: the bias to the
@@ -48,7 +38,7 @@ class VerticalReference:
 
     at: Array
     habit: Normal
-    spread: LeanSpread
+    components: LeanComponents = stored_as("spread")
     column_share: float
     column_share_sd: float
     offset: Array
@@ -60,24 +50,25 @@ class VerticalReference:
     @property
     def leaning(self) -> bool:
         """Whether heads were seen to lean as verticals do, and not as columns."""
-        return abs(self.column_share) + 2 * self.column_share_sd < _MOST_COLUMN_SHARE
+        return abs(self.column_share) + 2 * self.column_share_sd < config.COLUMN_SHARE_OF_REFERENCE
 
 
-def learn_verticals(uprights: Uprights | None, at: Array) -> VerticalReference | None:
-    """What is usual of the heads of a camera at a known tilt and roll (2,).
+def learn_heads(pairs: HeadFootPairs | None, at: Array) -> HeadReference | None:
+    """The reference of the heads of a camera at a known tilt and roll (2,).
 
     None where fewer than 12 tracks have heads. In the order of time: by parts of it comes how far
     errors are larger than they seem.
     """
-    if uprights is None or uprights.tracks.size < FEWEST_TRACKS:
+    if pairs is None or pairs.tracks.size < config.HEADS_OF_REFERENCE:
         return None
-    tracks = uprights.tracks
-    habit, spread = learn_habit(uprights, at, ASSUMED_SPREAD, rounds=_SPREAD_ROUNDS)
-    share, share_sd = column_share(uprights, at, spread)
-    found = VerticalReference(
+    tracks = pairs.tracks
+    guess = LeanComponents(between_sd=config.LEAN_BETWEEN_SD, within_sd=config.LEAN_WITHIN_SD)
+    habit, components = learn_habit(pairs, at, guess, rounds=config.LEAN_EM_ROUNDS)
+    share, share_sd = column_share(pairs, at, components)
+    found = HeadReference(
         at=at,
         habit=habit,
-        spread=spread,
+        components=components,
         column_share=share,
         column_share_sd=share_sd,
         offset=np.zeros(2),
@@ -88,17 +79,17 @@ def learn_verticals(uprights: Uprights | None, at: Array) -> VerticalReference |
     )
     if not found.leaning:
         return found
-    whole = fit_angles(uprights, at, habit, spread)
+    whole = fit_angles(pairs, at, habit, components)
     offset = whole.mean - at
 
     def error_ratio(train: Tracks, test: Tracks) -> float:
-        usual, _ = learn_habit(uprights.of_tracks(train), at, spread, rounds=0)
-        fit = fit_angles(uprights.of_tracks(test), at, usual, spread)
+        usual, _ = learn_habit(pairs.of_tracks(train), at, components, rounds=0)
+        fit = fit_angles(pairs.of_tracks(test), at, usual, components)
         return squared_ratio(fit.mean - at - offset, fit.covariance)
 
-    inflation = variance_inflation(tracks, error_ratio, _ASSUMED_INFLATION)
+    inflation = variance_inflation(tracks, error_ratio, config.HEADS_INFLATION)
     noise = whole.covariance * inflation
-    kept, left = shrink_offset(offset, noise, _PLAUSIBLE_OFFSET)
+    kept, left = shrink_offset(offset, noise, config.HEADS_PLAUSIBLE_OFFSET)
     return replace(
         found,
         column_share_sd=share_sd * float(np.sqrt(inflation)),

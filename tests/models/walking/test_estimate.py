@@ -13,12 +13,12 @@ from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
 from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
+from models.walking.config import PLAUSIBLE_OFFSET
 from models.walking.estimate import joint_estimate
+from models.walking.mixed.variance_inflation import shrink_offset
 from models.walking.reference.assumed import assumed_speed_reference
 from models.walking.reference.learning import learn_speed_reference
 from models.walking.serialization import reference_from_bytes, reference_to_bytes
-from models.walking.speed_reference import PLAUSIBLE_OFFSET
-from models.walking.variance_inflation import shrink_offset
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FAR = CameraPose(
@@ -64,7 +64,7 @@ def test_the_reference_knows_its_site(site):
     assert reference.walking_speed_mps == pytest.approx(1.3, abs=0.07)
     assert reference.tracks == 150
     assert 1 <= reference.pose_variance_inflation < 4
-    assert reference.doubt is None
+    assert reference.implausible is None
     assert np.abs(reference.offset[:2]).max() < math.radians(0.3)
 
 
@@ -232,9 +232,9 @@ def test_no_tracks_tell_nothing(site):
 )
 def test_a_wrong_prior_pose_is_doubted(site, wrong, code, value):
     reference = learn_speed_reference(site[1], wrong, WalkConfig(), 0)
-    doubt = reference.doubt
+    doubt = reference.implausible
     assert doubt is not None
-    assert reference_from_bytes(reference_to_bytes(reference)).doubt is None  # told once
+    assert reference_from_bytes(reference_to_bytes(reference)).implausible is None  # told once
     name, expected, tolerance = value
     assert doubt.code is code
     assert doubt.values[name] == pytest.approx(expected, abs=tolerance)

@@ -6,7 +6,7 @@ import pytest
 
 from service.store import references, sources, tracks
 from service.workers.upkeep import reconciliation
-from service.workers.upkeep.limits import limits_of_camera
+from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 from tests.service.street import KNOCKED, PRIOR, Street

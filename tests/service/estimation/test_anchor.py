@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import select
 
-from models.monitoring.creep_log import DAY_S
+from models.durations import DAY_S
 from models.monitoring.creep_serialization import creep_log_from_bytes
 from service.estimation.anchoring import (
     compute_anchor_days,

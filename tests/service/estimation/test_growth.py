@@ -11,11 +11,11 @@ import pytest
 from sqlalchemy import delete, select
 
 from models.paths.serialization import flow_from_bytes
+from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
-from service.estimation.paths import LearnedPaths
 from service.store import alerts, flow_maps, references
 from service.store.estimates import EstimateRecord
 from service.store.flow_maps import FlowMapRecord

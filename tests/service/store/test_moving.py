@@ -15,7 +15,7 @@ from service.settings import Settings
 from service.store import moving
 from service.store.engines.store import Store
 from service.store.trainings import ModelRecord
-from service.training.trainings import begin_training
+from service.training import begin_training
 from tests.conftest import CAMERA, track
 from tests.service.bench import Bench, moved
 from tests.stores import server

@@ -21,8 +21,8 @@ from service.store import events, trainings, workers
 from service.store.engines.dialects import now_in
 from service.store.engines.failures import failure_of
 from service.store.engines.store import Store
-from service.training.weights import fetch_weights, share_weights
-from service.workers.processes.workforce import (
+from service.training import fetch_weights, share_weights
+from service.workers.processes.workers import (
     heartbeat,
     register_worker,
     take_setback,
