@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import JSON, ForeignKey, Index, String, delete, func, or_, select, update
+from sqlalchemy import JSON, ForeignKey, Index, String, delete, or_, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.record import Record
+from service.store.record import Record, count_where
 
 
 class TokenRecord(Record):
@@ -52,10 +52,9 @@ def every(session: Session) -> Sequence[TokenRecord]:
 
 
 def count_valid(session: Session, now: datetime) -> int:
-    """How many tokens would be let in."""
-    query = select(func.count()).select_from(TokenRecord)
+    """The number of tokens that are valid."""
     fresh = or_(TokenRecord.expires_at.is_(None), TokenRecord.expires_at > now)
-    return session.scalar(query.where(TokenRecord.revoked_at.is_(None), fresh)) or 0
+    return count_where(session, TokenRecord.revoked_at.is_(None), fresh)
 
 
 def note_use(session: Session, token_id: str, now: datetime) -> None:
@@ -106,7 +105,7 @@ def set_actor(session: Session, actor: Actor | None) -> None:
 
 
 def name_in(session: Session, said: str | None) -> str | None:
-    """Who did it: in whose name a session writes, and where that is not known, who is said."""
+    """The name that a session writes in, and where that is not known, the one that is said."""
     actor = actor_of(session)
     return said if actor is None else actor.name
 

@@ -9,11 +9,11 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.enums import Activity, AlertKind, Outcome
 from service.store.engines.following import mark_entry, settled
-from service.store.record import Record, delete_some
+from service.store.record import Record, delete_some, newest_first
 
 
 class ActivityRecord(Record):
-    """What somebody, or the service where `by` is None, did.
+    """An act of somebody, or of the service where `by` is None.
 
     `camera_id` refers to
     nothing, so that it stays when the camera goes; `subject_id` is the alert's, training's or
@@ -65,12 +65,7 @@ def after(
 
 def newest(session: Session, camera_id: str, limit: int) -> Sequence[ActivityRecord]:
     """The newest entries of a camera, newest first."""
-    return session.scalars(
-        select(ActivityRecord)
-        .where(ActivityRecord.camera_id == camera_id)
-        .order_by(ActivityRecord.id.desc())
-        .limit(limit)
-    ).all()
+    return session.scalars(newest_first(ActivityRecord, camera_id).limit(limit)).all()
 
 
 def of_subject(session: Session, subject_id: str) -> Sequence[ActivityRecord]:

@@ -5,7 +5,19 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import JSON, Index, String, and_, bindparam, exists, not_, select, text
+from sqlalchemy import (
+    JSON,
+    ColumnElement,
+    Index,
+    Select,
+    String,
+    and_,
+    bindparam,
+    exists,
+    not_,
+    select,
+    text,
+)
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
 from service.enums import (
@@ -16,7 +28,7 @@ from service.enums import (
     Severity,
 )
 from service.reasons import Reasons, code_of, values_of
-from service.store.record import Record, camera_key, delete_some, foreign_key
+from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
 _IS_FIRING = f"state = '{AlertState.FIRING}'"
 
@@ -106,7 +118,7 @@ _FIRING = select(AlertRecord).where(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertFilter:
-    """Which alerts are wanted; None is any."""
+    """A choice of alerts; None is any."""
 
     state: AlertState | None = None
     camera_id: str | None = None
@@ -140,12 +152,8 @@ def firing_cameras(session: Session, kind: AlertKind) -> set[str]:
 
 def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The alert of a camera and kind that was opened last, or None."""
-    return session.scalars(
-        select(AlertRecord)
-        .where(AlertRecord.camera_id == camera_id, AlertRecord.kind == kind)
-        .order_by(AlertRecord.opened_at.desc())
-        .limit(1)
-    ).first()
+    query = newest_first(AlertRecord, camera_id, AlertRecord.opened_at)
+    return session.scalars(query.where(AlertRecord.kind == kind).limit(1)).first()
 
 
 def ended(
@@ -165,60 +173,40 @@ def firing_of_source(
     session: Session, track_source: str, kinds: Sequence[AlertKind]
 ) -> Sequence[AlertRecord]:
     """The open alerts of some kinds about the cameras of a source of tracks."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.track_source == track_source,
-            AlertRecord.kind.in_(kinds),
-            AlertRecord.state == AlertState.FIRING,
-            AlertRecord.camera_id.is_not(None),
-        )
-    ).all()
+    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind.in_(kinds))
+    return session.scalars(query.where(AlertRecord.camera_id.is_not(None))).all()
 
 
 def firing_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert about all of a source of tracks, or None."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.track_source == track_source,
-            AlertRecord.kind == kind,
-            AlertRecord.state == AlertState.FIRING,
-            AlertRecord.camera_id.is_(None),
-        )
-    ).first()
+    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind == kind)
+    return session.scalars(query.where(AlertRecord.camera_id.is_(None))).first()
 
 
 def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
     """The open alerts that a group is made of."""
-    return session.scalars(
-        select(AlertRecord)
-        .where(AlertRecord.group_id == group_id, AlertRecord.state == AlertState.FIRING)
-        .order_by(AlertRecord.camera_id)
-    ).all()
+    query = _all_firing(AlertRecord.group_id == group_id)
+    return session.scalars(query.order_by(AlertRecord.camera_id)).all()
 
 
 def groups_without_members(session: Session) -> Sequence[AlertRecord]:
     """Open groups none of whose members is: their cameras are gone."""
     member = aliased(AlertRecord)
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.camera_id.is_(None),
-            AlertRecord.state == AlertState.FIRING,
-            ~exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING),
-        )
-    ).all()
+    of_group = exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING)
+    return session.scalars(_all_firing(AlertRecord.camera_id.is_(None), ~of_group)).all()
 
 
 def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     """Open alerts whose silence has come to its time."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.state == AlertState.FIRING, AlertRecord.silenced_until <= now
-        )
-    ).all()
+    return session.scalars(_all_firing(AlertRecord.silenced_until <= now)).all()
+
+
+def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:
+    return select(AlertRecord).where(AlertRecord.state == AlertState.FIRING, *conditions)
 
 
 def answered_at(session: Session, camera_id: str) -> datetime | None:
-    """When a person last said of an alert that the camera is where it should be."""
+    """The time at which a person last said that the camera is where it should be."""
     return session.scalar(
         select(AlertRecord.resolved_at)
         .where(

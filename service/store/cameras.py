@@ -25,7 +25,15 @@ from service.enums import (
 from service.reasons import Reasons
 from service.store.engines.prepared import Prepared
 from service.store.estimates import EstimateRecord
-from service.store.record import Record, camera_key, delete_some, one_of, vocabulary
+from service.store.record import (
+    Record,
+    camera_key,
+    delete_some,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
 from service.store.references import SiteReferenceRecord, counting_source
 from service.store.trainings import ModelRecord, TrainingRecord
 
@@ -118,12 +126,7 @@ _AS_SET_UP = (
     .join(PriorPoseRecord, PriorPoseRecord.id == _NEWEST_POSE)
     .where(CameraRecord.id == bindparam("camera"))
 )
-_PRIOR_POSE = (
-    select(PriorPoseRecord)
-    .where(PriorPoseRecord.camera_id == bindparam("camera"))
-    .order_by(PriorPoseRecord.id.desc())
-    .limit(1)
-)
+_PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
 
 # A record takes ten times as long as what each post of tracks has to know of its camera.
 _PICTURE = Prepared(
@@ -153,7 +156,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Awaited:
-    """What a camera's tracks are awaited for: a `look` at them, a `source` for its reference.
+    """The reasons to await a camera's tracks: a `look` at them, a `source` for its reference.
 
     `picture` is what they have to keep to.
     """
@@ -175,7 +178,7 @@ def picture(connection: Connection, camera_id: str) -> Picture | None:
 
 
 def awaited(connection: Connection, camera_id: str) -> Awaited | None:
-    """What tracks of a camera are awaited for; None where there is no such camera."""
+    """The reasons to await tracks of a camera; None where there is no such camera."""
     row = _AWAITED.row(connection, {"camera": camera_id})
     if row is None:
         return None
@@ -203,7 +206,7 @@ def ids(session: Session) -> Sequence[str]:
 
 
 def count(session: Session) -> int:
-    """How many cameras there are."""
+    """The number of cameras."""
     return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
 
 
@@ -214,28 +217,18 @@ def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
 
 def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:
     """The poses that a camera was trusted to have, newest first."""
-    return session.scalars(
-        select(PriorPoseRecord)
-        .where(PriorPoseRecord.camera_id == camera_id)
-        .order_by(PriorPoseRecord.id.desc())
-        .limit(limit)
-    ).all()
+    return session.scalars(newest_first(PriorPoseRecord, camera_id).limit(limit)).all()
 
 
 def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many that nothing names; how many."""
-    surplus = (
-        select(PriorPoseRecord.id)
-        .where(PriorPoseRecord.camera_id == camera_id)
-        .order_by(PriorPoseRecord.id.desc())
-        .offset(keep)
-    )
+    beyond = surplus(PriorPoseRecord, camera_id, keep)
     naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord)
     named = [select(one.prior_pose_id).where(one.camera_id == camera_id) for one in naming]
     bite = (
         select(PriorPoseRecord.id)
         .where(
-            PriorPoseRecord.id.in_(surplus),
+            PriorPoseRecord.id.in_(beyond),
             *(PriorPoseRecord.id.not_in(query) for query in named),
         )
         .limit(limit)

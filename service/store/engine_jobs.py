@@ -41,12 +41,12 @@ def due_without(session: Session, queue: str) -> Sequence[tuple[str, datetime | 
 
 
 def waits(session: Session, queue: str, key: str) -> bool:
-    """Whether a job of a queue's partition waits to start."""
+    """True if a job of a queue's partition waits to start."""
     return session.scalar(_WAITS, {"queue": queue, "key": key}) is not None
 
 
 def any_waits(session: Session, queue: str, besides: str) -> bool:
-    """Whether any job of a queue waits to start, but for one by its deduplication id."""
+    """True if any job of a queue waits to start, but for one by its deduplication id."""
     return session.scalar(_ANY_WAITS, {"queue": queue, "besides": besides}) is not None
 
 

@@ -13,7 +13,17 @@ from service.enums import (
     PoseState,
 )
 from service.reasons import Reasons
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of, vocabulary
+from service.store.record import (
+    Record,
+    camera_key,
+    count_where,
+    delete_some,
+    foreign_key,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
 
 
 def _parameters(*columns: str) -> Any:
@@ -98,22 +108,13 @@ class EstimateRecord(Record):
 
 def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     """The estimate that is served, or None."""
-    return session.scalars(
-        select(EstimateRecord)
-        .where(EstimateRecord.camera_id == camera_id)
-        .order_by(EstimateRecord.id.desc())
-        .limit(1)
-    ).first()
+    return session.scalars(newest_first(EstimateRecord, camera_id).limit(1)).first()
 
 
 def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> EstimateRecord | None:
     """The last estimate under an earlier reference, or None."""
-    return session.scalars(
-        select(EstimateRecord)
-        .where(EstimateRecord.camera_id == camera_id, EstimateRecord.reference_id < reference_id)
-        .order_by(EstimateRecord.id.desc())
-        .limit(1)
-    ).first()
+    query = newest_first(EstimateRecord, camera_id)
+    return session.scalars(query.where(EstimateRecord.reference_id < reference_id).limit(1)).first()
 
 
 def between(
@@ -129,7 +130,7 @@ def thinned(
 ) -> Sequence[EstimateRecord]:
     """Every so many-th of the estimates made between two times, oldest first; the newest is one."""
     wanted = _made_between(camera_id, start, end)
-    count = session.scalar(select(func.count()).where(*wanted)) or 0
+    count = count_where(session, *wanted)
     number = func.row_number().over(order_by=EstimateRecord.id.desc()).label("number")
     numbered = select(EstimateRecord.id, number).where(*wanted).subquery()
     every = max(-(-count // most), 1)
@@ -140,14 +141,8 @@ def thinned(
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many, oldest first. Returns how many."""
-    surplus = (
-        select(EstimateRecord.id)
-        .where(EstimateRecord.camera_id == camera_id)
-        .order_by(EstimateRecord.id.desc())
-        .offset(keep)
-        .subquery()
-    )
-    bite = select(surplus.c.id).order_by(surplus.c.id).limit(limit)
+    beyond = surplus(EstimateRecord, camera_id, keep).subquery()
+    bite = select(beyond.c.id).order_by(beyond.c.id).limit(limit)
     return delete_some(session, EstimateRecord.id, bite)
 
 

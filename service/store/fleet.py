@@ -79,7 +79,7 @@ def drift_history(
 
 
 def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) -> dict[str, int]:
-    """How many tracks have come that the reference being learned of each camera may be made of.
+    """The number of tracks that the reference being learned of each camera may be made of.
 
     Of those of a camera that were seen at any time `without`, none.
     """
@@ -169,7 +169,7 @@ def _maintenance_windows(*, some: bool) -> Select[MaintenanceRecord]:
 
 
 def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
-    """Whether a track was seen at any of some times of its camera: what `outside` denies."""
+    """The condition of being seen at any of some times of a camera: what `outside` denies."""
     rows = [(camera_id, *span) for camera_id, each in spans.items() for span in each]
     columns = column("camera_id", String), column("from_s", Float), column("to_s", Float)
     times = values(*columns, name="times").data(rows).cte("times")

@@ -9,7 +9,7 @@ from service.store.record import Record, foreign_key
 
 
 class FlowMapRecord(Record):
-    """Where people walk at a reference's site (`models.paths`), learned of `tracks` tracks.
+    """The density of paths at a reference's site (`models.paths`), learned of `tracks` tracks.
 
     `data` is None where too few of them walk. `chart` is the drift chart (`models.monitoring`)
     that goes with it. `to_s` is when the last of them ended, `weight` what they count for together,
@@ -46,7 +46,7 @@ class AnchorRecord(Record):
 
 
 class LastPoseRecord(Record):
-    """Where the next estimate against a reference may begin (`models.pose.warm_start`).
+    """The beginning of the next estimate against a reference (`models.pose.warm_start`).
 
     `basis` tells what it hangs on beside the tracks: of another one it says nothing.
     """
@@ -69,5 +69,5 @@ def anchor(session: Session, reference_id: int) -> AnchorRecord | None:
 
 
 def last_pose(session: Session, reference_id: int) -> LastPoseRecord | None:
-    """Where the next estimate against a reference may begin; None where it is to look anew."""
+    """The beginning of the next estimate against a reference; None where it is to look anew."""
     return session.get(LastPoseRecord, reference_id)

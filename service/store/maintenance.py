@@ -31,11 +31,11 @@ class MaintenanceRecord(Record):
 
     @property
     def until(self) -> datetime:
-        """When it ended, or will."""
+        """The time at which it ended, or will."""
         return self.ended_at or self.to_at
 
     def holds(self, now: datetime) -> bool:
-        """Whether somebody is there."""
+        """True if somebody is there."""
         return self.from_at <= now < self.until
 
 

@@ -57,7 +57,7 @@ def move_table(
 
 
 def fingerprint(rows: Iterator[Row]) -> tuple[int, str]:
-    """How many rows there are, and a hash of them all that no order changes."""
+    """The number of rows, and a hash of them all that no order changes."""
     count = total = 0
     for row in rows:
         count += 1
@@ -90,7 +90,7 @@ def rows_of_server(target: psycopg.Connection[Any], table: Table) -> Iterator[Ro
 
 
 def count_foreign(target: psycopg.Connection[Any], ids: set[str]) -> int:
-    """How many cameras of the server's are none of these."""
+    """The number of the server's cameras that are none of these."""
     return sum(row[0] not in ids for row in target.execute("SELECT id FROM cameras"))
 
 

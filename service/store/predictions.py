@@ -1,4 +1,4 @@
-"""What models say of tracks."""
+"""Predictions of models on tracks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from service.store.windows import WindowBounds, window_ids
 
 
 class PredictionRecord(Record):
-    """What a model says of a track; without numbers where the track gives no window."""
+    """A model's prediction on a track; without numbers where the track gives no window."""
 
     __tablename__ = "predictions"
 
@@ -58,7 +58,7 @@ def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
 def predictions(
     session: Session, model_id: str, track_pks: Sequence[int]
 ) -> Sequence[PredictionRecord]:
-    """What the model says of some tracks, newest first, of those that gave it something to say."""
+    """The model's predictions on some tracks, newest first, of those with a window."""
     return session.scalars(
         select(PredictionRecord)
         .join(TrackRecord, PredictionRecord.track_pk == TrackRecord.id)

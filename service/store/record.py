@@ -6,12 +6,13 @@ Angles are radians, times aware UTC; times of tracks are seconds since the epoch
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from sqlalchemy import (
     JSON,
     BigInteger,
     CheckConstraint,
+    ColumnElement,
     DateTime,
     Dialect,
     Enum,
@@ -21,12 +22,15 @@ from sqlalchemy import (
     Select,
     TypeDecorator,
     delete,
+    func,
+    select,
 )
 from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute, Session, mapped_column
 
 from service import enums
 from service.reasons import Reasons, from_json, to_json
 
+Found = TypeVar("Found")
 NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -129,6 +133,23 @@ def camera_key() -> Any:
 def foreign_key(target: str, gone: str = "CASCADE", **options: Any) -> Any:
     """A column that names a row elsewhere, and what becomes of it with that."""
     return mapped_column(ForeignKey(target, ondelete=gone), **options)
+
+
+def newest_first(record: type[Found], camera_id: Any, by: Any = None) -> Select[Found]:
+    """The rows of a camera, newest first: by their ids, or by another column."""
+    table: Any = record
+    order = table.id if by is None else by
+    return select(record).where(table.camera_id == camera_id).order_by(order.desc())
+
+
+def surplus(record: Any, camera_id: str, keep: int, by: Any = None) -> Select[Any]:
+    """The ids of all but the newest so many rows of a camera."""
+    return newest_first(record, camera_id, by).with_only_columns(record.id).offset(keep)
+
+
+def count_where(session: Session, *conditions: ColumnElement[bool]) -> int:
+    """The number of rows that meet some conditions."""
+    return session.scalar(select(func.count()).where(*conditions)) or 0
 
 
 def delete_some(session: Session, key: InstrumentedAttribute[Any], some: Select[Any]) -> int:

@@ -23,11 +23,20 @@ from service.enums import (
 )
 from service.reasons import Reasons
 from service.store.estimates import EstimateRecord
-from service.store.record import Record, camera_key, delete_some, foreign_key, one_of, vocabulary
+from service.store.record import (
+    Record,
+    camera_key,
+    delete_some,
+    foreign_key,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
 
 
 class SiteReferenceRecord(Record):
-    """What estimators say while a camera is known to be at its prior pose; the newest counts.
+    """The estimators' answers while a camera is known to be at its prior pose; the newest counts.
 
     It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
     is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
@@ -103,47 +112,28 @@ def counting_source(camera_id: CameraId) -> Select[str | None]:
 
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:
     """The reference of a camera that counts."""
-    return session.scalars(_newest(camera_id)).one()
+    return session.scalars(newest_first(SiteReferenceRecord, camera_id).limit(1)).one()
 
 
 def newest_if_any(session: Session, camera_id: str) -> SiteReferenceRecord | None:
     """The reference that counts; None where the camera is gone."""
-    return session.scalars(_newest(camera_id)).first()
+    return session.scalars(newest_first(SiteReferenceRecord, camera_id).limit(1)).first()
 
 
 def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[SiteReferenceRecord]:
     """The references of a camera, newest first, without what was learned."""
-    return session.scalars(
-        select(SiteReferenceRecord)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .limit(limit)
-        .options(defer(SiteReferenceRecord.data))
-    ).all()
+    query = newest_first(SiteReferenceRecord, camera_id).limit(limit)
+    return session.scalars(query.options(defer(SiteReferenceRecord.data))).all()
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many that no estimate names; how many."""
-    surplus = (
-        select(SiteReferenceRecord.id)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .offset(keep)
-    )
+    beyond = surplus(SiteReferenceRecord, camera_id, keep)
     named = exists().where(EstimateRecord.reference_id == SiteReferenceRecord.id)
     of_camera = EstimateRecord.camera_id == camera_id  # by its index
     bite = (
         select(SiteReferenceRecord.id)
-        .where(SiteReferenceRecord.id.in_(surplus), ~named.where(of_camera))
+        .where(SiteReferenceRecord.id.in_(beyond), ~named.where(of_camera))
         .limit(limit)
     )
     return delete_some(session, SiteReferenceRecord.id, bite)
-
-
-def _newest(camera_id: str) -> Select[SiteReferenceRecord]:
-    return (
-        select(SiteReferenceRecord)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .limit(1)
-    )

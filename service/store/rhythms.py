@@ -10,7 +10,7 @@ from service.store.record import Record
 
 
 class RhythmRecord(Record):
-    """How many people a camera usually sees when, and how late they come (`arrivals`).
+    """The arrival model of a camera: how many people come when, and how late.
 
     `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
     """

@@ -26,7 +26,7 @@ class SnapshotRecord(Record):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SnapshotFacts:
-    """What is known of a still image without reading it."""
+    """Facts of a still image, without reading it."""
 
     sha256: str
     width: int
@@ -40,7 +40,7 @@ def find(session: Session, camera_id: str) -> SnapshotRecord | None:
 
 
 def facts(session: Session, camera_id: str) -> SnapshotFacts | None:
-    """What is known of the still image of a camera, or None."""
+    """The facts of the still image of a camera, or None."""
     row = session.execute(
         select(
             SnapshotRecord.sha256,

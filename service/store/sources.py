@@ -16,7 +16,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.engines.prepared import Prepared
-from service.store.record import Record
+from service.store.record import Record, count_where
 from service.store.stored_tracks import Spans, TrackRecord, outside
 
 
@@ -71,7 +71,7 @@ def of_camera(session: Session, camera_id: str) -> Sequence[SourceRecord]:
 
 
 def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:
-    """When the newest track of a source ended."""
+    """The end of the newest track of a source."""
     return session.scalar(
         select(func.max(TrackRecord.ended_s)).where(
             TrackRecord.camera_id == camera_id, TrackRecord.source == name
@@ -82,17 +82,15 @@ def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:
 def count_from(
     session: Session, camera_id: str, name: str, started_from_s: float | None, without: Spans
 ) -> int:
-    """How many tracks of a source started from a time on and were not seen at others."""
-    query = select(func.count()).where(
-        TrackRecord.camera_id == camera_id, TrackRecord.source == name, *outside(without)
-    )
+    """The number of tracks of a source that started from a time on and were not seen at others."""
+    conditions = [TrackRecord.camera_id == camera_id, TrackRecord.source == name, *outside(without)]
     if started_from_s is not None:
-        query = query.where(TrackRecord.started_s >= started_from_s)
-    return session.scalar(query) or 0
+        conditions.append(TrackRecord.started_s >= started_from_s)
+    return count_where(session, *conditions)
 
 
 def has_tracks(session: Session, camera_id: str, name: str) -> bool:
-    """Whether tracks of a source are stored."""
+    """True if tracks of a source are stored."""
     return newest_end_s(session, camera_id, name) is not None
 
 

@@ -46,7 +46,7 @@ class TrackRecord(Record):
 
 
 class StoredTrack(NamedTuple):
-    """What estimates need of a track; as a `TrackRecord` has it."""
+    """The columns of a `TrackRecord` that estimates need."""
 
     id: int
     track_id: str
@@ -75,7 +75,7 @@ Spans = tuple[tuple[float, float], ...]  # times, from and to
 
 
 def bytes_of_track() -> ColumnElement[int]:
-    """How many bytes a track's points, boxes and heads have."""
+    """The bytes of a track's points, boxes and heads."""
     return (
         func.length(TrackRecord.points)
         + func.coalesce(func.length(TrackRecord.boxes), 0)
@@ -84,13 +84,13 @@ def bytes_of_track() -> ColumnElement[int]:
 
 
 def of_counting_source(camera_id: CameraId) -> ColumnElement[bool]:
-    """Whether a track is of the source that counts; all are, as long as none does."""
+    """The condition that a track is of the source that counts; all are, as long as none does."""
     counting = counting_source(camera_id).scalar_subquery()
     return TrackRecord.source == func.coalesce(counting, TrackRecord.source)
 
 
 def counting(camera_id: str | BindParameter[str]) -> list[ColumnElement[bool]]:
-    """That a track is of a camera, and of the source that counts."""
+    """The conditions that a track is of a camera, and of the source that counts."""
     return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
 
 
@@ -110,7 +110,7 @@ def newest_source_of(camera_id: str | InstrumentedAttribute[str]) -> Select[str]
 
 
 def started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
-    """That a track counts and started at or after a time."""
+    """The conditions that a track counts and started at or after a time."""
     conditions = counting(camera_id)
     if started_from_s is not None:
         conditions.append(TrackRecord.started_s >= started_from_s)
@@ -118,7 +118,7 @@ def started_from(camera_id: str, started_from_s: float | None) -> list[ColumnEle
 
 
 def outside(spans: Spans) -> list[ColumnElement[bool]]:
-    """That tracks were seen at none of some times."""
+    """The conditions that tracks were seen at none of some times."""
     return [
         (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s) for from_s, to_s in spans
     ]

@@ -15,7 +15,7 @@ from models.durations import DAY_S
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
 from service.store.engines.prepared import Prepared
-from service.store.record import delete_some
+from service.store.record import count_where, delete_some
 from service.store.stored_tracks import (
     StoredTrack,
     TrackRecord,
@@ -46,24 +46,23 @@ def add(connection: Connection, rows: Sequence[dict[str, Any]]) -> int:
 
 
 def count(session: Session, camera_id: str) -> int:
-    """How many tracks are stored."""
-    query = select(func.count()).select_from(TrackRecord)
-    return session.scalar(query.where(TrackRecord.camera_id == camera_id)) or 0
+    """The number of stored tracks."""
+    return count_where(session, TrackRecord.camera_id == camera_id)
 
 
 def stored_bytes(session: Session, camera_id: str) -> int:
-    """How many bytes the points, boxes and heads of a camera's tracks have."""
+    """The bytes of the points, boxes and heads of a camera's tracks."""
     size = bytes_of_track()
     return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
 
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
-    """When the newest track ended."""
+    """The end of the newest track."""
     return session.scalar(_NEWEST_END, {"camera": camera_id})
 
 
 def newest_received_at(session: Session, camera_id: str) -> datetime | None:
-    """When a track was stored last."""
+    """The time at which a track was stored last."""
     return session.scalar(
         select(func.max(TrackRecord.received_at)).where(TrackRecord.camera_id == camera_id)
     )
@@ -72,7 +71,7 @@ def newest_received_at(session: Session, camera_id: str) -> datetime | None:
 def arrivals(
     session: Session, camera_id: str, received_after: datetime
 ) -> Sequence[tuple[datetime, float]]:
-    """When tracks were stored and when they had ended, of those stored after a time."""
+    """The times at which tracks were stored and ended, of those stored after a time."""
     rows = session.execute(
         select(TrackRecord.received_at, TrackRecord.ended_s).where(
             *counting(camera_id), TrackRecord.received_at > received_after
@@ -82,21 +81,15 @@ def arrivals(
 
 
 def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
-    """How many tracks ended from one time to another."""
-    query = select(func.count()).where(
-        *counting(camera_id),
-        TrackRecord.ended_s >= from_s,
-        TrackRecord.ended_s <= to_s,
-    )
-    return session.scalar(query) or 0
+    """The number of tracks that ended from one time to another."""
+    ended_s = TrackRecord.ended_s
+    return count_where(session, *counting(camera_id), ended_s >= from_s, ended_s <= to_s)
 
 
 def count_since(session: Session, camera_id: str, ended_after_s: float | None) -> int:
-    """How many tracks ended after a time; all of them, if none is given."""
-    query = select(func.count()).where(*counting(camera_id))
-    if ended_after_s is not None:
-        query = query.where(TrackRecord.ended_s > ended_after_s)
-    return session.scalar(query) or 0
+    """The number of tracks that ended after a time; all of them, if none is given."""
+    after = [] if ended_after_s is None else [TrackRecord.ended_s > ended_after_s]
+    return count_where(session, *counting(camera_id), *after)
 
 
 def newest_source(session: Session, camera_id: str) -> str | None:
@@ -127,17 +120,13 @@ def newest_pk(session: Session, camera_id: str) -> int | None:
 
 
 def count_between(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
-    """How many tracks started after one time and before another."""
-    query = select(func.count()).where(
-        *counting(camera_id),
-        TrackRecord.started_s > from_s,
-        TrackRecord.started_s < to_s,
-    )
-    return session.scalar(query) or 0
+    """The number of tracks that started after one time and before another."""
+    started_s = TrackRecord.started_s
+    return count_where(session, *counting(camera_id), started_s > from_s, started_s < to_s)
 
 
 def a_year(session: Session, camera_id: str) -> float:
-    """How many tracks a year come, by those of the newest four weeks; of a day at the least."""
+    """The number of tracks a year, by those of the newest four weeks; of a day at the least."""
     newest = newest_end_s(session, camera_id) or 0.0
     count, first = session.execute(
         select(func.count(), func.min(TrackRecord.ended_s)).where(
@@ -177,7 +166,7 @@ def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
 
 
 def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
-    """Whether a track is to be deleted: it came before a time, or so many have come after it.
+    """The condition of being deleted: it came before a time, or so many have come after it.
 
     By its arrival, not by its own times: what was recorded years ago and is posted today has been
     acknowledged today, and stays as long as what was walked today. The source that

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 from service.enums import (
     TrainingState,
 )
-from service.store.record import Record, camera_key, delete_some, foreign_key
+from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first, surplus
 
 
 class TrainingRecord(Record):
@@ -82,21 +82,14 @@ UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 
 # Built once, which takes longer than to run them: each request for a pose asks for the one, and
 # each reconcile of a camera for the others.
-_NEWEST_MODEL = (
-    select(ModelRecord)
-    .where(ModelRecord.camera_id == bindparam("camera"))
-    .order_by(ModelRecord.created_at.desc())
-    .limit(1)
-)
-_OF_CAMERA = (
-    select(TrainingRecord)
-    .where(TrainingRecord.camera_id == bindparam("camera"))
-    .order_by(TrainingRecord.queued_at.desc())
-    .limit(bindparam("most"))
+_CAMERA = bindparam("camera", type_=String)
+_NEWEST_MODEL = newest_first(ModelRecord, _CAMERA, ModelRecord.created_at).limit(1)
+_OF_CAMERA = newest_first(TrainingRecord, _CAMERA, TrainingRecord.queued_at).limit(
+    bindparam("most")
 )
 _UNFINISHED_OF_CAMERA = (
     select(TrainingRecord)
-    .where(TrainingRecord.camera_id == bindparam("camera"), TrainingRecord.state.in_(UNFINISHED))
+    .where(TrainingRecord.camera_id == _CAMERA, TrainingRecord.state.in_(UNFINISHED))
     .order_by(TrainingRecord.queued_at)
 )
 
@@ -123,12 +116,8 @@ def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
 
 def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:
     """Models of a camera older than its newest so many."""
-    return session.scalars(
-        select(ModelRecord)
-        .where(ModelRecord.camera_id == camera_id)
-        .order_by(ModelRecord.created_at.desc())
-        .offset(keep)
-    ).all()
+    query = newest_first(ModelRecord, camera_id, ModelRecord.created_at)
+    return session.scalars(query.offset(keep)).all()
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
@@ -136,16 +125,11 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
 
     Those stay that have a model or have not ended.
     """
-    surplus = (
-        select(TrainingRecord.id)
-        .where(TrainingRecord.camera_id == camera_id)
-        .order_by(TrainingRecord.queued_at.desc())
-        .offset(keep)
-    )
+    beyond = surplus(TrainingRecord, camera_id, keep, TrainingRecord.queued_at)
     bite = (
         select(TrainingRecord.id)
         .where(
-            TrainingRecord.id.in_(surplus),
+            TrainingRecord.id.in_(beyond),
             TrainingRecord.state.not_in(UNFINISHED),
             TrainingRecord.id.not_in(select(ModelRecord.training_id)),
         )
@@ -160,7 +144,7 @@ def weights_in_use(session: Session) -> set[str]:
 
 
 def has_weights(session: Session, sha256: str) -> bool:
-    """Whether weights are in the database."""
+    """True if weights are in the database."""
     return session.scalar(select(WeightsRecord.sha256).filter_by(sha256=sha256)) is not None
 
 
@@ -182,7 +166,7 @@ def forget_weights(session: Session, limit: int) -> int:
 
 
 def model_exists(session: Session, model_id: str) -> bool:
-    """Whether a model is still stored."""
+    """True if a model is still stored."""
     return session.get(ModelRecord, model_id) is not None
 
 

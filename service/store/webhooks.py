@@ -126,7 +126,7 @@ def enabled(session: Session) -> Sequence[WebhookRecord]:
 
 
 def pending(session: Session) -> dict[str, int]:
-    """How many deliveries of each webhook wait."""
+    """The number of waiting deliveries of each webhook."""
     rows = session.execute(
         select(DeliveryRecord.webhook_id, func.count())
         .where(DeliveryRecord.state == DeliveryState.PENDING)
@@ -264,5 +264,5 @@ def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Seq
 
 
 def _has_come(now: datetime) -> ColumnElement[bool]:
-    """Whether it is time for a delivery. For one that was never tried it is, by any clock."""
+    """The condition that a delivery is due. One that was never tried is, by any clock."""
     return or_(DeliveryRecord.next_attempt_at <= now, DeliveryRecord.tries == 0)

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
 from service.store.engines.dialects import whole
+from service.store.record import count_where
 from service.store.stored_tracks import (
     Spans,
     StoredTrack,
@@ -67,7 +68,7 @@ def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
-    """How many tracks are in a window."""
+    """The number of tracks in a window."""
     query = select(func.count()).select_from(window_ids(session, bounds).subquery())
     return session.scalar(query) or 0
 
@@ -101,11 +102,9 @@ def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredT
 
 
 def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
-    """How many tracks of a camera at its prior pose ended after a time."""
-    query = select(func.count()).select_from(TrackRecord).where(*_still(bounds))
-    if ended_after_s is not None:
-        query = query.where(TrackRecord.ended_s > ended_after_s)
-    return session.scalar(query) or 0
+    """The number of tracks of a camera at its prior pose that ended after a time."""
+    after = [] if ended_after_s is None else [TrackRecord.ended_s > ended_after_s]
+    return count_where(session, *_still(bounds), *after)
 
 
 def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
@@ -126,12 +125,12 @@ def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
 
 
 def newest_end_s(session: Session, bounds: WindowBounds) -> float | None:
-    """When the newest track within bounds ended, however many they allow; None without any."""
+    """The end of the newest track within bounds, however many they allow; None without any."""
     return session.scalar(select(func.max(TrackRecord.ended_s)).where(*_inside(bounds)))
 
 
 def oldest_end_s(session: Session, bounds: WindowBounds) -> float | None:
-    """When the oldest track of a window ended; None of an empty one."""
+    """The end of the oldest track of a window; None of an empty one."""
     ids = window_ids(session, bounds)
     return session.scalar(select(func.min(TrackRecord.ended_s)).where(TrackRecord.id.in_(ids)))
 

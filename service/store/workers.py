@@ -58,7 +58,7 @@ def alive(session: Session) -> Sequence[WorkerRecord]:
 
 
 def newest_heartbeat(session: Session) -> datetime | None:
-    """When any worker was last heard of."""
+    """The newest heartbeat of any worker."""
     return session.scalar(select(func.max(WorkerRecord.heartbeat_at)).where(~WorkerRecord.lost))
 
 
@@ -68,7 +68,7 @@ def after(session: Session, now: datetime) -> Sequence[WorkerRecord]:
 
 
 def troubles(session: Session) -> dict[str, str]:
-    """What `serve` has to say of workers that it cannot keep alive, by their names."""
+    """The troubles of workers that `serve` cannot keep alive, by their names."""
     rows = session.execute(
         select(WorkerRecord.name, WorkerRecord.trouble).where(WorkerRecord.trouble.is_not(None))
     )

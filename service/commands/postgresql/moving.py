@@ -23,7 +23,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
-    """What is in the server's database now, checked: rows by table, and weights."""
+    """The content of the server's database, checked: rows by table, and weights."""
 
     rows: dict[str, int]
     weights: int

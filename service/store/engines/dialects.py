@@ -1,4 +1,4 @@
-"""What is said differently in the SQL of the two databases, each in one place.
+"""SQL that the two databases write differently, each in one place.
 
 SQLite's way is written as it ever was: its statements are not changed by what PostgreSQL needs.
 """
@@ -27,7 +27,7 @@ _POSTGRESQL = "postgresql"
 
 
 def is_sqlite(bind: Engine | Connection) -> bool:
-    """Whether a database is a file of ours."""
+    """True of a database that is an SQLite file."""
     return bind.dialect.name == "sqlite"
 
 
@@ -105,7 +105,7 @@ def _new_rows(element: NewRows, compiler: SQLCompiler, **kw: Any) -> str:
 
 
 def contains_word(column: SQLColumnExpression[Any], word: str) -> ColumnElement[bool]:
-    """Whether a JSON list of words has one."""
+    """The condition that a JSON list of words has one."""
     return as_json(column).contains(f'"{word}"')
 
 

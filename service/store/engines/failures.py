@@ -1,4 +1,4 @@
-"""What errors of the databases mean: to who asked for something, and to an operator at a start."""
+"""Errors of the databases, as answers to requests and as one line for an operator at a start."""
 
 import contextlib
 import logging
@@ -49,13 +49,13 @@ def failure_of(error: SQLAlchemyError) -> ServiceError | None:
 
 
 def _is(error: DBAPIError, said: str, words: tuple[str, ...], states: tuple[str, ...]) -> bool:
-    """Whether a database says so: PostgreSQL by a SQLSTATE, SQLite in words."""
+    """True if a database says so: PostgreSQL by a SQLSTATE, SQLite in words."""
     state = getattr(error.orig, "sqlstate", None)
     return state.startswith(states) if state else any(each in said for each in words)
 
 
 def _is_cut_off(error: DBAPIError) -> bool:
-    """Whether a server is not there, or no longer: what has no SQLSTATE is said by the driver."""
+    """True of a server that is not there, or no longer: the driver's errors have no SQLSTATE."""
     no_state = getattr(error.orig, "sqlstate", "none") is None
     return error.connection_invalidated or (no_state and isinstance(error, OperationalError))
 

@@ -63,14 +63,14 @@ def revision(path: Path) -> str | None:
 
 
 def faults(path: Path, most: int = 20) -> list[str]:
-    """What SQLite finds wrong in a file; nothing is well."""
+    """The faults that SQLite finds in a file; a sound one has none."""
     with connected(path) as connection:
         rows = [str(row[0]) for row in connection.execute(f"PRAGMA integrity_check({most})")]
     return [] if rows == ["ok"] else rows
 
 
 def first_fault(path: Path, within_s: float) -> str | None:
-    """What a quick look finds wrong in a file, if anything within a time.
+    """The first fault that a quick look finds in a file, if any within a time.
 
     Raises:
         sqlite3.DatabaseError: it cannot be looked through at all.
@@ -88,7 +88,7 @@ def first_fault(path: Path, within_s: float) -> str | None:
 
 
 def broken_references(path: Path) -> dict[str, int]:
-    """How many rows of each table refer to something that is not there."""
+    """The number of rows of each table that refer to something that is not there."""
     found: dict[str, int] = {}
     with connected(path) as connection:
         for table, *_ in connection.execute("PRAGMA foreign_key_check"):
@@ -143,7 +143,7 @@ def wipe_log(path: Path, patience_ms: int = _BUSY_MS) -> None:
 
 
 def overwrite_deleted(session: Session) -> None:
-    """What this session's connection deletes or changes from now on is overwritten with zeros.
+    """Have what this session's connection deletes or changes overwritten with zeros.
 
     A server keeps what was deleted until it vacuums, and in its logs: so its operator has to know.
     """
@@ -152,7 +152,7 @@ def overwrite_deleted(session: Session) -> None:
 
 
 def free_pages(path: Path) -> int:
-    """How many pages of a file hold nothing."""
+    """The number of pages of a file that hold nothing."""
     with connected(path) as connection:
         return int(connection.execute("PRAGMA freelist_count").fetchone()[0])
 

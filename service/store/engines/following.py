@@ -34,7 +34,7 @@ def mark_entry(session: Session, record: Any) -> None:
 
 
 def settled(session: Session, record: Any) -> list[ColumnElement[bool]]:
-    """That nothing will come before a row any more; SQLite's rows are all so."""
+    """The condition that nothing will come before a row any more; SQLite's rows are all so."""
     if is_sqlite(session.get_bind()):
         return []
     return [record.id <= _horizon(session, record)]

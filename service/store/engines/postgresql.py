@@ -91,7 +91,7 @@ class Postgresql:
         return False
 
     def changes(self) -> "Unwatched":
-        """What tells whether anybody has changed the store."""
+        """A watcher of changes to the store."""
         return Unwatched()
 
     def lock(self, name: str) -> "ServerLock":
@@ -164,7 +164,7 @@ class ServerLock:
         self._looked_s = 0.0
 
     def held(self) -> bool:
-        """Whether it is ours; where it is nobody's, it is taken."""
+        """True if it is ours; where it is nobody's, it is taken."""
         try:
             return self._take() if self._connection is None else self._lives(self._connection)
         except SQLAlchemyError as error:

@@ -73,7 +73,7 @@ class FileLock:
         self._held = False
 
     def held(self) -> bool:
-        """Whether it is ours; where it is nobody's, it is taken."""
+        """True if it is ours; where it is nobody's, it is taken."""
         if not self._held:
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -134,11 +134,11 @@ class Sqlite:
                 _LOOK_AND_WRITE.run(connection)
 
     def refused(self, error: DBAPIError) -> bool:
-        """Whether an error says that a connection was only to look."""
+        """True of an error that says that a connection was only to look."""
         return _is(error, sqlite3.SQLITE_READONLY)
 
     def changes(self) -> Changes:
-        """What tells whether anybody has changed the store."""
+        """A watcher of changes to the store."""
         return Changes(self._path)
 
     def lock(self, name: str) -> FileLock:
@@ -147,7 +147,7 @@ class Sqlite:
 
 
 def _begun(connection: Connection, until_s: float) -> bool:
-    """Whether a transaction has begun; False where others write, and there is time to ask again."""
+    """True if a transaction has begun; False where others write, and there is time to ask again."""
     try:
         _BEGIN.run(connection)
     except OperationalError as error:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import DBAPIError
@@ -11,58 +11,22 @@ from sqlalchemy.orm import Session
 from service.data_dir import make_private
 from service.settings import Settings
 from service.store.engines.dialects import is_sqlite
-from service.store.engines.sqlite import Sqlite, sqlite_engine
+from service.store.engines.postgresql import (
+    Postgresql,
+    ServerLock,
+    Unwatched,
+    postgresql_engine,
+    wait_for,
+)
+from service.store.engines.sqlite import Changes, FileLock, Sqlite, sqlite_engine
 
 R = TypeVar("R")
+Backend = Sqlite | Postgresql
+Watcher = Changes | Unwatched
+Lock = FileLock | ServerLock
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
 _CONNECTIONS = 15
-
-
-class Watcher(Protocol):
-    """Tells by a number whether a store is as it was."""
-
-    def version(self) -> int | None:
-        """The number now; None where it cannot be told."""
-
-    def close(self) -> None:
-        """Watch no longer."""
-
-
-class Backend(Protocol):
-    """What the two databases do each in its own way."""
-
-    engine: Engine
-    reading: Engine  # the same connections, for who only reads
-    connections: int
-
-    def turn(self) -> AbstractContextManager[None]:
-        """A turn to write among the threads of this process."""
-
-    def begin(self, connection: Connection, about: str | None) -> None:
-        """Begin to write upon what the transaction is about; None is everything."""
-
-    def looking(self) -> AbstractContextManager[Connection | None]:
-        """A connection that refuses to write; None where writers keep nobody else from it."""
-
-    def refused(self, error: DBAPIError) -> bool:
-        """Whether an error says that a connection was only to look."""
-
-    def changes(self) -> Watcher:
-        """What tells whether anybody has changed the store."""
-
-    def lock(self, name: str) -> "Lock":
-        """A lock that one process of all has."""
-
-
-class Lock(Protocol):
-    """A lock that is let go of however its holder ends; for one thread."""
-
-    def held(self) -> bool:
-        """Whether it is ours, still or from now on."""
-
-    def close(self) -> None:
-        """Let go of it."""
 
 
 class Store:
@@ -116,7 +80,7 @@ class Store:
             session.commit()
 
     def write_if_needed(self, about: str | None, do: Callable[[Session], R]) -> R:
-        """What comes of something that hardly ever writes: it is tried without keeping anybody out.
+        """The result of something that hardly ever writes: it is tried without keeping anybody out.
 
         Args:
             about: as of `write`.
@@ -153,7 +117,7 @@ class Store:
             yield connection
 
     def changes(self) -> Watcher:
-        """What tells whether anybody has changed the store; for one thread."""
+        """A watcher of changes to the store; for one thread."""
         return self._backend.changes()
 
     def lock(self, name: str) -> Lock:
@@ -176,8 +140,6 @@ def joined(connection: Connection) -> Iterator[Session]:
 def also_about(session: Session, about: str) -> None:
     """Within a transaction that writes about something, write about something else as well."""
     if not is_sqlite(session.get_bind()):
-        from service.store.engines.postgresql import wait_for
-
         wait_for(session.connection(), about)
 
 
@@ -190,15 +152,11 @@ def engine_for(url: str) -> Engine:
     """An engine for a migration, or a command."""
     if url.startswith("sqlite"):
         return sqlite_engine(url, _PATIENCE_S, _CONNECTIONS)
-    from service.store.engines.postgresql import postgresql_engine
-
     return postgresql_engine(url, _PATIENCE_S, _CONNECTIONS)
 
 
 def _backend_of(settings: Settings, patience_s: float, connections: int) -> Backend:
     if settings.database_url is None:
         return Sqlite(settings.store_url, patience_s, connections)
-    from service.store.engines.postgresql import Postgresql  # no driver of it is loaded before
-
     most = min(connections, settings.database_connections)
     return Postgresql(settings.store_url, patience_s, most)

@@ -19,7 +19,7 @@ class Turns:
 
     @property
     def waiting(self) -> int:
-        """How many wait."""
+        """The number of those who wait."""
         return len(self._waiting)
 
     @contextmanager
