@@ -34,7 +34,7 @@ from service.api.middleware.origins import OriginMiddleware
 from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
 from service.api.middleware.rates import RateMiddleware
 from service.api.middleware.threads import start_threads
-from service.cameras.quota import Quota
+from service.cameras.posts import Quota
 from service.job_queue import JobQueue
 from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings

@@ -25,7 +25,7 @@ _OURS = (
 
 
 class StartError(Exception):
-    """What keeps a command from its work: one line that names it and says what to do."""
+    """An obstacle to a command: one line that names it and says what to do."""
 
 
 def make_private(folder: Path) -> None:

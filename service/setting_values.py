@@ -1,4 +1,4 @@
-"""What settings are written as, and what is said of one that is refused."""
+"""Settings as they are written, and what is said of one that is refused."""
 
 import base64
 import os
@@ -15,7 +15,7 @@ _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
 
 def one_a_core() -> int:
-    """How many workers a machine has where nobody says."""
+    """The number of workers of a machine where nobody says."""
     ours = getattr(os, "sched_getaffinity", None)  # Linux's alone
     cores = len(ours(0)) if ours else os.cpu_count() or 1
     return min(cores, _MOST_WORKERS)

@@ -14,9 +14,8 @@ from tests.conftest import ROOT
 SERVICE_ROOMS = [
     {"data_dir", "setting_values", "enums"},
     {"settings", "errors", "logs", "reasons"},
-    {"reason_words"},
     {"formats", "store"},
-    {"job_queue"},
+    {"wording", "job_queue"},
     {"access"},
     {"estimate_queue", "references", "notifications"},
     {"alerts", "training"},

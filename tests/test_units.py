@@ -12,14 +12,13 @@ EDGES = (
     "service/api/trainings.py",
     "service/pages/",
     "service/formats/degrees.py",
-    "service/reason_words.py",
+    "service/wording/",
     "service/reasons.py",  # as they are told to clients
 )
 # Who tells people otherwise than by schemas and pages: by events and webhooks, and on a
 # terminal. They take the words of `service/formats/degrees.py`.
 TELLING = {
     "service/commands/demo.py",
-    "service/commands/demo_screen.py",
     "service/commands/demo_street.py",
     "service/estimation/estimates.py",
     "service/notifications/outbox.py",

@@ -29,7 +29,7 @@ FIELDS = {
 }  # fmt: skip
 # Values that are spelled like a word of a vocabulary, and mean something else.
 OTHERS = {
-    ("operations/checking.py", "ok"): "a verdict, defined there",
+    ("operations/check.py", "ok"): "a verdict, defined there",
     ("formats/batch.py", "source"): "the name of a field",
     ("formats/batch.py", "tracks"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
@@ -58,8 +58,8 @@ OTHERS = {
     ("store/record.py", "source"): "the name of a column",
     ("store/stored_tracks.py", "source"): "the name of a column",
     ("store/stored_tracks.py", "tracks"): "the name of a table",
-    ("pages/plausibility.py", "critical"): "a tone, defined there",
-    ("pages/plausibility.py", "warning"): "a tone, defined there",
+    ("wording/typed_pose.py", "critical"): "a tone, defined there",
+    ("wording/typed_pose.py", "warning"): "a tone, defined there",
 }
 
 

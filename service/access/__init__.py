@@ -1,1 +1,1 @@
-"""Who may do what: tokens, sessions of pages, and what each scope holds."""
+"""Access: tokens, sessions of pages, and what each scope holds."""

@@ -1,6 +1,5 @@
 """The log of who did what when: written with the activity that it tells of, never changed."""
 
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -58,10 +57,3 @@ def note(
         details=details or {},
     )
     activity.add(session, record)
-
-
-def list_activity(
-    session: Session, camera_id: str | None, entry_id: int, limit: int
-) -> Sequence[ActivityRecord]:
-    """Entries after one, oldest first; of a camera that there is or was, or of everything."""
-    return activity.after(session, camera_id, entry_id, limit)

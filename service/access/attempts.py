@@ -14,7 +14,7 @@ _MOST_LINES = 30
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """What follows from a failure: seconds to wait (0: none), and whether to write it down."""
+    """The consequences of a failure: seconds to wait (0: none), and whether to write it down."""
 
     wait_s: int
     worth_a_line: bool

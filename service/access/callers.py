@@ -1,4 +1,4 @@
-"""Who asks, and what that allows."""
+"""Callers, and what their scopes allow."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ class Caller:
     cameras: frozenset[str] | None = None
 
     def may(self, scope: TokenScope) -> bool:
-        """Whether what needs a scope is allowed."""
+        """True if what needs a scope is allowed."""
         return scope in widened(self.scopes)
 
     def may_post(self, camera_id: str) -> bool:
-        """Whether tracks of a camera may be posted, as far as the camera goes."""
+        """True if tracks of a camera may be posted, as far as the camera goes."""
         return self.cameras is None or camera_id in self.cameras
 
 

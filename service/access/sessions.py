@@ -78,7 +78,7 @@ def note_refused(session: Session, address: str) -> None:
 
 
 def caller_of_session(session: Session, cookie: str) -> Caller | None:
-    """Whose page asks; None where its session, or the token behind it, is over."""
+    """The caller whose page asks; None where its session, or the token behind it, is over."""
     id_sha256 = _hash(cookie)
     found = access.session_with_token(session, id_sha256)
     now = datetime.now(UTC)

@@ -24,7 +24,7 @@ MAX_NAME = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TokenSpec:
-    """What a token is to be: whose, for what, for which cameras (None: all), until when."""
+    """A token to make: whose, for what, for which cameras (None: all), until when."""
 
     name: str
     scopes: tuple[str, ...]
@@ -74,7 +74,7 @@ def list_tokens(session: Session) -> Sequence[TokenRecord]:
 
 
 def count_tokens(session: Session) -> int:
-    """How many tokens would be let in now."""
+    """The number of tokens that would be let in now."""
     return access.count_valid(session, datetime.now(UTC))
 
 
@@ -96,7 +96,7 @@ def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord
 
 
 def caller_of_token(session: Session, text: str) -> Caller | None:
-    """Who asks with a token; None where nobody is let in with it."""
+    """The caller with a token; None where nobody is let in with it."""
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
     record = access.find(session, token_id) if prefix == _PREFIX else None
@@ -109,7 +109,7 @@ def caller_of_token(session: Session, text: str) -> Caller | None:
 
 
 def caller_of(record: TokenRecord) -> Caller:
-    """Who a token stands for."""
+    """The caller that a token stands for."""
     return Caller(
         name=record.name,
         scopes=frozenset(record.scopes),
@@ -119,7 +119,7 @@ def caller_of(record: TokenRecord) -> Caller:
 
 
 def is_valid(record: TokenRecord, now: datetime) -> bool:
-    """Whether a token is neither revoked nor over."""
+    """True of a token that is neither revoked nor over."""
     return record.revoked_at is None and (record.expires_at is None or now < record.expires_at)
 
 

@@ -27,6 +27,7 @@ from service.settings import Settings
 from service.store import activity, alerts, events, maintenance, tracks
 from service.store.activity import ActivityRecord
 from service.store.alerts import AlertFilter, AlertRecord
+from service.wording.reasons import in_words
 
 # What of an alert's body an event has.
 _EVENT_FIELDS = (
@@ -240,7 +241,7 @@ def _keep_activity(
         text=note,
         details={
             "severity": record.severity,
-            "reason": record.reason,
+            "reason": in_words(record.reasons),
             "reason_code": record.reason_code,
         },
     )

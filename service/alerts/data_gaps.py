@@ -22,6 +22,7 @@ from service.reasons import Reasons, ServiceCode
 from service.references import attendance_of
 from service.settings import Settings
 from service.store import alerts, tracks
+from service.wording.alerts import TRACKS_COME_AGAIN
 
 _LOOK_BACK_S = 3 * HOUR_S  # the level of the day is told by these hours before a silence
 _LONGEST_S = 28 * 24 * HOUR_S
@@ -82,9 +83,9 @@ def watch_data_gap(
         received_at = tracks.newest_received_at(session, camera_id)
         if received_at is not None and received_at > firing.opened_at:
             end_alert(
-                session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note="tracks come again"
+                session, camera_id, AlertKind.NO_DATA, Outcome.CLEARED, note=TRACKS_COME_AGAIN
             )
-            return "tracks come again"
+            return TRACKS_COME_AGAIN
     silence = data_gap_of(session, settings, camera_id, now)
     if silence is None or silence.severity is None:
         return None

@@ -13,6 +13,7 @@ from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, cameras, tracks
 from service.store.cameras import CameraRecord
+from service.wording.alerts import ESTIMATED_AGAIN
 
 # Who closed the alert knows; if nothing is better by then, it is told again.
 _ANSWERED = timedelta(hours=1)
@@ -101,8 +102,7 @@ def _open(
 
 
 def _end(session: Session, camera: CameraRecord) -> None:
-    note = "it is looked at again"
-    end_alert(session, camera.id, AlertKind.STALE, Outcome.CLEARED, note)
+    end_alert(session, camera.id, AlertKind.STALE, Outcome.CLEARED, ESTIMATED_AGAIN)
 
 
 def _answered(session: Session, camera: CameraRecord) -> bool:

@@ -8,10 +8,10 @@ from fastapi import APIRouter, Header, Query
 from fastapi.responses import Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict
 
-from service.access.activity import list_activity
 from service.api.fields import Text
 from service.api.middleware.dependencies import AppState, StateDep
 from service.enums import Activity, AlertKind, Outcome
+from service.store import activity
 
 
 class EntryOut(BaseModel):
@@ -85,5 +85,5 @@ def _lines(state: AppState, camera_id: str | None, after: int, limit: int | None
 
 def _page(state: AppState, camera_id: str | None, after: int, limit: int) -> list[EntryOut]:
     with state.store.read() as session:
-        records = list_activity(session, camera_id, after, limit)
+        records = activity.after(session, camera_id, after, limit)
         return [EntryOut.model_validate(record) for record in records]

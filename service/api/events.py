@@ -16,7 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.api.middleware.dependencies import AppState, StateDep
 from service.api.middleware.direct.feed import Feed, wait
 from service.api.middleware.guard import still_let_in
-from service.operations import health
+from service.store import events as stored
 from service.store.engines.store import Store
 from service.store.events import EventRecord
 
@@ -112,9 +112,9 @@ def _after(state: AppState, seen: int) -> Sequence[EventRecord]:
 
 def _newest_in(store: Store) -> int:
     with store.read() as session:
-        return health.newest_event_id(session)
+        return stored.newest_id(session)
 
 
 def _after_in(store: Store, seen: int) -> Sequence[EventRecord]:
     with store.read() as session:
-        return health.events_after(session, seen, _BATCH)
+        return stored.after(session, seen, _BATCH)

@@ -92,7 +92,7 @@ def _of_looks(metrics: Metrics) -> Iterator[Metric]:
 
 def _of_alerts(metrics: Metrics) -> Iterator[Metric]:
     zeros = dict.fromkeys(product(AlertKind, Severity), 0)
-    alone = [alert for alert in metrics.alerts if not alert.grouped]
+    alone = [alert for alert in metrics.alerts if alert.group_id is None]
     count = Counter((alert.kind, alert.severity) for alert in alone)
     yield _gauge(
         "surefoot_alerts_firing",
@@ -106,11 +106,11 @@ def _of_alerts(metrics: Metrics) -> Iterator[Metric]:
             "1 for an alert that fires, silenced or not, in a group or not.",
             metrics.alerts,
         ),
-        ("silenced", "is silenced.", [a for a in metrics.alerts if a.silenced]),
-        ("grouped", "is in a group.", [a for a in metrics.alerts if a.grouped]),
+        ("silenced", "is silenced.", [a for a in metrics.alerts if a.is_silenced(metrics.at)]),
+        ("grouped", "is in a group.", [a for a in metrics.alerts if a.group_id is not None]),
     ):
         words = text if name == "firing" else f"1 for an alert that fires and {text}"
-        found = {(alert.camera_id, alert.kind): 1 for alert in chosen}
+        found = {(alert.camera_id or "", alert.kind): 1 for alert in chosen}
         yield _gauge(f"surefoot_alert_{name}", words, ["camera_id", "kind"], found)
 
 

@@ -43,10 +43,10 @@ def _answer(state: AppState, camera_id: str) -> KeptAnswer:
     with state.store.read() as session:
         view = poses.view_pose(session, state.settings, camera_id)
         body = written(ServedPoseOut.from_value(view))
-    clockwork = view.standing.clockwork
+    clockwork = view.status.clockwork
     hands = clockwork.hands(before)
     # Why nobody is seen says for how long; and something may have come to its time just now.
-    lasts = not view.standing.silent and clockwork.hands(datetime.now(UTC)) == hands
+    lasts = not view.status.silent and clockwork.hands(datetime.now(UTC)) == hands
 
     def holds(now: datetime) -> bool:
         return lasts and clockwork.hands(now) == hands

@@ -12,7 +12,7 @@ from service.api.middleware.dependencies import AppState, BodyDep, StateDep
 from service.api.middleware.direct.straight import StraightRoute, straight
 from service.api.middleware.direct.written import written
 from service.cameras import tracks
-from service.cameras.pictures import StalePictureError
+from service.cameras.posts import StalePictureError
 from service.cameras.tracks import Receipt
 from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats

@@ -11,9 +11,9 @@ from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
 from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
-from service.reason_words import in_words
 from service.reasons import code_of
 from service.store.webhooks import WebhookRecord
+from service.wording.reasons import in_words
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
 

@@ -33,7 +33,7 @@ _MANY = 1000  # more alerts than a camera has kinds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSpec:
-    """What an integrator says of a camera."""
+    """A camera as an integrator registers it."""
 
     camera_id: str | None
     name: str
@@ -47,7 +47,7 @@ class CameraSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraChange:
-    """What to change; None stays."""
+    """Changes to a camera; None stays."""
 
     name: str | None = None
     intrinsics: Intrinsics | None = None
@@ -211,7 +211,7 @@ def require_camera(session: Session, camera_id: str) -> CameraRecord:
 
 
 def no_camera(camera_id: str) -> NotFoundError:
-    """What to answer where there is no camera of an id."""
+    """The error where there is no camera of an id."""
     return NotFoundError(f"camera_id: there is no camera {camera_id!r}")
 
 

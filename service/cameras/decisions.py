@@ -1,4 +1,4 @@
-"""What a person says of how a camera stands: its pose is accepted, it was put back, it never moved.
+"""Answers of a person: a camera's pose is accepted, it was put back, it never moved.
 
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
@@ -23,7 +23,7 @@ from service.store.alerts import AlertRecord
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What a person decides of a camera: who, if they say so, and why."""
+    """A person's answer about a camera: who, if they say so, and why."""
 
     camera_id: str
     by: str | None
@@ -104,28 +104,17 @@ def resolve_alert(
     """
     record = require_firing(session, alert_id)
     for each in (*alerts.firing_members(session, record.id), record):
-        if each.state == AlertState.FIRING:
-            _resolve(session, queue, settings, each, answer, note, by)
+        if each.state != AlertState.FIRING:
+            continue
+        if each.camera_id is None or each.kind not in alerts.POSE_KINDS:
+            close_alert(session, each, Outcome(answer), note, by)
+            continue
+        decision = Decision(camera_id=each.camera_id, by=by, note=note)
+        if answer == Answer.ACCEPTED:
+            accept_pose(session, queue, settings, decision)
+        else:
+            _answer(session, queue, decision, answer)
     return record
-
-
-def _resolve(
-    session: Session,
-    queue: JobQueue,
-    settings: Settings,
-    record: AlertRecord,
-    answer: Answer,
-    note: str | None,
-    by: str | None,
-) -> None:
-    if record.camera_id is None or record.kind not in alerts.POSE_KINDS:
-        close_alert(session, record, Outcome(answer), note, by)
-        return
-    decision = Decision(camera_id=record.camera_id, by=by, note=note)
-    if answer == Answer.ACCEPTED:
-        accept_pose(session, queue, settings, decision)
-    else:
-        _answer(session, queue, decision, answer)
 
 
 def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answer) -> None:

@@ -24,7 +24,7 @@ _FARTHEST = timedelta(days=366)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindowChange:
-    """What to change of a window; None stays."""
+    """Changes to a window; None stays."""
 
     from_at: datetime | None = None
     to_at: datetime | None = None

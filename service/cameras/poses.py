@@ -1,29 +1,33 @@
-"""The served pose, from the store alone, and its history."""
+"""The served pose, from the store alone, with its reasons, and its history."""
 
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
+from models.reasons import Reason, Value
+from models.walking.config import FEWEST_WALKERS
+from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
-from service.cameras.standing import Standing, standings
-from service.cameras.state_words import reasons_of
+from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import PoseState
-from service.reason_words import in_words
-from service.reasons import Reasons
-from service.references import tracks_so_far
+from service.notifications.outbox import json_time
+from service.reasons import Reasons, ServiceCode
+from service.references import tracks_so_far, wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, fleet
+from service.store import cameras, estimates, fleet, maintenance, windows
 from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
 from service.store.serialization import intrinsics_of, pose_of_prior
+from service.wording.reasons import in_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceView:
-    """What is served of a camera's reference."""
+    """The served part of a camera's reference."""
 
     ready: bool
     tracks: int
@@ -33,10 +37,10 @@ class ReferenceView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseView:
-    """What is served of a camera's pose, and how the camera stands."""
+    """The served pose of a camera, and its status."""
 
     camera_id: str
-    standing: Standing
+    status: CameraStatus
     reasons: Reasons
     pose: CameraPose
     reference: ReferenceView
@@ -45,23 +49,23 @@ class PoseView:
 
     @property
     def state(self) -> PoseState:
-        """How the camera stands, in a word."""
-        return self.standing.state
+        """The camera's state."""
+        return self.status.state
 
     @property
     def reason(self) -> str:
-        """Why it stands so, in words."""
+        """The reasons in words."""
         return in_words(self.reasons)
 
     @property
     def estimate(self) -> EstimateRecord | None:
-        """What the pose is of; it may tell nothing yet."""
-        return self.standing.estimate
+        """The estimate behind the pose; it may tell nothing yet."""
+        return self.status.estimate
 
     @property
     def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
-        return self.standing.identifiable
+        return self.status.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -74,16 +78,16 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     if set_up is None:
         raise no_camera(camera_id)
     camera, prior, model_id = set_up
-    standing = standings(session, settings, (camera_id,))[camera_id]
-    record = standing.reference
+    status = camera_statuses(session, settings, (camera_id,))[camera_id]
+    record = status.reference
     counts = {}
     if record.ready_at is None:
-        attended = {camera_id: standing.attended.spans}
+        attended = {camera_id: status.attended.spans}
         counts = fleet.learning_counts(session, (camera_id,), attended)
     so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
-    reasons = reasons_of(session, settings, standing, so_far)
+    reasons = _reasons_of(session, settings, status, so_far)
     pose = pose_of_prior(prior)
-    estimate = standing.estimate
+    estimate = status.estimate
     if estimate is not None:
         pose = replace(
             pose,
@@ -102,10 +106,10 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
     why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
-    served = (standing.state.value, why, pose, estimate_id, reference, model_id, lens)
+    served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,
-        standing=standing,
+        status=status,
         reasons=reasons,
         pose=pose,
         reference=reference,
@@ -136,3 +140,63 @@ def thinned_history(
     """
     require_camera(session, camera_id)
     return estimates.thinned(session, camera_id, start, end, most)
+
+
+def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_far: int) -> Reasons:
+    """Reasons of a camera's state: what is missing, what was told, who is there.
+
+    `so_far` is how many tracks its reference has.
+    """
+    now = datetime.now(UTC)
+    found: list[Reason] = []
+    if status.attended.under_way(now):
+        window = maintenance.under_way(session, status.camera_id, now)
+        if window is not None:
+            found.append(_window(window))
+    estimate = status.estimate
+    if status.judged and estimate is not None and status.state != PoseState.NO_DATA:
+        found += estimate.reasons
+    elif status.state == PoseState.DRIFTING:
+        if estimate is not None and estimate.identifiable:
+            found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
+        else:
+            found += _of_alerts(status)
+    if not status.judged:
+        found += _missing(session, settings, status, so_far)
+    silence = data_gap_of(session, settings, status.camera_id, now) if status.silent else None
+    if silence is not None and status.state in (PoseState.NO_DATA, PoseState.DRIFTING):
+        found += silence.reasons
+    return tuple(found)
+
+
+def _of_alerts(status: CameraStatus) -> list[Reason]:
+    """The alerts' reasons; once, where several say the same."""
+    different: list[Reasons] = []
+    for alert in status.alerts:
+        if alert.reasons not in different:
+            different.append(alert.reasons)
+    return [reason for reasons in different for reason in reasons]
+
+
+def _missing(
+    session: Session, settings: Settings, status: CameraStatus, so_far: int
+) -> list[Reason]:
+    """The count of tracks that is missing until the camera is judged anew."""
+    reference = status.reference
+    if reference.ready_at is None:
+        values = {"tracks": so_far, "wanted": wanted_tracks(reference, settings)}
+        return [Reason(code=ServiceCode.REFERENCE_TRACKS, values=values)]
+    bounds = window_beside(status.attended, reference, settings)
+    since: dict[str, Value] = {
+        "tracks": windows.count_window(session, bounds),
+        "cause": status.cause,
+        "least_walkers": FEWEST_WALKERS,
+    }
+    return [Reason(code=ServiceCode.TRACKS_SINCE, values=since), *reference.doubts]
+
+
+def _window(window: MaintenanceRecord) -> Reason:
+    values = {"until": json_time(window.to_at)}
+    if window.reason:
+        values["note"] = window.reason
+    return Reason(code=ServiceCode.MAINTENANCE, values=values)

@@ -89,5 +89,5 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
 
 
 def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:
-    """What is known of the still image of a camera; None where none may be shown."""
+    """Size and time of a camera's still image; None where none may be shown."""
     return snapshots.facts(session, camera_id) if settings.snapshots else None

@@ -35,6 +35,7 @@ from service.store import alerts, cameras, estimates, references, sources
 from service.store.engines.store import joined
 from service.store.references import SiteReferenceRecord
 from service.store.sources import SourceRecord
+from service.wording.alerts import ONE_SOURCE_POSTS, source_change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,9 +151,7 @@ def watch_sources(
     silent_for = timedelta(hours=settings.source_silent_h)
     posting = [record for record in others if now - record.last_seen_at < silent_for]
     if not posting:
-        end_alert(
-            session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note="only one source posts"
-        )
+        end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=ONE_SOURCE_POSTS)
         return None
     if all(record.told_at is not None for record in posting):
         return None
@@ -212,7 +211,7 @@ def _count(
     former = None if last is None else sources.find(session, camera_id, last)
     if former is not None:
         former.told_at = None  # should it come back, it is new again
-    words = f"{record.name} instead of {last}"
+    words = source_change(record.name, last)
     end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=f"now counts: {words}")
     note(session, Activity.SOURCE_USED, by=by, camera_id=camera_id, text=words)
     request_estimate(session, queue, camera_id)
@@ -221,7 +220,7 @@ def _count(
 def _is_silent(
     session: Session, settings: Settings, counting: SourceRecord, other: SourceRecord
 ) -> bool:
-    """Whether the source that counts has fallen silent where another has not.
+    """True if the source that counts has fallen silent where another has not.
 
     By when they post and by the times of their tracks: some post once a day.
     """
@@ -237,7 +236,7 @@ def _is_silent(
 def _is_ready(
     session: Session, settings: Settings, reference: SiteReferenceRecord, name: str
 ) -> bool:
-    """Whether a source's tracks would make a reference of a camera that is where it should be."""
+    """True if a source's tracks would make a reference of a camera that is where it should be."""
     if reference.ready_at is None:
         return True  # nobody has judged the camera by now
     if not _is_well(session, settings, reference):
@@ -249,7 +248,7 @@ def _is_ready(
 
 
 def _usable(session: Session, settings: Settings, reference: SiteReferenceRecord, name: str) -> int:
-    """How many of a source's tracks were seen while the camera was known to be still."""
+    """Count of a source's tracks that were seen while the camera was known to be still."""
     attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
     from_s = _still_from_s(session, settings, reference)
     return sources.count_from(session, reference.camera_id, name, from_s, attended.spans)
@@ -265,7 +264,7 @@ def _still_from_s(
 
 
 def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecord) -> bool:
-    """Whether the source that counts has said last that the camera is where it should be."""
+    """True if the source that counts said last that the camera is where it should be."""
     camera_id = reference.camera_id
     last = estimates.newest(session, camera_id)
     if last is None or not made_against(reference, last) or last.state != PoseState.OK:

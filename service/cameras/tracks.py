@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection
 
-from service.cameras.pictures import check_picture
+from service.cameras.posts import check_picture
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
 from service.estimate_queue import request_estimate
@@ -19,7 +19,7 @@ from service.store.serialization import pack
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Receipt:
-    """What became of the tracks of one request."""
+    """The fate of the tracks of one request."""
 
     accepted: int
     duplicates: int

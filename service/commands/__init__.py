@@ -1,1 +1,1 @@
-"""What the command line starts, and what else it can be asked."""
+"""Commands of the command line."""

@@ -34,7 +34,7 @@ def backup(
     data_dir: DataDir = None,
 ) -> None:
     """Write database, weights and key to one checked archive, while the service runs."""
-    from service.operations.writing import write_backup
+    from service.operations.backup import write_backup
 
     settings = _begin_on_file(data_dir, "backup")
     with _progress() as tell:
@@ -55,7 +55,7 @@ def restore(
     force: Annotated[bool, typer.Option("--force", help="Move aside what is there.")] = False,
 ) -> None:
     """Verify an archive and put it into a data directory that nothing uses."""
-    from service.operations.restoring import restore_backup
+    from service.operations.restore import restore_backup
 
     settings = _begin_on_file(data_dir, "restore")
     with _progress() as tell:
@@ -77,7 +77,7 @@ def check(
     """Look a data directory over; 1 where something is wrong. A service may run meanwhile."""
     from rich.table import Table
 
-    from service.operations.checking import Verdict, check_data_dir, repair_weights
+    from service.operations.check import Verdict, check_data_dir, repair_weights
 
     settings = _begin_on_file(data_dir, "check")
     if repair:

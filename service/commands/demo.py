@@ -1,10 +1,14 @@
 """`surefoot demo`: a simulated street, a knocked camera, and the alert, in the terminal."""
 
+import contextlib
+import fcntl
+import shutil
+import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,8 +21,6 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from models.geometry.rotation import angle_between
 from models.tracks.scenes import SceneTrack
-from service.commands.demo_folder import demo_folder, free_port, remove_left_over, require_free
-from service.commands.demo_screen import Screen, clock, save_picture
 from service.commands.demo_street import (
     BETWEEN_S,
     CAMERA_ID,
@@ -27,17 +29,22 @@ from service.commands.demo_street import (
     PRIOR,
     REFERENCE_TRACKS,
     STILL_TRACKS,
-    camera_body,
+    Screen,
+    clock,
+    save_picture,
+    street_body,
     street_people,
 )
 from service.commands.replay import post_tracks
 from service.commands.settings_given import settings_given
-from service.data_dir import StartError
+from service.data_dir import StartError, running_in
 from service.enums import AlertState, ReferenceState
 from service.formats.degrees import degrees
 from service.settings import Settings
 from service.workers.processes.signals import end_like_ctrl_c
 
+_PREFIX, _LOCK = "surefoot-demo-", "demo.lock"
+_HOST = "127.0.0.1"
 _BATCH = 10
 _PAUSE_S = 0.4  # for the eye
 _LONGEST_S = 150.0
@@ -47,12 +54,12 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
-    port = port or free_port()
-    remove_left_over()
-    require_free(port)
+    port = port or _free_port()
+    _remove_left_over()
+    _require_free(port)
     end_like_ctrl_c()
     console.print("A street camera, people walking by; later somebody knocks the camera.")
-    with demo_folder() as folder:
+    with _folder() as folder:
         settings = settings_given(
             data_dir=folder,
             port=port,
@@ -91,7 +98,7 @@ def _play(
     clock_s = time.time() - BETWEEN_S * sum(count for _, _, count in parts)
     with Live(get_renderable=lambda: screen.table(progress), console=console) as live:
         training = progress.add_task("beside it, a regressor is trained", total=None)
-        http.post("/cameras", json=camera_body()).raise_for_status()
+        http.post("/cameras", json=street_body()).raise_for_status()
         for number, (words, pose, count) in enumerate(parts):
             if pose != PRIOR:
                 screen.knocked_at = datetime.fromtimestamp(clock_s, UTC)
@@ -125,7 +132,7 @@ def _show(
 
 
 def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
-    """Whether the newest track is in the reference or the estimate that is shown."""
+    """True if the newest track is in the reference or the estimate that is shown."""
     pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
     alerts = http.get(
         "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}
@@ -176,7 +183,7 @@ def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: f
         time.sleep(0.2)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
     log_path = settings.data_dir / "serve.log"
     with log_path.open("w") as log:
@@ -209,3 +216,48 @@ def _wait_for_interrupt() -> None:
             time.sleep(3600)
     except KeyboardInterrupt:
         return
+
+
+@contextlib.contextmanager
+def _folder() -> Iterator[Path]:
+    """A folder that is removed at the end; by its lock others see that a demo is in it."""
+    with (
+        tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name,
+        (Path(name) / _LOCK).open("w") as lock,
+    ):
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield Path(name)
+
+
+def _remove_left_over() -> None:
+    """Remove the folders of demos that were killed, once nothing runs in them."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        # Without the lock it is somebody else's, or is just being made.
+        with contextlib.suppress(OSError):
+            if (folder / _LOCK).exists() and not running_in(folder):
+                shutil.rmtree(folder)
+
+
+def _require_free(port: int) -> None:
+    """Check that nobody listens on a port of this machine.
+
+    Raises:
+        StartError: somebody does; the demo would register its street there.
+    """
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((_HOST, port))
+        except OSError as error:
+            raise StartError(
+                f"port: {_HOST}, port {port} cannot be had ({error.strerror}); another service "
+                "runs there: name another port by --port, or none"
+            ) from error
+
+
+def _free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind((_HOST, 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,10 +1,17 @@
-"""The street of the demo: its camera, the knock, and the people who walk there."""
+"""The street of the demo: its camera, the knock, its people, and what the terminal shows of it."""
 
 import math
-from dataclasses import asdict
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -13,7 +20,9 @@ from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import SceneTrack
 from models.tracks.trajectory import Trajectory
-from service.formats.degrees import in_degrees
+from service.commands.replay import camera_body
+from service.enums import ReferenceState
+from service.formats.degrees import degrees
 
 CAMERA_ID = "demo-street"
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
@@ -38,13 +47,82 @@ def street_people(pose: CameraPose, count: int, seed: int) -> list[SceneTrack]:
     return tracks
 
 
-def camera_body() -> dict[str, Any]:
+def street_body() -> dict[str, Any]:
     """The body that registers the camera."""
-    return {
-        "id": CAMERA_ID,
-        "name": "Demo street",
-        "intrinsics": {name: getattr(LENS, name) for name in
-                       ("width", "height", "fx", "fy", "cx", "cy")},
-        "prior_pose": in_degrees(asdict(PRIOR)),
-        "reference_tracks": REFERENCE_TRACKS,
-    }  # fmt: skip
+    body = camera_body(CAMERA_ID, LENS, PRIOR)
+    return {**body, "name": "Demo street", "reference_tracks": REFERENCE_TRACKS}
+
+
+@dataclass(slots=True)
+class Screen:
+    """The terminal below the progress bars."""
+
+    tracks: int = 0
+    knocked_at: datetime | None = None
+    pose: dict[str, Any] | None = None
+    alert: dict[str, Any] | None = None
+
+    def table(self, progress: Progress) -> Table:
+        """The page as it is now."""
+        page = Table.grid()
+        page.add_row(progress)
+        rows = Table(title=f"{CAMERA_ID}: {self.tracks} people seen", title_justify="left")
+        for column in ("", "height m", "tilt deg", "roll deg"):
+            rows.add_column(column, justify="left" if not column else "right")
+        rows.add_row("prior pose", *_row_of(PRIOR))
+        truth = KNOCK.apply(PRIOR) if self.knocked_at else PRIOR
+        rows.add_row("true pose" + (" (knocked)" if self.knocked_at else ""), *_row_of(truth))
+        if self.pose is not None:
+            rows.add_row(f"served pose: {self.pose['state']}", *_served(self.pose))
+        page.add_row(rows)
+        if self.pose is not None:
+            page.add_row(self._words(self.pose))
+        return page
+
+    def _words(self, pose: dict[str, Any]) -> str:
+        reference = pose["reference"]
+        if reference["state"] == ReferenceState.LEARNING:
+            return f"learning what is usual here: {pose['reason']}"
+        usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
+        if self.alert is None:
+            return f"{usual}\n{pose['reason']}"
+        drift = {
+            name: 0.0 if value is None else value for name, value in self.alert["drift"].items()
+        }
+        return (
+            f"{usual}\n[bold red]ALERT[/] {self.alert['severity']}: since "
+            f"{clock(self.alert['changed_at'])} the camera is turned by {drift['angle_deg']:.1f} "
+            f"deg\n(tilt {drift['tilt_deg']:+.1f}, roll {drift['roll_deg']:+.1f}), height "
+            f"{drift['height_m']:+.2f} m"
+        )
+
+
+def save_picture(page: Table, path: Path) -> None:
+    """The last screen as SVG."""
+    with open(os.devnull, "w") as nowhere:
+        recorder = Console(record=True, width=90, file=nowhere)
+        recorder.print(page)
+        recorder.save_svg(str(path), title="surefoot demo")
+
+
+def _row_of(pose: CameraPose) -> Sequence[str]:
+    """The cells of a pose."""
+    return [
+        f"{pose.height_m:.2f}",
+        f"{degrees(pose.tilt_rad):.2f}",
+        f"{degrees(pose.roll_rad):.2f}",
+    ]
+
+
+def _served(pose: dict[str, Any]) -> Sequence[str]:
+    """The served numbers, with their deviations where they are estimated."""
+    sd = pose["sd"] or {}
+    return [
+        f"{pose['pose'][name]:.2f}" + (f" ± {sd[name]:.2f}" if sd.get(name) is not None else "")
+        for name in ("height_m", "tilt_deg", "roll_deg")
+    ]
+
+
+def clock(moment: str | None) -> str:
+    """The time of day in an answer's time."""
+    return "an unknown time" if moment is None else f"{datetime.fromisoformat(moment):%H:%M:%S}"

@@ -2,19 +2,22 @@
 
 import fcntl
 import logging
+from datetime import UTC, datetime
 from pathlib import Path
 
 from service.data_dir import (
+    COPIES,
     MIGRATE_LOCK,
     StartError,
     make_file,
     make_private,
+    require_space,
+    sync_folder,
     telling_of,
 )
 from service.job_queue import migrate_engine_tables
 from service.notifications.keys import settle_key
-from service.operations.before_migration import copy_before
-from service.operations.placing import finish_restore
+from service.operations.restore import finish_restore
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
@@ -23,6 +26,7 @@ from service.store.engines.revisions import alembic_config, known_revisions, req
 log = logging.getLogger("surefoot.migrate")
 
 _LOOK_S = 10.0  # reads a gigabyte or more
+_KEPT_COPIES = 2
 
 
 def migrate(settings: Settings) -> None:
@@ -72,7 +76,7 @@ def _migrate_tables(settings: Settings) -> None:
         return
     copy: Path | None = None
     if found is not None and settings.copy_before_migration:
-        copy = copy_before(path, head)
+        copy = _copy_before(path, head)
         log.info("database_copied", extra={"path": str(copy), "revision": found})
     import alembic.command  # 0.1 s that a start with nothing to migrate needs not
 
@@ -88,3 +92,33 @@ def _migrate_tables(settings: Settings) -> None:
             "a copy of it: install the release that ran before, and report this"
         ) from error
     log.info("migrated", extra={"from": found, "to": head})
+
+
+def _copy_before(database: Path, revision: str) -> Path:
+    """Copy a database beside it, and delete copies but the newest two; returns the copy.
+
+    Args:
+        database: nobody else writes its schema meanwhile.
+        revision: what it is about to be brought to, for the name.
+
+    Raises:
+        StartError: there is no space for it.
+    """
+    folder = database.parent / COPIES
+    require_space(
+        database.parent,
+        files.size(database) + 2**20,
+        "the copy before the migration (SUREFOOT_COPY_BEFORE_MIGRATION=false: none)",
+    )
+    folder.mkdir(mode=0o700, exist_ok=True)
+    target = folder / f"{datetime.now(UTC):%Y%m%dT%H%M%S%fZ}-before-{revision}.sqlite"
+    unfinished = target.with_suffix(".partial")
+    for left in folder.glob("*.partial*"):
+        left.unlink()
+    files.copy(database, unfinished)
+    files.drop_log(unfinished)
+    unfinished.rename(target)
+    sync_folder(folder)
+    for old in sorted(folder.glob("*.sqlite"))[:-_KEPT_COPIES]:
+        old.unlink()
+    return target

@@ -22,7 +22,7 @@ _TRIES, _LONGEST_WAIT_S = 30, 30.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayProgress:
-    """How far a replay is."""
+    """Progress of a replay."""
 
     posted: int
     tracks: int
@@ -119,7 +119,7 @@ def post_tracks(
 
 
 def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str, Any]:
-    """What registers a camera."""
+    """The body that registers a camera."""
     return {
         "id": camera_id,
         "intrinsics": {

@@ -1,7 +1,9 @@
 """`surefoot token`: make, list and revoke tokens where the data directory is."""
 
+import contextlib
 import getpass
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -43,20 +45,14 @@ def add(
     """Make a token and print it, once; the database is made if there is none."""
     from service.access import tokens
 
-    store = _store(data_dir)
     spec = tokens.TokenSpec(
         name=name,
         scopes=tuple(scope),
         cameras=tuple(camera) if camera else None,
         expires_at=None if expires is None else _time_after(expires),
     )
-    try:
-        with store.write() as session:
-            made = tokens.make_token(session, spec, _who())
-    except ServiceError as error:
-        raise StartError(error.detail) from error
-    finally:
-        store.close()
+    with _store(data_dir) as store, store.write() as session:
+        made = tokens.make_token(session, spec, _who())
     typer.echo(made.text)
 
 
@@ -66,8 +62,7 @@ def list_all(data_dir: DataDir = None) -> None:
     from service.access import tokens
 
     table = Table("id", "name", "may", "cameras", "made", "last used", "ends")
-    store = _store(data_dir)
-    with store.read() as session:
+    with _store(data_dir) as store, store.read() as session:
         for record in tokens.list_tokens(session):
             table.add_row(
                 record.id,
@@ -78,7 +73,6 @@ def list_all(data_dir: DataDir = None) -> None:
                 _time(record.used_at),
                 _end(record),
             )
-    store.close()
     Console().print(table)
 
 
@@ -90,25 +84,25 @@ def revoke(
     """Let a token in no more; a service that runs knows it with the next request."""
     from service.access import tokens
 
-    store = _store(data_dir)
-    try:
-        with store.write() as session:
-            name = tokens.revoke_token(session, token_id, _who()).name
-    except ServiceError as error:
-        raise StartError(error.detail) from error
-    finally:
-        store.close()
+    with _store(data_dir) as store, store.write() as session:
+        name = tokens.revoke_token(session, token_id, _who()).name
     typer.echo(f"revoked the token {token_id} of {name}")
 
 
-def _store(data_dir: Path | None) -> "Store":
+@contextlib.contextmanager
+def _store(data_dir: Path | None) -> Iterator["Store"]:
+    """A migrated store; what it refuses is told in a line."""
     from service.commands.migrate import migrate
     from service.store.engines.store import Store
 
     be_private()
     settings = settings_given(data_dir=data_dir)
     migrate(settings)
-    return Store(settings)
+    with contextlib.closing(Store(settings)) as store:
+        try:
+            yield store
+        except ServiceError as error:
+            raise StartError(error.detail) from error
 
 
 def _who() -> str:

@@ -127,7 +127,7 @@ def _mind(context: JobContext, name: str) -> int:
 
 
 def _is_full(context: JobContext) -> bool:
-    """Whether a worker has grown beyond its ceiling, after all that is free was given back."""
+    """True if a worker has grown beyond its ceiling, after all that is free was given back."""
     limit_mb: float = context.settings.worker_max_mb
     if context.running.of_kind(TRAIN_JOB):
         limit_mb *= _CEILING_IN_TRAINING
@@ -138,7 +138,7 @@ def _is_full(context: JobContext) -> bool:
 
 
 def _limits_s(settings: Settings) -> dict[str, float]:
-    """How long a task of each kind may take; trainings mind their time themselves."""
+    """The longest time of a task of each kind; trainings mind theirs themselves."""
     return {
         ESTIMATE_JOB: settings.estimate_limit_s,
         DELIVER_JOB: settings.delivery_limit_s,

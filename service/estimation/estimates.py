@@ -40,6 +40,7 @@ from service.store.estimates import EstimateRecord
 from service.store.references import SiteReferenceRecord
 from service.store.serialization import identifiable_drift
 from service.training import train_at_edge
+from service.wording.alerts import fired_as
 
 _UNJUDGED = DriftVerdict(streak=0, excess=0.0, drifted=())
 
@@ -221,7 +222,7 @@ def _update_alerts(
     if judgement.clock is not None or still_clock:
         kind, other = other, kind
     if other in firing:
-        end_alert(session, camera_id, other, Outcome.CLEARED, note=f"it is told as {kind} now")
+        end_alert(session, camera_id, other, Outcome.CLEARED, note=fired_as(kind))
     if drift.identifiable or judgement.charted:
         open_alert(
             session,

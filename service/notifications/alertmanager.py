@@ -8,8 +8,7 @@ Times and numbers are annotations.
 from typing import Any
 
 from service.enums import Severity
-
-_TEST_LASTS = "This is a test of surefoot; it ends by itself."
+from service.wording.alerts import TEST_ENDS, alert_summary
 
 
 def postable_alerts(
@@ -39,7 +38,7 @@ def postable_test(payload: dict[str, Any], now: str) -> dict[str, Any]:
     """A test alert that has ended as it comes: Alertmanager takes it and pages nobody."""
     return {
         "labels": {"alertname": "SurefootTest", "severity": "none"},
-        "annotations": {"summary": str(payload["data"]["text"]), "description": _TEST_LASTS},
+        "annotations": {"summary": str(payload["data"]["text"]), "description": TEST_ENDS},
         "startsAt": payload["timestamp"],
         "endsAt": now,
     }
@@ -53,14 +52,12 @@ def alert_name(kind: str) -> str:
 def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> dict[str, Any]:
     kind, camera_id = body["kind"], body["camera_id"]
     labels = {"alertname": alert_name(kind), "kind": kind, "severity": severity}
-    whose = f"camera {camera_id}"
     if camera_id is not None:
         labels["camera_id"] = camera_id
     elif body.get("track_source"):  # of many cameras; another tracker's is another alert
         labels["track_source"] = body["track_source"]
-        whose = f"{len(body['camera_ids'])} cameras of {body['track_source']}"
     annotations = {
-        "summary": f"{kind.replace('_', ' ')}: {whose}",
+        "summary": alert_summary(kind, camera_id, body.get("camera_ids"), body.get("track_source")),
         "description": body["reason"],
         "alert_id": body["id"],
         **{f"drift_{name}": f"{value:g}" for name, value in _numbers(body["drift"]).items()},

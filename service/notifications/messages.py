@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from service.enums import WebhookFormat
 from service.notifications.alertmanager import ended, postable_alerts, postable_test
 from service.notifications.keys import old_secret_of, secret_of
-from service.notifications.outbox import alert_body, is_silenced, json_time
+from service.notifications.outbox import alert_body, json_time
 from service.notifications.signing import signed_headers
 from service.settings import Settings
 from service.store import alerts, webhooks
@@ -70,7 +70,7 @@ def _stands(
         return [postable_test(delivery.payload, json_time(now))]
     record = alerts.find(session, delivery.alert_id)
     body = delivery.payload["data"] if record is None else alert_body(record)
-    if record is None or is_silenced(record, now):
+    if record is None or record.is_silenced(now):
         body = ended(body, json_time(now))
     return postable_alerts(body, settings.public_url, changed=True, at=json_time(now))
 

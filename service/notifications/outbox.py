@@ -17,6 +17,7 @@ from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
 from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
+from service.wording.reasons import in_words
 
 _ALERT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
@@ -34,7 +35,7 @@ def queue_alert(
 ) -> None:
     """Tell the webhooks that want it of a change to an alert, with its body as of now."""
     now = datetime.now(UTC)
-    if is_silenced(record, now) and message not in _TOLD_IN_SILENCE:
+    if record.is_silenced(now) and message not in _TOLD_IN_SILENCE:
         return
     for webhook in webhooks.enabled(session):
         if webhook.kinds is None or record.kind in webhook.kinds:
@@ -80,20 +81,15 @@ def wake(session: Session, queue: JobQueue, webhook: WebhookRecord, now: datetim
 
 def alert_body(record: AlertRecord) -> dict[str, Any]:
     """An alert as clients see it, in the API, in webhooks and, in part, in events."""
-    values = {name: getattr(record, name) for name in _ALERT_FIELDS}
+    made = {"reason": in_words(record.reasons), "drift": in_degrees(record.drift)}
+    values = {name: made[name] if name in made else getattr(record, name) for name in _ALERT_FIELDS}
     body = {
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
-    body["drift"] = in_degrees(record.drift)
     body["acknowledged"] = record.acknowledged_at is not None
-    body["silenced"] = is_silenced(record, datetime.now(UTC))
+    body["silenced"] = record.is_silenced(datetime.now(UTC))
     return body
-
-
-def is_silenced(record: AlertRecord, now: datetime) -> bool:
-    """True where an alert is to be quiet."""
-    return record.silenced_until is not None and record.silenced_until > now
 
 
 def json_time(at: datetime) -> str:

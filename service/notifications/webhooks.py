@@ -17,11 +17,11 @@ from service.notifications.addresses import AddressError, check_url
 from service.notifications.keys import sealed_secret
 from service.notifications.outbox import add_delivery, wake
 from service.notifications.signing import new_secret
-from service.reason_words import in_words
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
 from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.wording.reasons import in_words
 
 OLD_SECRET_STAYS = timedelta(hours=24)
 _BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)

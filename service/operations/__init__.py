@@ -1,1 +1,1 @@
-"""Copies of a data directory: made while it is in use, checked, and put back."""
+"""Backup, restore and check of a data directory; health and metrics of the service."""

@@ -1,4 +1,4 @@
-"""What a backup says of itself: its release, schema, key, and the hash of each member."""
+"""A backup's description: its release, schema, key, and the hash of each member."""
 
 import hashlib
 import json

@@ -1,40 +1,16 @@
 """The metrics of a moment: what operators of the service watch."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.monitoring.verdict import Drift
-from service.cameras.standing import Standing, standings
-from service.enums import AlertKind, PoseState, Severity, TrainingState
-from service.notifications.outbox import is_silenced
+from service.cameras.status import CameraStatus, camera_statuses
+from service.enums import TrainingState
 from service.settings import Settings
 from service.store import cameras, events, metrics, tracks, webhooks
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CameraMetrics:
-    """A camera: its state, its newest track and its drift, where there is an estimate."""
-
-    camera_id: str
-    state: PoseState
-    last_track_s: float | None
-    drift: Drift | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AlertMetrics:
-    """An alert that fires; `camera_id` is empty where it is of no one camera.
-
-    It is `grouped` where another one speaks for it.
-    """
-
-    camera_id: str
-    kind: AlertKind
-    severity: Severity
-    silenced: bool
-    grouped: bool
+from service.store.alerts import AlertRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +27,16 @@ class WebhookMetrics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metrics:
-    """Everything at one moment. Heartbeats are seconds since the Unix epoch.
+    """Everything at one moment, with the alerts that fire.
 
-    `unseen_s` is the age of the oldest track of a camera that nothing has looked at, where there is
-    one; `failing` are the cameras whose last look failed.
+    Heartbeats are seconds since the Unix epoch. `unseen_s` is the age of the oldest track of a
+    camera that nothing has looked at, where there is one; `failing` are the cameras whose last look
+    failed.
     """
 
-    cameras: tuple[CameraMetrics, ...]
-    alerts: tuple[AlertMetrics, ...]
+    at: datetime
+    cameras: Collection[CameraStatus]
+    alerts: Sequence[AlertRecord]
     webhooks: tuple[WebhookMetrics, ...]
     trainings: dict[TrainingState, int]
     heartbeats_s: dict[str, float]
@@ -78,17 +56,9 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
     }
     workers = metrics.workers(session)
     return Metrics(
-        cameras=_cameras(standings(session, settings)),
-        alerts=tuple(
-            AlertMetrics(
-                camera_id=alert.camera_id or "",
-                kind=alert.kind,
-                severity=alert.severity,
-                silenced=is_silenced(alert, now),
-                grouped=alert.group_id is not None,
-            )
-            for alert in metrics.firing(session)
-        ),
+        at=now,
+        cameras=camera_statuses(session, settings).values(),
+        alerts=metrics.firing(session),
         webhooks=_webhooks(session, now),
         trainings=metrics.trainings_by_state(session),
         heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in workers},
@@ -97,18 +67,6 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
         failing=tuple(camera.id for camera in cameras.failing(session)),
         queue_lag_s=max(unseen_s.values(), default=0.0),
         events=events.newest_id(session),
-    )
-
-
-def _cameras(standing: dict[str, Standing]) -> tuple[CameraMetrics, ...]:
-    return tuple(
-        CameraMetrics(
-            camera_id=camera_id,
-            state=each.state,
-            last_track_s=each.last_track_s,
-            drift=None if each.estimate is None else each.estimate.drift,
-        )
-        for camera_id, each in standing.items()
     )
 
 

@@ -1,4 +1,1 @@
-"""What the operators' pages are made of: drawings and words as pure functions, templates, static.
-
-Templates and static files are package data. Nothing here knows HTTP or SQL.
-"""
+"""The operators' pages: what they read, drawings, routes, templates, static files."""

@@ -27,7 +27,6 @@ from service.enums import (
     Outcome,
     Severity,
 )
-from service.reason_words import in_words
 from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
@@ -92,11 +91,6 @@ class AlertRecord(Record):
     )
 
     @property
-    def reason(self) -> str:
-        """Why it was opened, in words."""
-        return in_words(self.reasons)
-
-    @property
     def reason_code(self) -> str | None:
         """The code of the first reason; None of a group that is about to be told."""
         return code_of(self.reasons)
@@ -105,6 +99,10 @@ class AlertRecord(Record):
     def reason_values(self) -> dict[str, Any]:
         """The numbers and names of the first reason, angles in degrees."""
         return values_of(self.reasons)
+
+    def is_silenced(self, now: datetime) -> bool:
+        """Whether it is to be quiet."""
+        return self.silenced_until is not None and self.silenced_until > now
 
 
 POSE_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that hold a camera against its prior pose

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from service import enums
 from service.reasons import CODES
-from tests.service.pages.views.test_reason_words import SAID
+from tests.service.wording.test_reasons import SAID
 
 _HEAD = """\
 # States and reasons

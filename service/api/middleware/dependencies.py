@@ -17,9 +17,7 @@ from service.access.callers import Caller
 from service.api.middleware.direct.feed import Feed
 from service.api.middleware.direct.kept import Kept, KeptAnswer
 from service.api.middleware.instruments import Instruments
-from service.cameras.pictures import Pictures
-from service.cameras.quota import Quota
-from service.cameras.watched import Watched
+from service.cameras.posts import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings

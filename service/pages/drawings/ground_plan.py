@@ -1,4 +1,7 @@
-"""The ground from above, to scale: a camera, its view by two poses, people. World +Y is up."""
+"""The ground from above, to scale: a camera, its view by two poses, people.
+
+World +Y is up; of a pose that is tried, up is where it looks.
+"""
 
 import math
 from collections.abc import Sequence
@@ -12,11 +15,11 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from service.pages.drawings.picture import Overlay
+from service.pages.drawings.picture import Overlay, ground_of
 from service.pages.drawings.svg_paths import Frame, path_data
 
 _SIZE_PX = 640.0
-_MARGIN_PX = 18.0
+_MARGIN_PX, _TRIED_MARGIN_PX = 18.0, 20.0
 _STRIP_PX = 26.0  # below the ground, for the scale and +Y
 _HEIGHT_PX = 470.0
 _BORDER = 25  # pixels of each side of the picture's edge
@@ -78,6 +81,36 @@ def ground_plan_svg(
     return Markup(
         f'<svg class="picture plan" viewBox="0 0 {_SIZE_PX:.0f} {_HEIGHT_PX:.0f}" role="img" '
         f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
+    )
+
+
+def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]) -> Markup:
+    """A square map of what the camera sees, with feet (N, 2); empty where it sees no ground."""
+    view = ground_of(lens, pose)
+    if view is None:
+        return Markup("")
+    left, right = min(view.across_m[0], 0.0), max(view.across_m[1], 0.0)
+    near, far = min(view.away_m[0], 0.0), view.away_m[1]
+    scale = (_SIZE_PX - 2 * _TRIED_MARGIN_PX) / max(right - left, far - near, 1e-6)
+    middle = (left + right) / 2
+    frame = Frame(left=0.0, top=0.0, right=_SIZE_PX, bottom=_SIZE_PX)
+
+    def on_page(ground: Array) -> Array:
+        local = (ground - view.foot_m) @ np.array([view.right, view.forward]).T
+        across = _SIZE_PX / 2 + (local[:, 0] - middle) * scale
+        return np.stack(
+            [across, _SIZE_PX - _TRIED_MARGIN_PX - (local[:, 1] - near) * scale], axis=-1
+        )
+
+    feet = [ground_from_pixel(lens, pose.rotation, pose.centre_m, uv)[0] for uv in tracks]
+    drawn = path_data([on_page(walk) for walk in feet], frame)
+    u, v = on_page(np.array([view.foot_m]))[0]
+    return Markup(
+        f'<svg class="picture" viewBox="0 0 {_SIZE_PX:.0f} {_SIZE_PX:.0f}" role="img" '
+        f'aria-label="The ground from above; a square is {view.spacing_m:g} m">'
+        f'<path class="grid prior" d="{path_data([on_page(x) for x in view.lines()], frame)}"/>'
+        f'<path class="track" d="{drawn}"/>'
+        f'<circle class="foot" cx="{u:.1f}" cy="{v:.1f}" r="7"/></svg>'
     )
 
 

@@ -9,15 +9,12 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.packaged import CHARTS, CHARTS_URL, packaged_file
 from service.api.middleware.pages import render
 from service.enums import AlertState
-from service.pages.drawings.camera import draw_camera
-from service.pages.views import camera_page
-from service.pages.views.camera_page import CameraPage
-from service.pages.wording import camera_words
-from service.pages.wording.activity_words import entry_words
-from service.pages.wording.camera_words import Clock
-from service.pages.wording.moments import next_morning
-from service.pages.wording.sentences import headline
-from service.pages.wording.words import STATES
+from service.pages.camera_drawings import draw_camera
+from service.pages.camera_page import CameraPage, view_camera_page
+from service.wording import alerts, camera, moves
+from service.wording.activity import entry_words
+from service.wording.reasons import in_words
+from service.wording.times import Clock, next_morning
 
 router = APIRouter(include_in_schema=False)
 # The one style that plotly 7.1.0 writes into a page by itself, of maps, which are not used here.
@@ -28,25 +25,25 @@ _CHARTS_STYLE = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
 @router.get("/ui/cameras/{camera_id}")
 def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Has the camera moved, how far, since when, how sure, and what to do now."""
-    page = camera_page.view_camera_page(session, state.settings, camera_id)
+    page = view_camera_page(session, state.settings, camera_id)
     state.watched.note(camera_id)
     zone = state.settings.zone
     clock = Clock(now=page.now, zone=zone)
-    estimate = page.pose.estimate
     answer = render(
         request,
         "camera/page.html",
         page=page,
         clock=clock,
         zone_name=state.settings.timezone,
-        headline=headline(page, zone),
+        headline=camera.headline(page.facts, clock),
         drawings=draw_camera(page),
-        parameters=camera_words.parameter_rows(page.camera.prior_pose, page.pose.pose, estimate),
-        misplaced=camera_words.misplaced_words(page.misplaced),
-        flags=camera_words.flags(page, clock),
+        parameters=moves.parameter_rows(page.camera.prior_pose, page.pose.pose, page.pose.estimate),
+        misplaced=moves.misplaced_words(page.misplaced),
+        flags=_flags(page, clock),
         activity=[(entry, entry_words(entry, clock)) for entry in page.activity],
-        words=camera_words,
-        states=STATES,
+        words=alerts,
+        in_words=in_words,
+        states=camera.STATES,
         chart_facts=_chart_facts(page),
         tomorrow=next_morning(page.now, zone).isoformat(),
         charts_url=CHARTS_URL,
@@ -62,8 +59,17 @@ def charts(accept_encoding: Annotated[str, Header()] = "") -> Response:
     return packaged_file("plotly", CHARTS, accept_encoding)
 
 
+def _flags(page: CameraPage, clock: Clock) -> list[str]:
+    """Flags of open alerts and maintenance, each once."""
+    until = None if page.attended is None else page.attended.to_at
+    flags = [*camera.page_flags(page.camera.record.lacks, until, clock)]
+    for story in page.firing:
+        flags += camera.page_alert_flags(story.record, story.group, clock)
+    return list(dict.fromkeys(flags))
+
+
 def _chart_facts(page: CameraPage) -> dict[str, Any]:
-    """What charts show beside the history: prior poses, oldest first, and alerts."""
+    """Marks of the charts beside the history: prior poses, oldest first, and alerts."""
     return {
         "camera_id": page.camera.record.id,
         "priors": [
@@ -79,7 +85,7 @@ def _chart_facts(page: CameraPage) -> dict[str, Any]:
         "alerts": [
             {
                 "at": (story.record.changed_at or story.record.opened_at).isoformat(),
-                "words": camera_words.KINDS[story.record.kind],
+                "words": alerts.KINDS[story.record.kind],
                 "firing": story.record.state == AlertState.FIRING,
             }
             for story in page.alerts

@@ -1,17 +1,20 @@
 """`/`: the fleet page, and the parts of it that are fetched when something happens."""
 
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from service.api.fields import Text
-from service.api.middleware.dependencies import ReadDep, StateDep
+from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import render
-from service.operations import health
-from service.pages.rows import banners_of, counts_of, rows_of, urgent
-from service.pages.views import fleet
+from service.enums import PoseState
+from service.pages.fleet import counts_of, list_fleet, list_groups
+from service.store import events
+from service.wording.camera import STATES, fleet_alert_flags
+from service.wording.reasons import group_in_words
+from service.wording.times import Clock
 
 router = APIRouter(include_in_schema=False)
 
@@ -19,18 +22,18 @@ router = APIRouter(include_in_schema=False)
 @router.get("/")
 def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Every camera, what needs a person first."""
-    now, zone = datetime.now(UTC), state.settings.zone
     # What happens from here on is an event that the page asks for, even if it is in here too.
-    newest = health.newest_event_id(session)
-    cameras = fleet.list_fleet(session, state.settings)
+    newest = events.newest_id(session)
+    cameras = list_fleet(session, state.settings)
     return render(
         request,
         "fleet.html",
         newest_event=newest,
         counts=counts_of(cameras),
-        urgent=urgent(cameras),
-        rows=rows_of(cameras, now, zone),
-        groups=banners_of(fleet.list_groups(session), now, zone),
+        urgent=sum(camera.state == PoseState.DRIFTING for camera in cameras),
+        rows=cameras,
+        groups=list_groups(session),
+        **_words(state),
     )
 
 
@@ -43,14 +46,21 @@ def rows(
 ) -> HTMLResponse:
     """The rows of some cameras, or of all; one that is gone has none."""
     wanted = None if ids is None else set(ids.split(","))
-    cameras = fleet.list_fleet(session, state.settings, wanted)
-    found = rows_of(cameras, datetime.now(UTC), state.settings.zone)
-    return render(request, "_fleet_rows.html", rows=found)
+    found = list_fleet(session, state.settings, wanted)
+    return render(request, "_fleet_rows.html", rows=found, **_words(state))
 
 
 @router.get("/ui/fleet/banners")
 def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """The alerts that blame trackers."""
-    groups = fleet.list_groups(session)
-    found = banners_of(groups, datetime.now(UTC), state.settings.zone)
-    return render(request, "_fleet_banners.html", groups=found)
+    return render(request, "_fleet_banners.html", groups=list_groups(session), **_words(state))
+
+
+def _words(state: AppState) -> dict[str, Any]:
+    """The words that the templates say times, states and alerts with."""
+    return dict(
+        clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
+        states=STATES,
+        in_words=group_in_words,
+        flags_of=fleet_alert_flags,
+    )

@@ -16,7 +16,7 @@ class Form(dict[str, list[str]]):
     """The fields of a form; one that was left empty is missing."""
 
     def one(self, name: str) -> str:
-        """What was typed into a field; empty where nothing was."""
+        """The text of a field; empty where nothing was typed."""
         return self.get(name, [""])[0].strip()
 
 

@@ -74,7 +74,7 @@ def _refused(request: Request, wanted: str, error: UnauthorizedError | Forbidden
 
 
 def _over_https(request: Request, settings: Settings) -> bool:
-    """Whether the person's browser speaks https, whatever is between."""
+    """True if the person's browser speaks https, whatever is between."""
     if request.headers.get("origin", "").startswith("https://") or request.url.scheme == "https":
         return True
     forwarded = request.headers.get("x-forwarded-proto", "").lower()

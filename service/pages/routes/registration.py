@@ -23,9 +23,9 @@ from service.cameras import cameras
 from service.formats.calibration_file import read_calibration
 from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
+from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
-from service.pages.drawings.preview import tried_ground_svg
-from service.pages.plausibility import judge_pose, judge_tracks, worst_first
+from service.wording.typed_pose import judge_pose, judge_tracks, worst_first
 
 router = APIRouter(include_in_schema=False)
 
@@ -43,7 +43,7 @@ def show(request: Request) -> HTMLResponse:
 
 @router.post("/ui/preview")
 def preview(body: PreviewBody) -> PreviewOut:
-    """What the picture and the ground look like by a form so far, and what is to say of it."""
+    """The picture and the ground by a form so far, and remarks on it."""
     read = body.fields.read()
     typed = body.fields.model_dump()
     wrong = {error.pointer[1:]: error.reason for error in read.errors}
@@ -77,7 +77,7 @@ def preview(body: PreviewBody) -> PreviewOut:
 
 @router.post("/ui/calibration")
 def calibration(body: BodyDep) -> FilledOut:
-    """What a calibration file of OpenCV's says, for the form's fields."""
+    """The form's fields out of a calibration file of OpenCV's."""
     return FilledOut.from_value(read_calibration(body))
 
 

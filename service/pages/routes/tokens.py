@@ -93,7 +93,7 @@ def _page(
 
 
 def _spec(form: Form) -> TokenSpec:
-    """What was typed, as the use case takes it.
+    """The token that was typed, as the use case takes it.
 
     Raises:
         MalformedError: the days are no number.

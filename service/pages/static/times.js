@@ -1,4 +1,4 @@
-// "3 minutes ago", said anew as time goes on; the same words as service/pages/wording/words.py.
+// "3 minutes ago", said anew as time goes on; the same words as service/wording/times.py.
 
 const EVERY_MS = 10_000;
 const UNITS = [

@@ -16,11 +16,11 @@ from service.alerts.arrival_models import (
     save_arrival_model,
 )
 from service.alerts.data_gaps import data_gap_of, watch_data_gap
-from service.reason_words import in_words
 from service.settings import Settings
 from service.store import rhythms
 from service.store.serialization import pack
 from service.store.stored_tracks import TrackRecord
+from service.wording.reasons import in_words
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
 from service.workers.upkeep.periodic import run_arrival_models

@@ -22,10 +22,9 @@ import pytest
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone
 from service.notifications.keys import secret_of
-from service.operations.checking import check_data_dir
-from service.operations.placing import finish_restore
-from service.operations.restoring import restore_backup
-from service.operations.writing import write_backup
+from service.operations.backup import write_backup
+from service.operations.check import check_data_dir
+from service.operations.restore import finish_restore, restore_backup
 from service.store import webhooks
 from service.store.engines.revisions import known_revisions
 from service.store.engines.store import Store

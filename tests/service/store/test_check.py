@@ -4,7 +4,7 @@ import os
 import sqlite3
 
 from service.commands.migrate import migrate
-from service.operations.checking import check_data_dir, repair_weights
+from service.operations.check import check_data_dir, repair_weights
 from tests.service.notifications.test_sealing import hook
 from tests.service.store.test_backup import with_model
 from tests.test_migrations import put

@@ -11,7 +11,6 @@ from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
 from models.monitoring.verdict_reasons import reason_of_chart, reason_of_drift
 from models.reasons import Reason, TracksCode
-from service.reason_words import group_in_words, in_words
 from service.reasons import (
     CODES,
     ServiceCode,
@@ -22,6 +21,7 @@ from service.reasons import (
     to_json,
     values_of,
 )
+from service.wording.reasons import group_in_words, in_words
 
 LIMITS = {
     "sigmas": 5.0, "floor_rad": math.radians(0.5), "floor_m": 0.2, "people": 12, "clear_ratio": 0.7,

@@ -14,19 +14,20 @@ from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
-from service.enums import AlertState
-from service.pages.views.camera_activity import ActivityEntry, activity_of
+from service.enums import AlertState, PoseState
 from service.settings import Settings
-from service.store import alerts, cameras, events, maintenance, tracks, trainings
+from service.store import activity, alerts, cameras, events, maintenance, tracks, trainings
+from service.store.activity import ActivityRecord
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.cameras import PriorPoseRecord
 from service.store.maintenance import MaintenanceRecord
 from service.store.serialization import trajectory_of
 from service.store.snapshots import SnapshotFacts
 from service.store.trainings import TrainingRecord
+from service.wording.camera import CameraFacts
 
 _TRACKS = 120  # more are a carpet
-_ALERTS, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 5, 20, 5
+_ALERTS, _ACTIVITY, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 40, 5, 20, 5
 DISTANCES_M = (5.0, 10.0, 20.0, 40.0, 80.0)
 
 
@@ -40,7 +41,7 @@ class AlertStory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraPage:
-    """What the page of a camera shows. Lists are newest first, windows in their order.
+    """The contents of a camera's page. Lists are newest first, windows in their order.
 
     `alerts` are all that fire, and then those that ended last.
 
@@ -60,7 +61,7 @@ class CameraPage:
     priors: tuple[PriorPoseRecord, ...]
     windows: tuple[MaintenanceRecord, ...]
     trainings: tuple[TrainingRecord, ...]
-    activity: tuple[ActivityEntry, ...]
+    activity: tuple[ActivityRecord, ...]
     sources: tuple[SourceView, ...]
     snapshot: SnapshotFacts | None
     snapshots_allowed: bool
@@ -70,7 +71,7 @@ class CameraPage:
     def firing(self) -> tuple[AlertStory, ...]:
         """The open alerts, what needs a person most first."""
         stories = {story.record.id: story for story in self.alerts}
-        return tuple(stories[record.id] for record in self.pose.standing.alerts)
+        return tuple(stories[record.id] for record in self.pose.status.alerts)
 
     @property
     def past(self) -> tuple[AlertStory, ...]:
@@ -82,6 +83,25 @@ class CameraPage:
         """The maintenance window that is under way, the one that ends last."""
         here = [each for each in self.windows if each.holds(self.now)]
         return max(here, key=lambda each: each.until, default=None)
+
+    @property
+    def facts(self) -> CameraFacts:
+        """The facts that its headline is made of."""
+        status, reference, silence = self.pose.status, self.pose.reference, self.silence
+        if not status.silent or status.state == PoseState.LEARNING:
+            silence = None  # as is usual, or nothing is known to be usual yet
+        return CameraFacts(
+            state=status.state,
+            judged=status.judged,
+            estimate=status.estimate,
+            alerts=status.alerts,
+            answered_by=status.reference.answered_by,
+            ready=reference.ready,
+            learned=reference.tracks,
+            wanted=reference.wanted,
+            silence=None if silence is None else silence.reasons,
+            silent_since_s=None if silence is None else silence.last_s,
+        )
 
 
 def view_camera_page(session: Session, settings: Settings, camera_id: str) -> CameraPage:
@@ -97,7 +117,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     pose = view_pose(session, settings, camera_id)
     estimate = pose.estimate
     ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
-    found = [*pose.standing.alerts, *list_alerts(session, ended, _ALERTS)]
+    found = [*pose.status.alerts, *list_alerts(session, ended, _ALERTS)]
     windows = maintenance.of_camera(session, camera_id)
     over = sum(window.until <= now for window in windows)
     priors = cameras.prior_poses(session, camera_id, _PRIORS)
@@ -124,7 +144,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
-        activity=activity_of(session, camera_id),
+        activity=tuple(activity.newest(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,

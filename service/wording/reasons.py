@@ -1,4 +1,4 @@
-"""Reasons in words: all that is said to people of why something is so is said here."""
+"""Reasons in words: why a state is what it is, an alert fired, a part is missing."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +32,7 @@ def in_words(reasons: Sequence[Reason]) -> str:
 
 
 def group_in_words(reasons: Sequence[Reason]) -> str:
-    """The same of a tracker's alert, beside the tracker's name."""
+    """Reasons of a tracker's alert, to stand beside the tracker's name."""
     return in_words(
         [
             Reason(code=each.code, values={**each.values, "track_source": ""})

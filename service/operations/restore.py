@@ -1,13 +1,15 @@
-"""Put a backup into a data directory: verified first, then in place whole or not at all."""
+"""A backup put into a data directory: verified first, then in place whole or not at all."""
 
 import os
 import shutil
 import tarfile
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from models.regression.weights_files import weights_path
 from service.data_dir import (
+    COPIES,
     DATABASE,
     KEY_FILE,
     WEIGHTS,
@@ -21,6 +23,7 @@ from service.data_dir import (
 )
 from service.notifications.keys import require_openable
 from service.notifications.sealing import read_key_file, sealer_of
+from service.operations.backup import Progress
 from service.operations.manifest import (
     MANIFEST,
     Manifest,
@@ -29,19 +32,20 @@ from service.operations.manifest import (
     hash_stream,
     read_manifest,
 )
-from service.operations.placing import commit_restore, finish_restore, has_data
-from service.operations.writing import Progress
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
 from service.store.engines.revisions import require_known
 
 _LARGEST_MANIFEST = 64 * 2**20
+READY = "restored"
+_PARTS = (KEY_FILE, WEIGHTS, DATABASE)
+_REPLACED = (DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm", KEY_FILE, f"{KEY_FILE}.new", WEIGHTS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Restored:
-    """What was put in place, and where what was there before is now."""
+    """The backup that was put in place, and where what was there before is now."""
 
     manifest: Manifest
     replaced: Path | None
@@ -70,7 +74,7 @@ def restore_backup(
             finish_restore(folder)
             for left in folder.glob("restoring-*"):
                 shutil.rmtree(left)
-            if has_data(folder) and not force:
+            if _has_data(folder) and not force:
                 raise StartError(
                     f"restore: {folder} holds data; name an empty folder by --data-dir, or say "
                     "--force to move it aside"
@@ -84,7 +88,7 @@ def restore_backup(
             except BaseException:
                 shutil.rmtree(unpacked)
                 raise
-            return Restored(manifest=manifest, replaced=commit_restore(unpacked, folder))
+            return Restored(manifest=manifest, replaced=_commit(unpacked, folder))
 
 
 def _unpack(archive: Path, folder: Path, on_progress: Progress) -> Manifest:
@@ -160,3 +164,52 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         sealer = read_key_file(folder / KEY_FILE) if in_archive else sealer_of(settings)
         require_openable(sealer, secrets)
     on_progress("checking", 1, 1)
+
+
+def _commit(unpacked: Path, folder: Path) -> Path | None:
+    """Put what was unpacked in the place of what is there; returns where that was moved to.
+
+    The renaming decides: cut off before it, nothing has changed; after it, the next start goes on.
+    """
+    unpacked.rename(folder / READY)
+    sync_folder(folder)
+    return finish_restore(folder)
+
+
+def finish_restore(folder: Path) -> Path | None:
+    """Go on with a restore that was decided; None where there is none, or nothing was replaced."""
+    ready = folder / READY
+    if not ready.is_dir():
+        return None
+    aside_name = ready / "replaced"
+    if not aside_name.exists():
+        aside_name.write_text(f"replaced-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+        sync_folder(ready)
+    aside = folder / aside_name.read_text()
+    marker = ready / "moved-aside"
+    if not marker.exists():
+        for path in (folder / name for name in _REPLACED):
+            if path.is_file() and not path.stat().st_size:
+                path.unlink()  # a database that was just begun
+            elif path.exists():
+                aside.mkdir(mode=0o700, exist_ok=True)
+                path.rename(aside / path.name)
+        marker.touch()
+        sync_folder(folder)
+        sync_folder(ready)
+    for name in _PARTS:
+        if (ready / name).exists():
+            (ready / name).rename(folder / name)
+    done = folder / f"restoring-{READY}"  # a name that nobody goes on with
+    ready.rename(done)
+    sync_folder(folder)
+    shutil.rmtree(done)
+    return aside if aside.exists() else None
+
+
+def _has_data(folder: Path) -> bool:
+    """True if a folder holds a database with something in it, a key, weights or copies."""
+    database = folder / DATABASE
+    if database.exists() and database.stat().st_size:
+        return True
+    return any((folder / name).exists() for name in (KEY_FILE, WEIGHTS, COPIES))

@@ -6,9 +6,9 @@ import numpy as np
 from markupsafe import Markup
 
 from models.geometry.rotation import Array
+from service.pages.camera_page import CameraPage
 from service.pages.drawings.ground_plan import ground_plan_svg
 from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
-from service.pages.views.camera_page import CameraPage
 
 _POINTS = 24
 

@@ -1,4 +1,4 @@
-"""Write a data directory that may be in use to one checked archive."""
+"""A data directory that may be in use, written to one checked archive."""
 
 import fcntl
 import io

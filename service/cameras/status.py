@@ -1,4 +1,4 @@
-"""How a camera stands: the one derivation that pages, API, metrics and lists of alerts share.
+"""A camera's status: the one derivation that pages, API, metrics and lists of alerts share.
 
 While an alert that an estimate fired is open, the camera is taken for moved, whatever else is
 known of it, and the last identifiable pose is served. Once a person has answered (it was put back,
@@ -12,10 +12,10 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.monitoring.verdict import Drift
 from service.alerts.arrival_models import ArrivalModel, unpacked
 from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
-from service.notifications.outbox import is_silenced
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
 from service.store import fleet, metrics
@@ -38,17 +38,17 @@ class Clockwork:
     moments: tuple[datetime, ...]
 
     def silent(self, now: datetime) -> bool:
-        """Whether nobody has been seen for longer than is usual; why says for how long, then."""
+        """True if nobody has been seen for longer than is usual; the reasons say for how long."""
         return is_no_data(self.settings, self.rhythm, self.last_track_s, now)
 
     def hands(self, now: datetime) -> tuple[bool, ...]:
-        """The same at two times between which nothing changes."""
+        """A value that is the same at two times between which nothing changes."""
         return (self.silent(now), *(at <= now for at in self.moments))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFacts:
-    """What is stored of a camera that its state follows from, at a moment.
+    """The stored facts that a camera's status follows from, at a moment.
 
     `estimate` is the newest, `last_identifiable` the newest of which something is identifiable.
     """
@@ -62,8 +62,8 @@ class CameraFacts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """How a camera stands. `alerts` are all that fire, what needs a person most first.
+class CameraStatus:
+    """A camera's status. `alerts` are all that fire, what needs a person most first.
 
     `estimate` is what is served, maybe nothing identifiable; None where the prior pose is. It is
     `judged` where it says how the camera stands now, against its reference; else it is the last
@@ -85,8 +85,13 @@ class Standing:
 
     @property
     def last_track_s(self) -> float | None:
-        """When the newest track ended of those that count."""
+        """The end of the newest track of those that count."""
         return self.clockwork.last_track_s
+
+    @property
+    def drift(self) -> Drift | None:
+        """The drift of the estimate; None where there is none."""
+        return None if self.estimate is None else self.estimate.drift
 
     @property
     def identifiable(self) -> tuple[str, ...]:
@@ -94,10 +99,10 @@ class Standing:
         return () if self.estimate is None else tuple(self.estimate.identifiable)
 
 
-def standings(
+def camera_statuses(
     session: Session, settings: Settings, ids: Collection[str] | None = None
-) -> dict[str, Standing]:
-    """How all cameras stand, or some, in order of their ids: a handful of statements for all."""
+) -> dict[str, CameraStatus]:
+    """The status of all cameras, or some, in order of their ids, by a handful of statements."""
     now = datetime.now(UTC)
     newest = metrics.newest(session, ids)
     windows: dict[str, list[MaintenanceRecord]] = {}
@@ -129,12 +134,12 @@ def standings(
                 moments=tuple(_moments(attending, firing[camera_id])),
             ),
         )
-        found[camera_id] = standing_of(facts, now)
+        found[camera_id] = status_of(facts, now)
     return found
 
 
-def standing_of(facts: CameraFacts, now: datetime) -> Standing:
-    """How a camera stands, by what is known of it."""
+def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
+    """A camera's status, by what is known of it."""
     reference = facts.reference
     estimate = _counting(facts, now)
     judged = estimate is not None and made_against(reference, estimate)
@@ -154,7 +159,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
         state = estimate.state
     else:
         state = PoseState.OK
-    return Standing(
+    return CameraStatus(
         camera_id=reference.camera_id,
         state=state,
         since=_since(state, facts, alerts, cause),
@@ -170,7 +175,7 @@ def standing_of(facts: CameraFacts, now: datetime) -> Standing:
 
 
 def _identifies(estimate: EstimateRecord | None) -> bool:
-    """Whether the newest estimate is the last that tells something; none is the last, too."""
+    """True if the newest estimate is the last that tells something; none is the last, too."""
     return estimate is None or bool(estimate.identifiable)
 
 
@@ -208,7 +213,7 @@ def _counting(facts: CameraFacts, now: datetime) -> EstimateRecord | None:
 
 
 def _cause(reference: SiteReferenceRecord, attended: Attendance, now: datetime) -> Cause:
-    """What was last of all that has the camera judged anew."""
+    """The last cause of all that have the camera judged anew."""
     left_s = attended.free_since_s(now)
     if reference.answer is not None and reference.answered_at is not None:
         if left_s is not None and left_s > reference.answered_at.timestamp():
@@ -226,8 +231,8 @@ def _urgency(alert: AlertRecord, now: datetime) -> tuple[bool, bool, datetime]:
 
 
 def waits(alert: AlertRecord, now: datetime) -> bool:
-    """Whether nobody has taken an alert up, and no group speaks for it."""
-    return not (alert.acknowledged_by or is_silenced(alert, now) or alert.group_id is not None)
+    """True if nobody has taken an alert up, and no group speaks for it."""
+    return not (alert.acknowledged_by or alert.is_silenced(now) or alert.group_id is not None)
 
 
 def alert_since(alert: AlertRecord) -> datetime:

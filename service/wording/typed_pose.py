@@ -1,4 +1,4 @@
-"""What is to say of a pose that somebody typed, before it is trusted for months."""
+"""Remarks on a pose that somebody typed, before it is trusted for months."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ _LEVEL = math.radians(45)
 
 
 class Tone(StrEnum):
-    """How a saying is meant, those first that somebody has to look at."""
+    """Tones of remarks, those first that somebody has to look at."""
 
     CRITICAL = "critical"
     WARNING = "warning"
@@ -41,7 +41,7 @@ class Saying:
 
 
 def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[Saying]:
-    """What is to say of a pose."""
+    """Remarks on a pose."""
     found = [*_looking(lens, pose, typed_angles=typed_angles), *_standing(pose)]
     if not typed_angles:
         found.append(Saying(kind=Tone.INFO, text=f"R and t say: {pose_words(pose)}."))
@@ -49,7 +49,7 @@ def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> lis
 
 
 def worst_first(sayings: Sequence[Saying]) -> list[Saying]:
-    """The same, those first that somebody has to look at; then what is good to know."""
+    """Remarks in order: those first that somebody has to look at, then what is good to know."""
     order = list(Tone)
     return sorted(sayings, key=lambda saying: order.index(saying.kind))
 
@@ -69,7 +69,7 @@ def pose_words(pose: CameraPose) -> str:
 def judge_tracks(
     lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array], rate_hz: float
 ) -> list[Saying]:
-    """What recorded tracks, each (N, 3) of frame, u and v, say of a pose and a frame rate."""
+    """Remarks on a pose and a frame rate by recorded tracks, each (N, 3) of frame, u and v."""
     floating = 0
     for track in tracks:
         _, hits = ground_from_pixel(lens, pose.rotation, pose.centre_m, track[:, 1:])

@@ -9,11 +9,11 @@ from sqlalchemy import event
 from models.monitoring.verdict import DriftLimits
 from service.cameras.poses import view_pose
 from service.estimation.limits import drift_limits
-from service.pages.rows import rows_of
-from service.pages.views import fleet as use_cases
-from service.pages.wording.words import ago, duration, height_change
+from service.pages import fleet as use_cases
 from service.store import fleet as statements
 from service.store.estimates import EstimateRecord
+from service.wording.moves import height_change
+from service.wording.times import ago, duration
 from tests.service.bench import moved
 from tests.service.fleet_bench import Fleet, afternoon
 from tests.stores.databases import only_sqlite
@@ -110,7 +110,7 @@ def test_who_walked_while_somebody_was_there_is_not_learned_of(http, fleet, sett
     fleet.attend("twice", hours=-0.3, began_h=0.4)
     fleet.attend("twice", hours=-0.1, began_h=0.2)
     with fleet.store.read() as session:
-        found = {each.camera_id: each.learned for each in use_cases.list_fleet(session, settings)}
+        found = {each.id: each.learned for each in use_cases.list_fleet(session, settings)}
         for camera_id, learned in found.items():
             assert learned == view_pose(session, settings, camera_id).reference.tracks
     assert found["never"] == 60
@@ -197,8 +197,7 @@ def test_who_looks_for_a_page_that_is_not_there_gets_one(http):
     assert http.get("/ui/nothing").headers["content-type"] == "application/problem+json"
 
 
-def test_lines_are_made_without_a_store():
-    assert rows_of([], datetime.now(UTC), UTC) == []
+def test_words_are_made_without_a_store():
     assert [duration(s) for s in (-1, 89, 100, 5390, 5400, 2e5)] == [
         "0 seconds", "89 seconds", "2 minutes", "90 minutes", "2 hours", "2 days"
     ]  # fmt: skip

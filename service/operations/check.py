@@ -1,4 +1,4 @@
-"""Look a data directory over: what is wrong in it, and what is merely left over."""
+"""A data directory looked over: what is wrong in it, and what is merely left over."""
 
 import shutil
 import stat
@@ -22,7 +22,7 @@ from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import require_openable
 from service.notifications.sealing import sealer_of
 from service.operations.manifest import hash_file
-from service.operations.placing import READY
+from service.operations.restore import READY
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
@@ -32,7 +32,7 @@ _LEAST_FREE = 200e6
 
 
 class Verdict(StrEnum):
-    """What was found of one thing."""
+    """Verdicts on one thing."""
 
     OK = "ok"
     NOTE = "note"

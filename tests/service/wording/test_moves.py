@@ -6,9 +6,9 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from service.pages.wording.moments import next_morning, when
-from service.pages.wording.sentences import angle_half_width_deg, moved_words, signed
 from service.store.estimates import EstimateRecord
+from service.wording.moves import angle_half_width_deg, moved_words, signed
+from service.wording.times import next_morning, when
 
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 

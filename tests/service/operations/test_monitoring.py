@@ -14,9 +14,9 @@ from service.alerts import alerts
 from service.reasons import as_said
 from service.workers.processes.workers import register_worker
 from tests.service.bench import moved
-from tests.service.pages.views.test_metrics import PROMTOOL, needs_promtool
+from tests.service.operations.test_metrics import PROMTOOL, needs_promtool
 
-FOLDER = Path(__file__).parents[4] / "deploy/monitoring"
+FOLDER = Path(__file__).parents[3] / "deploy/monitoring"
 RULES = yaml.safe_load((FOLDER / "rules.yml").read_text())
 DASHBOARD = json.loads((FOLDER / "grafana.json").read_text())
 SELECTOR = re.compile(r"(surefoot_[a-z0-9_]+)(?:\{([^}]*)\})?")

@@ -1,8 +1,9 @@
-"""What was done at a camera, as sentences."""
+"""Entries of the log of a camera, as sentences."""
 
 from service.enums import Activity, Outcome
-from service.pages.views.camera_activity import ActivityEntry
-from service.pages.wording.camera_words import KINDS, OUTCOMES, Clock
+from service.store.activity import ActivityRecord
+from service.wording.alerts import KINDS, OUTCOMES
+from service.wording.times import Clock
 
 # By a person; of those that the service does by itself, what happened.
 _DONE = {
@@ -44,8 +45,8 @@ _BY_ITSELF = {
 }
 
 
-def entry_words(entry: ActivityEntry, clock: Clock) -> str:
-    """Who did what, as a sentence without the time."""
+def entry_words(entry: ActivityRecord, clock: Clock) -> str:
+    """A sentence without the time: who did what."""
     kind = "" if entry.kind is None else KINDS[entry.kind].lower()
     words = {
         "kind": kind,

@@ -1,0 +1,205 @@
+"""The lines of the fleet page: every camera in one, those that need a person first."""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+from markupsafe import Markup
+from sqlalchemy.orm import Session
+
+from models.monitoring.verdict import Drift
+from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
+from service.enums import PoseState, Severity
+from service.estimation.limits import drift_limits
+from service.pages.drawings.sparkline import sparkline
+from service.references import tracks_so_far, wanted_tracks
+from service.settings import Settings
+from service.store import fleet
+from service.store.alerts import AlertRecord
+from service.store.estimates import EstimateRecord
+from service.store.trainings import TrainingRecord
+from service.wording.camera import STATES, fleet_flags, fleet_line
+from service.wording.times import from_seconds
+
+_HISTORY = 24  # estimates of a sparkline
+# How soon a camera without an alert needs a person.
+_RANKS = {
+    PoseState.DRIFTING: 2,
+    PoseState.NO_DATA: 4,
+    PoseState.LEARNING: 6,
+    PoseState.OK: 7,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetRow:
+    """A camera in one line, as it is `now`.
+
+    `history` has the drift of its newest estimates in units of the limits, oldest first, None where
+    nothing was identifiable. `drift` has only what is sure. `learned` and `wanted` are people of
+    the reference being learned.
+    """
+
+    now: datetime
+    name: str
+    status: CameraStatus
+    drift: Drift | None
+    history: tuple[float | None, ...]
+    learned: int | None
+    wanted: int
+    unfinished: TrainingRecord | None
+
+    @property
+    def id(self) -> str:
+        """The camera's id."""
+        return self.status.camera_id
+
+    @property
+    def state(self) -> PoseState:
+        """The camera's state."""
+        return self.status.state
+
+    @property
+    def attended_until(self) -> datetime | None:
+        """The end of the maintenance that is under way."""
+        now_s = self.now.timestamp()
+        spans = self.status.attended.spans
+        ends = (to_s for from_s, to_s in spans if from_s <= now_s < to_s)
+        return next((from_seconds(to_s) for to_s in ends), None)
+
+    @property
+    def words(self) -> str:
+        """The camera's doings, in one line."""
+        now_s = self.now.timestamp()
+        return fleet_line(
+            self.state,
+            [alert.kind for alert in self.status.alerts],
+            self.drift,
+            judged=self.status.judged,
+            learned=self.learned,
+            wanted=self.wanted,
+            silent_s=now_s - (self.status.last_track_s or now_s),
+        )
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Whatever else is to be known of it at a glance."""
+        return fleet_flags(self.state, self.status.alerts, self.attended_until, self.now)
+
+    @property
+    def training(self) -> int | None:
+        """Progress of the training that waits or is under way, in percent."""
+        record = self.unfinished
+        if record is None:
+            return None
+        return round(100 * record.step / record.steps) if record.steps else 0
+
+    @property
+    def share(self) -> int | None:
+        """Progress of the reference, in percent; None where it is ready."""
+        return None if self.learned is None else round(100 * self.learned / self.wanted)
+
+    @property
+    def spark(self) -> Markup:
+        """Its drift of late, drawn."""
+        return sparkline(self.history)
+
+    @property
+    def rank(self) -> int:
+        """Urgency for a person: 0 at once, 7 not at all."""
+        alerts = self.status.alerts
+        if self.attended_until is not None:
+            return 5
+        if not alerts:
+            return _RANKS[self.state]
+        if not waits(alerts[0], self.now):
+            return 5 if alerts[0].is_silenced(self.now) else 3
+        return 0 if alerts[0].severity == Severity.CRITICAL else 1
+
+    @property
+    def order(self) -> tuple[int, float, str]:
+        """Sorts first what a person should look at first; of one kind the newest, then by name."""
+        at_s = self.status.since.timestamp() if self.rank < 6 else 0.0
+        return self.rank, -at_s, self.name.casefold()
+
+    @property
+    def key(self) -> str:
+        """The order as a string, which the page sorts by: newest first is what remains to 2**40."""
+        rank, negative_s, name = self.order
+        return f"{rank}-{2**40 + negative_s:016.1f}-{name}-{self.id}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetGroup:
+    """An alert that blames a tracker or its clock for what many cameras show, by id and name."""
+
+    alert: AlertRecord
+    cameras: tuple[tuple[str, str], ...]
+
+    @property
+    def since(self) -> datetime:
+        """Since when it is so, as far as is known."""
+        return alert_since(self.alert)
+
+
+def list_fleet(
+    session: Session, settings: Settings, ids: Collection[str] | None = None
+) -> list[FleetRow]:
+    """All cameras, or some, those first that need a person; a dozen statements for all of them."""
+    now = datetime.now(UTC)
+    statuses = camera_statuses(session, settings, ids)
+    names = dict(fleet.names(session, ids))
+    history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
+    learning = {
+        i: each.attended.spans for i, each in statuses.items() if each.reference.ready_at is None
+    }
+    counts = fleet.learning_counts(session, ids, learning)
+    trainings = fleet.unfinished_trainings(session, ids)
+    rows = [
+        FleetRow(
+            now=now,
+            name=names[camera_id],
+            status=each,
+            drift=_sure_drift(each.estimate) if each.state != PoseState.LEARNING else None,
+            history=tuple(history[camera_id]),
+            learned=tracks_so_far(each.reference, settings, counts.get(camera_id, 0))
+            if camera_id in learning
+            else None,
+            wanted=wanted_tracks(each.reference, settings),
+            unfinished=trainings.get(camera_id),
+        )
+        for camera_id, each in statuses.items()
+        if camera_id in names
+    ]
+    return sorted(rows, key=lambda row: row.order)
+
+
+def list_groups(session: Session) -> list[FleetGroup]:
+    """The alerts that blame trackers, the newest first."""
+    groups = fleet.firing_groups(session)
+    wanted = {camera_id for group in groups for camera_id in group.camera_ids or []}
+    names = dict(fleet.names(session, wanted)) if wanted else {}
+    return [
+        FleetGroup(
+            alert=group,
+            cameras=tuple((i, names[i]) for i in group.camera_ids or [] if i in names),
+        )
+        for group in groups
+    ]
+
+
+def counts_of(rows: Sequence[FleetRow]) -> list[tuple[PoseState, str, int]]:
+    """Each state with its word and how many cameras are in it."""
+    count = Counter(row.state for row in rows)
+    return [(state, word, count[state]) for state, word in STATES.items()]
+
+
+def _sure_drift(estimate: EstimateRecord | None) -> Drift | None:
+    """The drift with what is sure enough to be said: beyond 2 sd, or found to drift."""
+    if estimate is None or not estimate.identifiable:
+        return None
+    drift, drifted = estimate.drift, estimate.drifted
+    known = {name: drift.of(name) for name in drift.identifiable}
+    sure = [name for name, (by, sd) in known.items() if name in drifted or abs(by) > 2 * sd]
+    return replace(drift, identifiable=tuple(sure))

@@ -1,1 +1,0 @@
-"""What pages, lists and metrics show of many things at once."""

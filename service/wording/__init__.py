@@ -1,0 +1,1 @@
+"""Words for people: reasons, states, alerts, moves, times, activity; out of values alone."""

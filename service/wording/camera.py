@@ -1,0 +1,208 @@
+"""A camera's state in words: the headline of its page, its line in the fleet, their flags."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from models.monitoring.verdict import Drift
+from models.reasons import Reason
+from service.enums import AlertKind, PoseState
+from service.reasons import ServiceCode
+from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.estimates import EstimateRecord
+from service.wording.alerts import KINDS
+from service.wording.moves import drift_words, moved_words, sure_words
+from service.wording.reasons import in_words
+from service.wording.times import Clock, duration
+
+STATES = {
+    PoseState.DRIFTING: "Moved",
+    PoseState.NO_DATA: "No people",
+    PoseState.LEARNING: "Learning",
+    PoseState.OK: "Steady",
+}
+# The alerts that a state speaks for; every other one is named.
+_SPOKEN_FOR = {
+    PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
+    PoseState.NO_DATA: (AlertKind.NO_DATA,),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraFacts:
+    """The facts that a headline is made of.
+
+    `alerts` fire, what needs a person most first. `learned` of `wanted` people make the reference,
+    which is `ready` or not. `silence` says why nobody was seen since `silent_since_s`; None where
+    people come.
+    """
+
+    state: PoseState
+    judged: bool
+    estimate: EstimateRecord | None
+    alerts: Sequence[AlertRecord]
+    answered_by: str | None
+    ready: bool
+    learned: int
+    wanted: int
+    silence: Sequence[Reason] | None
+    silent_since_s: float | None
+
+
+def headline(camera: CameraFacts, clock: Clock) -> str:
+    """Has it moved, how far, since when, how sure: in one or two sentences."""
+    if camera.silence is None or camera.silent_since_s is None:
+        return _status_words(camera, clock)
+    since = clock.when(clock.of(camera.silent_since_s))
+    quiet = f"No people since {since}: {in_words(camera.silence)}."
+    return f"{_status_words(camera, clock)} {quiet}"
+
+
+def _status_words(camera: CameraFacts, clock: Clock) -> str:
+    state, estimate = camera.state, camera.estimate
+    known = estimate is not None and bool(estimate.identifiable)
+    doubts = [alert for alert in camera.alerts if alert.kind in POSE_KINDS]
+    if state == PoseState.DRIFTING and not camera.judged:
+        words = _moved(camera, estimate, clock) if estimate and known else _alarmed(doubts)
+        return f"{words} That is what is known last: the next people will tell how it stands now."
+    if estimate is not None and camera.judged and estimate.drifted:
+        return _moved(camera, estimate, clock)
+    if doubts:  # of a reference, or about a move whose size is not identifiable
+        return _alarmed(doubts)
+    if state == PoseState.LEARNING or estimate is None or not camera.judged:
+        return _waiting(camera)
+    if state == PoseState.NO_DATA:
+        return "When it was last told, it stood where it should."
+    if estimate.drift_streak > 0 or estimate.suspected:
+        how = moved_words(estimate)
+        return f"It may have moved{how and ': it ' + how}. The next people will tell."
+    people = (
+        f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
+    )
+    return f"Standing where it should, as {people}{sure_words(estimate)}."
+
+
+def _alarmed(doubts: Sequence[AlertRecord]) -> str:
+    return f"It may not stand where it should: {in_words(doubts[0].reasons)}."
+
+
+def _moved(camera: CameraFacts, estimate: EstimateRecord, clock: Clock) -> str:
+    since = ""
+    if estimate.drift_since is not None:
+        since = f" about {clock.when(estimate.drift_since)}"
+    if any(alert.kind == AlertKind.CLOCK for alert in camera.alerts):
+        how = moved_words(estimate)
+        return (
+            f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
+            f"frame rate looks like that{how and ', or the camera ' + how}{sure_words(estimate)}."
+        )
+    words = moved_words(estimate, since)
+    if not words or not set(estimate.drifted) & set(estimate.identifiable):
+        return f"The camera moved{since}; the newest people cannot tell how far."
+    return f"The camera {words}{sure_words(estimate)}."
+
+
+def _waiting(camera: CameraFacts) -> str:
+    if camera.state in (PoseState.OK, PoseState.NO_DATA):
+        who = camera.answered_by or "somebody"
+        return f"Where it should be, as {who} said. The next people will tell."
+    if not camera.ready:
+        return f"Learning: {camera.learned} of {camera.wanted} people."
+    return "Waiting for people: too few have come to tell how it stands."
+
+
+def fleet_line(
+    state: PoseState,
+    kinds: Sequence[AlertKind],
+    drift: Drift | None,
+    *,
+    judged: bool,
+    learned: int | None,
+    wanted: int,
+    silent_s: float,
+) -> str:
+    """A camera's doings, in one line of the fleet.
+
+    Args:
+        state: of the camera.
+        kinds: of the alerts that fire, what needs a person most first.
+        drift: as far as it is sure.
+        judged: whether the drift is of now, and not only the last that is known.
+        learned: people of the reference; None where it is ready.
+        wanted: as many make a reference.
+        silent_s: since the newest track ended.
+    """
+    if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
+        return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+    if kinds and kinds[0] == AlertKind.STALE:
+        return "its estimate is not being made: what was seen last may be long ago"
+    if state == PoseState.LEARNING and learned is not None:
+        return f"learning what is usual: {learned} of {wanted} people"
+    if state == PoseState.LEARNING:
+        return "waiting for people to tell how it stands now"
+    if state == PoseState.NO_DATA:
+        return f"no people seen for {duration(silent_s)}, longer than is usual here"
+    if state == PoseState.OK:
+        if judged:
+            return "standing still"
+        return "where it should be, as somebody said; the next people will tell"
+    moved = drift_words(drift)
+    if moved and not judged:
+        return f"{moved} when it was last told"
+    return moved or "moved, but by how much is not told yet"
+
+
+def page_flags(
+    lacks: Sequence[Reason], attended_until: datetime | None, clock: Clock
+) -> Sequence[str]:
+    """Flags of a camera's page, beside those of its alerts."""
+    found = [
+        f"Without the {str(lack.values['part']).replace('_', ' ')}"
+        for lack in lacks
+        if lack.code == ServiceCode.WITHOUT_PART
+    ]
+    if attended_until is not None:
+        found.append(f"Maintenance until {clock.when(attended_until)}")
+    return found
+
+
+def page_alert_flags(alert: AlertRecord, group: AlertRecord | None, clock: Clock) -> Sequence[str]:
+    """Flags of a camera's page, of an alert that fires."""
+    found = []
+    if alert.acknowledged_at is not None:
+        found.append(f"Acknowledged by {alert.acknowledged_by}")
+    if alert.silenced_until is not None and alert.is_silenced(clock.now):
+        found.append(f"Silenced until {clock.when(alert.silenced_until)}")
+    if group is not None:
+        cameras = len(group.camera_ids or [])
+        found.append(f"One of {cameras} cameras of {alert.track_source} at once")
+    return found
+
+
+def fleet_flags(
+    state: PoseState, alerts: Sequence[AlertRecord], attended_until: datetime | None, now: datetime
+) -> tuple[str, ...]:
+    """The flags of a camera's line in the fleet, of what needs a person most first."""
+    flags = []
+    if attended_until is not None:
+        flags.append(f"maintenance for {duration((attended_until - now).total_seconds())} more")
+    if alerts:
+        flags += fleet_alert_flags(alerts[0], now)
+    elif state == PoseState.DRIFTING and attended_until is None:
+        flags.append("no alert is open")
+    for alert in alerts:
+        if alert.kind not in _SPOKEN_FOR.get(state, ()):
+            flags.append(f"alert: {KINDS[alert.kind].lower()}")
+    return tuple(flags)
+
+
+def fleet_alert_flags(alert: AlertRecord, now: datetime) -> tuple[str, ...]:
+    """The flags of an alert in the fleet."""
+    flags = []
+    if alert.acknowledged_by is not None:
+        flags.append(f"seen by {alert.acknowledged_by}")
+    if alert.silenced_until is not None and alert.is_silenced(now):
+        flags.append(f"silenced for {duration((alert.silenced_until - now).total_seconds())} more")
+    if alert.group_id is not None:
+        flags.append("with its tracker")
+    return tuple(flags)

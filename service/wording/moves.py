@@ -1,0 +1,179 @@
+"""Moves of cameras in words: how far one turned or rose, how sure that is, what it means."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from models.geometry.misplacement import Misplacement
+from models.geometry.plane_parameters import ANGLES
+from models.geometry.pose import CameraPose
+from models.geometry.pose_parameters import PoseParameters
+from models.monitoring.verdict import Drift
+from models.quantiles import Z90
+from service.store.estimates import EstimateRecord
+
+# Operators say pan. Height is told apart.
+NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
+_SAYS_DEG, _SAYS_M = 0.1, 0.05  # less is not worth a word
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterRow:
+    """One pose parameter as text; `served`, `drift`, `sure` are empty if not identifiable."""
+
+    name: str
+    prior: str
+    served: str = ""
+    drift: str = ""
+    sure: str = ""
+
+
+def parameter_rows(
+    prior: CameraPose, served: CameraPose, estimate: EstimateRecord | None
+) -> tuple[ParameterRow, ...]:
+    """Pan, tilt, roll and height: prior, served, the drift, and half its 90 % interval."""
+    rows = []
+    for name, words in NAMES.items():
+        poses = PoseParameters.of_pose(prior), PoseParameters.of_pose(served)
+        before, after = (_shown(pose.of(name), name) for pose in poses)
+        unit, digits = (" m", 2) if name == "height" else ("°", 1)
+        row = {"name": words.capitalize(), "prior": _minus(f"{before:.{digits}f}") + unit}
+        if estimate is not None and name in estimate.identifiable:
+            drift, sd = (_shown(value, name) for value in estimate.drift.of(name))
+            row |= {
+                "served": _minus(f"{after:.{digits}f}") + unit,
+                "drift": f"{signed(drift, digits)}{unit}",
+                "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
+            }
+        rows.append(ParameterRow(**row))
+    return tuple(rows)
+
+
+def moved_words(estimate: EstimateRecord, since: str = "") -> str:
+    """The move of a camera after its name: "turned 5.1° (tilt +5.1°) and is 0.24 m higher"."""
+    turn, height = _turn_words(estimate), _height_words(estimate)
+    if height and estimate.drifted == ["height"]:
+        return f"is {height} than it should be{since and ', since'}{since}"
+    parts = [f"{turn}{since}" if turn else "", f"is {height}" if height else ""]
+    return " and ".join(part for part in parts if part)
+
+
+def sure_words(estimate: EstimateRecord) -> str:
+    """Half the 90 % intervals, to follow a sentence: "; sure to ±0.3° and ±0.05 m"."""
+    parts = []
+    half = angle_half_width_deg(estimate)
+    if half is not None:
+        parts.append(f"±{max(half, 0.1):.1f}°")
+    tells_height = half is None or abs(estimate.drift_by.height_m) >= _least_height_m(estimate)
+    if "height" in estimate.identifiable and tells_height:
+        parts.append(f"±{max(Z90 * estimate.pose_sd.height_m, 0.01):.2f} m")
+    return f"; sure to {' and '.join(parts)}" if parts else ""
+
+
+def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
+    """Half the 90 % interval of the angle that a camera has turned by; None where none is known."""
+    known = [name for name in ANGLES if name in estimate.identifiable]
+    if not known:
+        return None
+    drifts = [math.degrees(estimate.drift_by.of(name)) for name in known]
+    sds = [math.degrees(estimate.pose_sd.of(name)) for name in known]
+    length = math.hypot(*drifts)
+    if length < max(sds):  # without a direction, the widest
+        return Z90 * max(sds)
+    # By the direction of the turn: the angle is the length of the three drifts, nearly.
+    return Z90 * math.hypot(*(d * sd for d, sd in zip(drifts, sds, strict=True))) / length
+
+
+def drift_words(drift: Drift | None) -> str:
+    """A drift in a line: "turned 2.1° (tilt +1.9°, pan −0.8°), 12 cm lower"."""
+    if drift is None:
+        return ""
+    parts = []
+    named = ", ".join(
+        f"{NAMES[name]} {_minus(f'{math.degrees(drift.by.of(name)):+.1f}')}°"
+        for name in ANGLES
+        if name in drift.identifiable and drift.by.of(name)
+    )
+    if named:
+        parts.append(f"turned {math.degrees(abs(drift.angle_rad)):.1f}° ({named})")
+    if "height" in drift.identifiable and abs(drift.by.height_m) >= 0.005:
+        parts.append(height_change(drift.by.height_m))
+    return ", ".join(parts)
+
+
+def height_change(metres: float) -> str:
+    """A change of height: "12 cm lower", "1.3 m higher"."""
+    way = "higher" if metres > 0 else "lower"
+    if abs(metres) < 0.995:
+        return f"{abs(metres) * 100:.0f} cm {way}"
+    return f"{abs(metres):.1f} m {way}"
+
+
+def misplaced_words(each: Sequence[Misplacement]) -> str:
+    """A move's meaning on the ground: "A person at 10 m is now placed 1.7 m too far, …"."""
+    if not each:
+        return ""
+    if all(one.off_m is not None and one.off_m < _SAYS_M for one in each):
+        far = each[-1].distance_m
+        return f"By the prior pose, people up to {far:.0f} m away are placed where they stand."
+    first, *others = each
+    parts = [f"A person at {first.distance_m:.0f} m is now placed {_off_words(first)}"]
+    parts += [f"one at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
+    return f"{', '.join(parts)}."
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign, a real minus, and never a minus nought."""
+    text = f"{value:+.{digits}f}"
+    return _minus("0" + text[2:] if float(text) == 0 else text)
+
+
+def _turn_words(estimate: EstimateRecord) -> str:
+    """A turn: "turned 5.1° (pan +4.9°, tilt −1.2°)"; empty if no angle is known.
+
+    What is within its own 90 % interval is not named.
+    """
+    angles = [name for name in ("heading", "tilt", "roll") if name in estimate.identifiable]
+    if not angles:
+        return ""
+    named = [
+        f"{NAMES[name]} {signed(math.degrees(estimate.drift_by.of(name)), 1)}°"
+        for name in angles
+        if abs(math.degrees(estimate.drift_by.of(name))) >= _least_angle_deg(estimate, name)
+    ]
+    detail = f" ({', '.join(named)})" if named else ""
+    return f"turned {math.degrees(estimate.drift_angle_rad):.1f}°{detail}"
+
+
+def _height_words(estimate: EstimateRecord) -> str:
+    """A change of height: "0.24 m higher"; empty where unidentifiable."""
+    by_m = estimate.drift_by.height_m
+    if "height" not in estimate.identifiable or abs(by_m) < _least_height_m(estimate):
+        return ""
+    return f"{abs(by_m):.2f} m {'higher' if by_m > 0 else 'lower'}"
+
+
+def _least_angle_deg(estimate: EstimateRecord, name: str) -> float:
+    return max(Z90 * math.degrees(estimate.pose_sd.of(name)), _SAYS_DEG)
+
+
+def _least_height_m(estimate: EstimateRecord) -> float:
+    return max(Z90 * estimate.pose_sd.height_m, _SAYS_M)
+
+
+def _off_words(one: Misplacement) -> str:
+    if one.off_m is None or one.farther_m is None:
+        return "above the horizon, which is nowhere"
+    way = ""
+    # Mostly along the line of sight; else to a side.
+    if abs(one.farther_m) > 0.7 * one.off_m and one.off_m >= _SAYS_M:
+        way = " too far" if one.farther_m > 0 else " too near"
+    return f"{one.off_m:.1f} m{way or ' off'}"
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _shown(value: float, name: str) -> float:
+    return value if name == "height" else math.degrees(value)

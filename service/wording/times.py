@@ -1,0 +1,75 @@
+"""Times, ages and durations in words."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta, tzinfo
+
+from babel.dates import format_timedelta
+
+_AT_LEAST = 1.5  # of a unit, to say a length of time in it: "90 minutes", then "2 hours"
+_JUST_NOW = timedelta(seconds=10), timedelta(minutes=1)  # before and after now
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clock:
+    """Now, by the cameras' own clock: what templates say times with."""
+
+    now: datetime
+    zone: tzinfo
+
+    def when(self, at: datetime) -> str:
+        """A time in words."""
+        return when(at, self.now, self.zone)
+
+    def in_full(self, at: datetime) -> str:
+        """A time with its date and zone."""
+        return f"{at.astimezone(self.zone):%Y-%m-%d %H:%M %Z}"
+
+    def ago(self, at: datetime) -> str:
+        """The age of a time in words."""
+        return ago(at, self.now)
+
+    def of(self, seconds: float) -> datetime:
+        """The time of seconds since the epoch."""
+        return from_seconds(seconds)
+
+
+def when(at: datetime, now: datetime, zone: tzinfo) -> str:
+    """A time as one would say it: "14:32", "14:32 yesterday", "14:32 on Monday", "3 Mar, 14:32"."""
+    local, today = at.astimezone(zone), now.astimezone(zone).date()
+    clock = f"{local:%H:%M}"
+    days = (today - local.date()).days
+    if days == 0:
+        return clock
+    if days == 1:
+        return f"{clock} yesterday"
+    if days == -1:
+        return f"{clock} tomorrow"
+    if 1 < days < 7:
+        return f"{clock} on {local:%A}"
+    year = "" if local.year == today.year else f" {local.year}"
+    return f"{local.day} {local:%b}{year}, {clock}"
+
+
+def next_morning(now: datetime, zone: tzinfo) -> datetime:
+    """Eight o'clock of tomorrow, by the cameras' clock."""
+    local = now.astimezone(zone) + timedelta(days=1)
+    return local.replace(hour=8, minute=0, second=0, microsecond=0)
+
+
+def duration(seconds: float) -> str:
+    """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
+    return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale="en")
+
+
+def ago(at: datetime, now: datetime) -> str:
+    """An age, or in how long a time comes; `times.js` says the same as time goes on."""
+    if now - _JUST_NOW[0] < at <= now + _JUST_NOW[1]:
+        return "just now"
+    # A whole number, since of a timedelta it would take the second before.
+    seconds = round((at - now).total_seconds())
+    return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale="en")
+
+
+def from_seconds(at_s: float) -> datetime:
+    """The time of seconds since the epoch, as tracks have it."""
+    return datetime.fromtimestamp(at_s, UTC)
