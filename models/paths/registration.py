@@ -164,16 +164,14 @@ def distinct(peaks: Sequence[Peak]) -> list[Peak]:
     return kept
 
 
-def settled(
-    walkers: Walkers,
-    site: Site,
-    belief: Belief,
-    peak: Peak,
+def refined(
+    posterior: Posterior,
+    candidate: Array,
     shape: Shape,
     precision: Array,
     bias: Array,
     *,
-    roughly: bool = False,
+    warm: bool = False,
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
@@ -181,25 +179,23 @@ def settled(
     sure of them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
 
     Args:
-        walkers: who is registered.
-        site: to what.
-        belief: what else is known.
-        peak: where to begin.
-        shape: what the map says there.
-        precision: what the map's part knows (4, 4).
+        posterior: of walkers.
+        candidate: its peak (4,).
+        shape: of the map's log likelihood there.
+        precision: of the map's part (4, 4).
         bias: a person's mean score at the truth (4,).
-        roughly: whether it ends once hardly anything moves.
+        warm: from almost the same tracks' pose, where it ends once hardly anything moves.
     """
+    belief = posterior.belief
     known = precision + belief.precision
     covariance = np.linalg.inv(known)
     gain = precision @ np.linalg.inv(shape.curvature)
-    candidate = peak.candidate
     for _ in range(_SETTLING_ROUNDS):
-        scores = site.scores(walkers, candidate, candidate)
+        scores = posterior.site.scores(posterior.walkers, candidate, candidate)
         slope = scores.sum(axis=0) - bias * scores.any(axis=1).sum()
         move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
         candidate = candidate + move * min(1.0, _LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
-        if roughly and float(move @ known @ move) < _ROUGHLY**2:
+        if warm and float(move @ known @ move) < _ROUGHLY**2:
             break
     return candidate, np.asarray(covariance)
 

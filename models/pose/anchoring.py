@@ -16,12 +16,11 @@ from models.geometry.rotation import Array
 from models.monitoring.creep_log import DAY_S, CreepLog, add_day, begin_log
 from models.monitoring.creep_posterior import believed_turns
 from models.monitoring.group_scores import score_groups
+from models.pose.config import NO_TURN_RAD
 from models.pose.site import CameraSite
 from models.simulation.pose_offset import Knock, knock_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
-
-_NOTHING_RAD = np.radians(0.02)
 
 
 def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:
@@ -73,7 +72,7 @@ def without_creep(
     turns = believed_turns(log, ended_s / DAY_S, from_s)
 
     def seen(track: Trajectory, turn: Array) -> Trajectory | None:
-        if np.abs(turn).max() < _NOTHING_RAD:
+        if np.abs(turn).max() < NO_TURN_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
         stood = Knock(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)

@@ -22,7 +22,7 @@ from models.pose import (
     observe_walks,
     read_alarm_chart,
 )
-from models.pose.fusion import FusedEstimate
+from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 from models.regression.averaging import (
     FEWEST_TRACKS,
@@ -101,7 +101,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     basis = basis_of(evidence, crept=crept, suspicious=suspicious)
     begin = begin_of(evidence.last, basis)
     found = estimate_pose(observed, site, judged if asked_enough(evidence) else None, begin)
-    lacks.take(found.lacks)
+    lacks.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, lacks)
     seen = evidence.tracks[found.first :]
@@ -121,7 +121,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         pieces=walks.reason,
         lacks=tuple(lacks.said),
-        last=kept_of(found.last, basis),
+        last=kept_of(found.warm_start, basis),
     )
 
 

@@ -10,8 +10,8 @@ from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
 from models.paths.turn_detection import moved_within
 from models.pose import estimate_pose, learn_site
-from models.pose.after_change import least_covariance
-from models.pose.change_search import posed
+from models.pose.change_confirmation import least_covariance
+from models.pose.change_search import pose_fit_of
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -67,7 +67,7 @@ def test_a_pose_after_a_change_is_less_sure_than_one_of_as_many_people(site, lan
     tracks = window((lanes, PRIOR, 80), (lanes, PANNED, 40), seed=7)
     found = estimate_pose(tracks, site)
     assert found.change_idx is not None
-    alone = posed(of_tracks(tracks, np.arange(found.first, tracks.tracks)), site)
+    alone = pose_fit_of(of_tracks(tracks, np.arange(found.first, tracks.tracks)), site)
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
     more = np.linalg.eigvalsh(found.fused.covariance - alone.fused.covariance)
     assert more.min() > -1e-12

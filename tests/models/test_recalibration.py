@@ -21,7 +21,7 @@ from models.pose import (
     read_alarm_chart,
 )
 from models.pose.change_point import find_change
-from models.pose.fusion import by_speeds_alone
+from models.pose.pose_fit import by_speeds_alone
 from models.simulation.simulated_site import SiteConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -71,7 +71,7 @@ def test_the_pose_is_from_the_change_on(site, window, tracks):
     assert alone.change_idx is None
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
     assert found.fused.registered
-    assert not found.lacks
+    assert not found.failures
 
 
 def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
@@ -166,7 +166,7 @@ def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, tracks, fails_
         flow = replace(site.flow, bias=np.zeros(3))
     spoilt = replace(site, flow=flow)
     found = estimate_pose(asked, spoilt)
-    (lack,) = found.lacks
+    (lack,) = found.failures
     assert lack.part == "flow_map"
     assert isinstance(lack.error, ValueError)
     assert not found.fused.registered

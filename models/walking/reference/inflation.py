@@ -12,7 +12,7 @@ from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.tracks.observations import Observations, of_tracks
-from models.walking.fit import fit_pose
+from models.walking.fit import FitStart, fit_pose
 from models.walking.speed_reference import (
     SpeedReference,
     channels_of,
@@ -49,7 +49,8 @@ def pose_variance_inflation(
             if min(known.walkers, unknown.walkers) < 2:
                 continue
             part = learned_at(known, prior, blank, 0)
-            fit = fit_pose(channels_of(unknown, part, prior), at, pose_prior(prior))
+            channels = channels_of(unknown, part, prior)
+            fit = fit_pose(channels, FitStart(candidate=at), pose_prior(prior))
             error = fit.candidate - at - offset
             squared = float(error @ np.linalg.solve(fit.covariance, error)) / 3
             ratios.append(min(squared, _LARGEST_RATIO))

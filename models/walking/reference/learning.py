@@ -13,7 +13,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations
-from models.walking.fit import assumed, fit_pose
+from models.walking.fit import FitStart, assumed, fit_pose
 from models.walking.heads.reference import learn_verticals
 from models.walking.reference.assumed import assumed_speed_reference
 from models.walking.reference.doubt import doubt_of
@@ -45,10 +45,10 @@ def learn_speed_reference(
     blank = assumed_speed_reference(observations, prior, walk)
     blank = as_free_as_told(observations, prior, blank, seed)
     site = learned_at(observations, prior, blank, _SPREAD_ROUNDS)
-    whole = fit_pose(
-        channels_of(observations, site, prior), plane_parameters_of(prior), pose_prior(prior)
-    )
-    offset = whole.candidate - plane_parameters_of(prior)
+    at = plane_parameters_of(prior)
+    channels = channels_of(observations, site, prior)
+    whole = fit_pose(channels, FitStart(candidate=at), pose_prior(prior))
+    offset = whole.candidate - at
     inflation = pose_variance_inflation(observations, prior, blank, site, offset)
     kept, covariance = shrink_offset(offset, whole.covariance * inflation)
     site = replace(

@@ -51,7 +51,7 @@ def test_a_still_camera_has_no_change(known, pose):
 @pytest.mark.parametrize("after", [SLIGHT, KNOCKED, PRIOR])
 def test_a_look_from_the_pose_of_all_finds_the_same(known, after):
     tracks = window((PRIOR, 60), (after, 60))
-    near = joint_estimate(tracks, PRIOR, known).near
+    near = joint_estimate(tracks, PRIOR, known).warm_start
     assert find_change(tracks, PRIOR, known, near) == find_change(tracks, PRIOR, known)
 
 

@@ -14,6 +14,7 @@ from models.paths.map.density_map import DIRECTIONS
 from models.paths.map.placement import place_steps
 from models.paths.reference import candidate_of, learn_flow
 from models.pose.fusion import fused_estimate
+from models.pose.site import CameraSite
 from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Steps
@@ -158,7 +159,11 @@ def test_a_turned_camera_is_told_with_its_heading(site):
     reference, speeds, after, still, _ = site
     for tracks, pose in ((after, TURNED), (still, PRIOR)):
         joint = joint_estimate(tracks, PRIOR, speeds)
-        fused = fused_estimate(tracks, LENS, PRIOR, joint, speeds, reference)
+        fused = fused_estimate(
+            tracks,
+            CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, flow=reference),
+            joint,
+        )
         assert fused.registered
         assert fused.identifiable == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
@@ -172,7 +177,11 @@ def test_few_people_make_no_map_and_no_registration(site):
     (few,) = tracks_of(3, (PRIOR, 8))
     assert learn_flow(seen(few), LENS, PRIOR, 0) is None
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
-    fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, speeds, reference)
+    fused = fused_estimate(
+        seen(few[:3]),
+        CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, flow=reference),
+        joint,
+    )
     assert not fused.registered
     assert "heading" not in fused.identifiable
     assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])

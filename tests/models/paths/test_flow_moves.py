@@ -11,6 +11,7 @@ from models.paths.path_test import UsualFit
 from models.paths.reference import candidate_of, learn_flow
 from models.paths.turn_detection import StillScores, learn_scores, moved_within
 from models.pose.fusion import fused_estimate
+from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
 from models.simulation.simulated_site import (
     Lane,
@@ -33,6 +34,10 @@ CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 
 def feet(tracks):
     return observe([replace(track, top_v=None) for track in tracks], LENS)
+
+
+def camera_site(speeds, flow):
+    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, flow=flow)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +102,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
-    fused = fused_estimate(changed, LENS, PRIOR, joint, speeds, flow)
+    fused = fused_estimate(changed, camera_site(speeds, flow), joint)
     assert fused.reason == Reason(code=TracksCode.PATHS_CHANGED)
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
@@ -114,7 +119,7 @@ def test_times_that_are_wrong_change_no_paths(lanes, known, flow):
         for track in walk_site(LENS, PRIOR, lanes, CONFIG, 120, np.random.default_rng(12))
     ]
     joint = joint_estimate(feet(slow), PRIOR, speeds)
-    fused = fused_estimate(feet(slow), LENS, PRIOR, joint, speeds, flow)
+    fused = fused_estimate(feet(slow), camera_site(speeds, flow), joint)
     assert joint.values[2] == pytest.approx(math.log(1.5 * PRIOR.height_m), abs=0.15)
     assert fused.reason is None
     np.testing.assert_allclose(fused.covariance[:3, :3], joint.covariance)
@@ -182,7 +187,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
-    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), speeds, flow)
+    fused = fused_estimate(after, camera_site(speeds, flow), joint_estimate(after, PRIOR, speeds))
     assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
