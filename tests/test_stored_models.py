@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import (
     WalkConfig,
     estimate_pose,
@@ -27,7 +27,7 @@ GOLDEN = Path(__file__).parent / "golden" / "stored_models"
 FORMATS = {
     "speed_reference": (reference_from_bytes, reference_to_bytes),
     "speed_reference_without_boxes": (reference_from_bytes, reference_to_bytes),
-    "paths": (flow_from_bytes, flow_to_bytes),
+    "paths": (paths_from_bytes, paths_to_bytes),
     "chart": (chart_from_bytes, chart_to_bytes),
     "warm_start": (warm_start_from_bytes, warm_start_to_bytes),
 }
@@ -38,14 +38,14 @@ def made():
     boxed, bare = (_observed(boxes=boxes) for boxes in (True, False))
     site = learn_site(boxed, LENS, PRIOR)
     last = estimate_pose(boxed, site).warm_start
-    assert site.flow is not None
+    assert site.paths is not None
     assert site.chart is not None
     assert last is not None
     without_boxes = learn_speed_reference(bare, PRIOR, WalkConfig(), 0)
     return {
         "speed_reference": reference_to_bytes(site.speed_reference),
         "speed_reference_without_boxes": reference_to_bytes(without_boxes),
-        "paths": flow_to_bytes(site.flow),
+        "paths": paths_to_bytes(site.paths),
         "chart": chart_to_bytes(site.chart),
         "warm_start": warm_start_to_bytes(last),
     }

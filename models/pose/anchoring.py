@@ -3,7 +3,7 @@
 A site's `first` is what it was learned as with its reference: it stays until a person has a new
 one made. The map that estimates use grows, by habits alone: what its camera is believed to have
 crept by is taken out of the tracks that it grows by. What is left in it by mistake moves nothing
-of the first, and so the creep is told (`models.monitoring.creep`).
+of the first, and so the creep is found (`models.monitoring.creep`).
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from models.tracks.trajectory import Trajectory
 
 def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:
     """The log of a site as it was first learned, of tracks up to a time; None without a chart."""
-    if first.flow is None or first.chart is None:
+    if first.paths is None or first.chart is None:
         return None
     return begin_log(first.chart, to_s)
 
@@ -41,9 +41,9 @@ def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLo
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    if first.flow is None or first.chart is None or not tracks.tracks:
+    if first.paths is None or first.chart is None or not tracks.tracks:
         return log
-    usual = first.usual(first.flow, first.chart)
+    usual = first.usual(first.paths, first.chart)
     day_idx = np.floor(tracks.ended_s / DAY_S).astype(np.int64)
     # Each day by itself, so that it matters not which days were at hand together.
     for day in np.setdiff1d(day_idx, log.day_idx):

@@ -7,15 +7,8 @@ import numpy as np
 from models.geometry.plane_parameters import PLANE_PARAMETERS, identifiable_of
 from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
-from models.paths.reference import FlowReference
-from models.pose.config import (
-    BETTER_VIEW,
-    GROUPS_OF_A_COVARIANCE,
-    HABITS,
-    HEADING_SD,
-    MOVED_BY_CHANCE,
-    MOVED_BY_HABIT,
-)
+from models.paths.reference import PathReference
+from models.pose import config
 from models.pose.pose_fit import FusedEstimate
 from models.quantiles import chi_squared_above, f_above
 from models.walking.speed_reference import SpeedReference
@@ -24,32 +17,34 @@ from models.walking.speed_reference import SpeedReference
 def moved_beyond_doubt(
     before: FusedEstimate, groups_before: int, after: FusedEstimate, groups_after: int
 ) -> bool:
-    """Whether a camera has moved from one estimate to the other.
+    """True if a camera has moved from one estimate to the other.
 
     Neither chance may have made them so different nor, whoever walked, people's habits. Of few
     groups a covariance is not well known, and chance goes farther. A heading that is not
     identifiable counts for as little as is known of it. There must have been a pose to move from,
     and what has moved the farthest by its standard deviation must be identifiable where it is now:
-    the rest may be left open by the few who came since, as the prior's, and is better so than told
-    by those of before.
+    the rest may be left open by the few who came since, as the prior's, and is better so than by
+    those of before.
 
     Source: Hotelling 1931, T squared, by the freedom of the smaller part; with habits, whose
     variance is given, a chi square.
     """
     groups = min(groups_before, groups_after)
-    if groups < GROUPS_OF_A_COVARIANCE or not set(PLANE_PARAMETERS) <= set(before.identifiable):
+    posed = set(PLANE_PARAMETERS) <= set(before.identifiable)
+    if groups < config.GROUPS_OF_A_COVARIANCE or not posed:
         return False
     offset = after.values - before.values
     chance = before.covariance + after.covariance
-    habits = chance + 2 * np.diag(HABITS)
+    habits = chance + 2 * np.diag(config.HABITS)
     farthest = PARAMETERS[int(np.argmax(offset**2 / np.diag(habits)))]
     if farthest not in set(before.identifiable) & set(after.identifiable):
         return False
     parameters, freedom = len(PARAMETERS), groups - len(PARAMETERS)
-    limit = parameters * (groups - 1) / freedom * f_above(MOVED_BY_CHANCE, parameters, freedom)
+    highest = f_above(config.MOVED_BY_CHANCE, parameters, freedom)
+    limit = parameters * (groups - 1) / freedom * highest
     beyond_chance = float(offset @ np.linalg.solve(chance, offset)) > limit
     beyond_habit = float(offset @ np.linalg.solve(habits, offset)) > chi_squared_above(
-        MOVED_BY_HABIT, parameters
+        config.MOVED_BY_HABIT, parameters
     )
     return beyond_chance and beyond_habit
 
@@ -59,7 +54,7 @@ def widened(
     after: FusedEstimate,
     walking_groups: int,
     speed_reference: SpeedReference,
-    flow: FlowReference | None,
+    paths: PathReference | None,
 ) -> FusedEstimate:
     """The estimate after a change with the covariance that it deserves.
 
@@ -72,29 +67,29 @@ def widened(
         after: of those after it.
         walking_groups: that walk after it.
         speed_reference: how people walk at the site.
-        flow: where they do, if that is known.
+        paths: where they do, if that is known.
     """
     offset = (after.values - before.values) / max(walking_groups, 1)
-    floor = least_covariance(walking_groups, speed_reference, flow)
+    floor = least_covariance(walking_groups, speed_reference, paths)
     covariance = _at_least(after.covariance + np.outer(offset, offset), floor)
-    known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
+    determined = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return replace(
         after,
         covariance=covariance,
-        identifiable=tuple(name for name in after.identifiable if name in known),
+        identifiable=tuple(name for name in after.identifiable if name in determined),
     )
 
 
 def least_covariance(
-    walking_groups: int, speed_reference: SpeedReference, flow: FlowReference | None
+    walking_groups: int, speed_reference: SpeedReference, paths: PathReference | None
 ) -> Array:
     """The covariance (4, 4) that none of so many groups is below, by the reference's own."""
-    known = np.diag([0.0, 0.0, 0.0, HEADING_SD**-2])
-    known[:3, :3] = speed_reference.information_of_a_track * walking_groups
-    if flow is not None:
-        known = known + flow.still.information_of_a_group * walking_groups
-    floor = 1e-9 * np.trace(known) * np.eye(4)  # what nobody tells is not below anything
-    return np.asarray(np.linalg.inv(known + floor)) / BETTER_VIEW**2
+    information = np.diag([0.0, 0.0, 0.0, config.HEADING_SD**-2])
+    information[:3, :3] = speed_reference.information_of_a_track * walking_groups
+    if paths is not None:
+        information = information + paths.still.information_of_a_group * walking_groups
+    floor = 1e-9 * np.trace(information) * np.eye(4)  # what nobody shows is not below anything
+    return np.asarray(np.linalg.inv(information + floor)) / config.BETTER_VIEW**2
 
 
 def _at_least(covariance: Array, floor: Array) -> Array:

@@ -95,7 +95,7 @@ def _likeliest(
 def suspicion(
     observations: Observations, prior: CameraPose, reference: SpeedReference, at: Array
 ) -> float:
-    """How much better two poses than one explain the speeds of tracks, in units of the limit.
+    """The gain of two poses over one in explaining the speeds of tracks, in units of the limit.
 
     By their scores at about the pose of all of them (3,), as `raw`: a likelihood ratio linear in a
     small move, and a tenth of the time of `find_change`. Large moves it makes smaller than they
@@ -149,7 +149,7 @@ def _ratios_at(channels: Sequence[Channel], candidate: Array) -> Array:
 
 
 def _best_cut(gain: Array) -> int:
-    """Where a gain (N,) is highest that leaves enough tracks on both sides."""
+    """The place of the highest gain (N,) that leaves enough tracks on both sides."""
     allowed = gain[FEWEST_BESIDE : len(gain) - FEWEST_BESIDE + 1]
     return FEWEST_BESIDE + int(np.argmax(allowed))
 

@@ -51,7 +51,7 @@ def search_change(
     """The newest change of the camera that is beyond doubt, and the pose from there on.
 
     Where people walk another way than before, or elsewhere, a window is suspected; it is cut
-    where the parts before and after, each asked alone, are of two poses beyond doubt.
+    where the parts before and after, each estimated alone, are of two poses beyond doubt.
 
     Args:
         tracks: of the window, in the order of their ends.
@@ -98,7 +98,7 @@ def _confirmed(tracks: Observations, site: CameraSite, change_idx: int) -> Chang
     groups = after.joint.walking_groups
     if not moved_beyond_doubt(before.fused, before.joint.walking_groups, after.fused, groups):
         return None
-    fused = widened(before.fused, after.fused, groups, site.speed_reference, site.flow)
+    fused = widened(before.fused, after.fused, groups, site.speed_reference, site.paths)
     return ChangeSearch(
         change_idx=change_idx, first=first, tracks=later, fit=replace(after, fused=fused)
     )
@@ -109,13 +109,15 @@ def _still_there(
 ) -> ChangeSearch | None:
     """The pose that is refined from a warm start; None where anything speaks against it."""
     found = pose_fit_of(tracks, site, warm_start)
-    if not warm_start.is_refined_by(found) or _turned(tracks, site, found.fused) is not None:
+    if not warm_start.is_refined_by(found):
+        return None
+    if _moved_by_places(tracks, site, found.fused) is not None:
         return None
     search, suspected = warm_start.search, _suspicion(tracks, site, found)
     if not warm_start.is_calm(suspected):
         around = found.fused.neighbourhood
         speeds = None if around is None or suspected > SUSPECTED else around.speeds
-        if _hurried(tracks, site, found.fused, speeds) is not None:
+        if _moved_by_speeds(tracks, site, found.fused, speeds) is not None:
             return None
         search = replace(search, suspicion=suspected)
     begin = warm_start_of(found, site.prior, search)
@@ -123,39 +125,39 @@ def _still_there(
 
 
 def _suspicion(tracks: Observations, site: CameraSite, whole: PoseFit) -> float:
-    """How much better two poses explain the speeds than one, where the camera looks by now."""
+    """The gain of two poses over one in explaining the speeds, where the camera looks by now."""
     turned = replace(site.prior, heading_rad=whole.fused.parameters.heading_rad)
     return suspicion(tracks, turned, site.speed_reference, whole.joint.raw)
 
 
 def _suspects(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
-    """Where the camera may have moved, by speeds and by places: the first tracks after it.
+    """The first tracks after a possible move of the camera, by speeds and by places.
 
-    Both are asked where the camera stands by all tracks together. Asked at the prior pose, a
+    Both look from where the camera stands by all tracks together. From the prior pose, a
     camera that moved long ago seems to move with every change of the crowd.
     """
-    for look in (_hurried, _turned):
+    for look in (_moved_by_speeds, _moved_by_places):
         moved = look(tracks, site, whole)
         if moved is not None:
             yield moved
 
 
-def _hurried(
+def _moved_by_speeds(
     tracks: Observations,
     site: CameraSite,
     whole: FusedEstimate,
     warm_start: FitStart | None = None,
 ) -> int | None:
-    """Where the camera may have moved by speeds; None where it did not."""
+    """The first track after a possible move by speeds; None where there is none."""
     turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
     found = find_change(tracks, turned, site.speed_reference, warm_start)
     return None if found is None else found.track_idx
 
 
-def _turned(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
-    """Where the camera may have moved by places; None where it did not, or they are unknown."""
-    if site.flow is None:
+def _moved_by_places(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+    """The first track after a possible move by places; None where there is none, or no paths."""
+    if site.paths is None:
         return None
     at = whole.values
-    paths = site.flow.site(site.intrinsics)
-    return moved_within(walkers_of(tracks, at), paths, at, site.flow.still, SUSPECT_RATE)
+    paths = site.paths.model(site.intrinsics)
+    return moved_within(walkers_of(tracks, at), paths, at, site.paths.still, SUSPECT_RATE)

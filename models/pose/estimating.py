@@ -16,12 +16,10 @@ from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.estimate import JointEstimate, joint_estimate
 from models.walking.reference.assumed import FEWEST_WALKERS
 
-FLOW_MAP = "flow_map"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondLook:
-    """What a verdict goes by: its limits, and whether the camera is taken for moved by now."""
+    """The limits of a verdict, and whether the camera is taken for moved by now."""
 
     limits: DriftLimits
     drifting: bool
@@ -49,7 +47,7 @@ class PoseFinding:
 
     @property
     def drift(self) -> Drift:
-        """How far the camera is from its prior pose, with standard deviations."""
+        """The drift from the prior pose, with standard deviations."""
         return drift_of(self.fused, self.prior)
 
     @property
@@ -66,14 +64,14 @@ def estimate_pose(
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
-    What the flow map says may fail: the pose is by speeds alone then, and the failure is said. Of
+    The search by paths may fail: the pose is by speeds alone then, and the failure is named. Of
     a site that was not learned, all tracks count and the walking speed is assumed.
 
     Args:
         tracks: of the window, in the order of their ends.
         site: of the camera.
         second_look: what a verdict goes by, if there is to be one: where it is about to change, the
-            pose is asked for without the newest people, too. That takes as long again.
+            pose is estimated without the newest people, too. That takes as long again.
         warm_start: of the finding of almost the same tracks at the same site, the newest of them
             left out and some older ones: where nothing speaks against it, its pose is refined,
             which takes a quarter to a half of the time and comes to the same.
@@ -88,11 +86,11 @@ def estimate_pose(
         return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
     failures: list[PartialFailure] = []
     found = None
-    if site.flow is not None:
+    if site.paths is not None:
         search = partial(search_change, tracks, site, _at_site(warm_start, site))
-        found = unless_failed(failures, FLOW_MAP, search)
+        found = unless_failed(failures, "flow_map", search)
     if found is None:
-        site = replace(site, flow=None)
+        site = replace(site, paths=None)
         found = search_change(tracks, site, None if failures else _at_site(warm_start, site))
     fused = found.fit.fused
     earlier = None
@@ -114,18 +112,18 @@ def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None
     """The warm start, where it is of the same site; else None."""
     if warm_start is None or warm_start.prior != site.prior:
         return None
-    return warm_start if warm_start.registered == (site.flow is not None) else None
+    return warm_start if warm_start.registered == (site.paths is not None) else None
 
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
-    """How far an estimate is from the prior pose."""
+    """The drift of an estimate from the prior pose."""
     return drift_between(fused.parameters, fused.sd, fused.identifiable, prior)
 
 
 def _look_again(
     tracks: Observations, drift: Drift, second_look: SecondLook, site: CameraSite
 ) -> FusedEstimate | None:
-    """The pose without the newest people who walk; None where it is not asked for, or too few are.
+    """The pose without the newest people who walk; None where it is not needed, or too few do.
 
     A pose takes a second: only a verdict that is about to change needs it.
     """

@@ -9,16 +9,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.paths.path_test import loss
 from models.paths.registration import Belief, Peak, Posterior, distinct, register
-from models.pose.config import (
-    FAR_LOG_HEIGHT,
-    HEADING_SD,
-    HEADINGS,
-    LARGEST_LOG_HEIGHT,
-    ROUNDS,
-    SHARED,
-    UNLIKELY,
-    WARM_ROUNDS,
-)
+from models.pose import config
 from models.pose.site import CameraSite
 from models.pose.warm_start import WarmStart
 from models.tracks.observations import Observations
@@ -53,7 +44,7 @@ def belief_of(joint: JointEstimate, prior: CameraPose) -> Belief:
     """The Gaussian of the speeds, with that of a pose offset's heading."""
     precision = np.zeros((4, 4))
     precision[:3, :3] = np.linalg.inv(joint.covariance)
-    precision[3, 3] = HEADING_SD**-2.0
+    precision[3, 3] = config.HEADING_SD**-2.0
     return Belief(mean=np.append(joint.values, prior.heading_rad), precision=precision)
 
 
@@ -68,7 +59,7 @@ def find_modes(
 
     Args:
         posterior: of walkers, with the belief of the joint estimate.
-        tracks: of which the speeds are asked again.
+        tracks: whose speeds are fitted again.
         site: of the camera.
         joint: by speeds, the heading taken for the prior pose's.
         warm_start: whose modes alone are climbed from, where there is one.
@@ -77,7 +68,7 @@ def find_modes(
         begin = _from_afar(posterior, joint)
     else:
         modes = warm_start.fused.modes
-        begin = [(Peak(candidate=mode, value=-math.inf), WARM_ROUNDS) for mode in modes]
+        begin = [(Peak(candidate=mode, value=-math.inf), config.WARM_ROUNDS) for mode in modes]
     found = []
     for peak, rounds in begin:
         mode = Mode(peak=peak, posterior=posterior, speeds=joint, gain=0.0)
@@ -92,16 +83,16 @@ def find_modes(
 def _from_afar(posterior: Posterior, joint: JointEstimate) -> list[tuple[Peak, int]]:
     """The peaks of several headings and the poses by speeds, with their rounds of speeds.
 
-    How fast people walk is asked of the likely ones only.
+    Speeds are fitted again at the likely ones only.
     """
-    peaks = register(posterior, HEADINGS)
+    peaks = register(posterior, config.HEADINGS)
     best = peaks[0].value
-    begin = [(peak, ROUNDS if peak.value > best - UNLIKELY else 0) for peak in peaks]
+    begin = [(peak, config.ROUNDS if peak.value > best - config.UNLIKELY else 0) for peak in peaks]
     others = np.array([np.append(other, peaks[0].candidate[3]) for other in joint.others])
     if len(others):
         values = posterior.values(others).tolist()
         found = (Peak(candidate=c, value=v) for c, v in zip(others, values, strict=True))
-        begin.extend((peak, ROUNDS) for peak in found)
+        begin.extend((peak, config.ROUNDS) for peak in found)
     return begin
 
 
@@ -112,7 +103,7 @@ def _climbed(
     joint: JointEstimate,
     warm_start: WarmStart | None,
 ) -> Mode:
-    """The mode with the speeds asked at its heading, and the peak above it."""
+    """The mode with the speeds fitted at its heading, and the peak above it."""
     around = None if warm_start is None else warm_start.neighbourhood
     speeds = joint_at_heading(
         tracks,
@@ -133,22 +124,23 @@ def _climbed(
 
 def not_far_above(modes: list[Mode], log_height: float) -> list[Mode]:
     """Modes that are not twice or half as high as speeds say; all where there are no others."""
-    return [mode for mode in modes if abs(mode.candidate[2] - log_height) < FAR_LOG_HEIGHT] or modes
+    far = config.FAR_LOG_HEIGHT
+    return [mode for mode in modes if abs(mode.candidate[2] - log_height) < far] or modes
 
 
 def odds_of(modes: list[Mode]) -> Array:
-    """The odds of each mode against the first, by all it says or by known ground alone."""
+    """The odds of each mode against the first, by all it says or by seen ground alone."""
     best, odds = modes[0], [1.0]
-    walkers, paths = best.posterior.walkers, best.posterior.site
+    walkers, paths = best.posterior.walkers, best.posterior.paths
     for mode in modes[1:]:
         worse = max(loss(walkers, paths, best.candidate, mode.candidate), 0.0)
-        by_known = math.exp(-0.5 * worse**2 + min(mode.log_belief - best.log_belief, 0.0))
-        odds.append(max(math.exp(mode.peak.value - best.peak.value), by_known))
+        by_seen = math.exp(-0.5 * worse**2 + min(mode.log_belief - best.log_belief, 0.0))
+        odds.append(max(math.exp(mode.peak.value - best.peak.value), by_seen))
     return np.array(odds)
 
 
 def birge_ratio(belief: Belief, precision: Array, values: Array) -> float:
-    """How much farther apart speeds and places are than their covariances say: 1 or more.
+    """The ratio of how far apart speeds and places are to what their covariances say: 1 or more.
 
     Neither is trusted over the other: both are then less sure than they say.
 
@@ -158,7 +150,7 @@ def birge_ratio(belief: Belief, precision: Array, values: Array) -> float:
     squared = pull @ np.linalg.solve(belief.precision, pull) + pull @ np.linalg.solve(
         precision, pull
     )
-    return max(1.0, float(squared) / SHARED)
+    return max(1.0, float(squared) / config.SHARED)
 
 
 def covariance_between(peaks: list[Peak], odds: Array) -> Array:
@@ -171,14 +163,14 @@ def covariance_beyond_gaussian(mode: Mode, covariance: Array) -> Array:
     """The covariance (4, 4) that a posterior has which is flatter than at its peak.
 
     Looked at along the heading, the other parameters following as they do around the peak. Nothing
-    where that would take the camera to no height at all: so little is known then that nothing is
-    told.
+    where that would take the camera to no height at all: so little is known then that nothing
+    is added.
     """
     line = covariance[:, 3] / covariance[3, 3]
     sd = math.sqrt(covariance[3, 3])
     # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
     turns = sd * np.arange(-4.0, 5.0)
-    if abs(turns[-1] * line[2]) > LARGEST_LOG_HEIGHT:
+    if abs(turns[-1] * line[2]) > config.LARGEST_LOG_HEIGHT:
         return np.zeros_like(covariance)
     values = mode.posterior.values(mode.candidate + turns[:, None] * line)
     density = np.exp(values - values.max())

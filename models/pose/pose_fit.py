@@ -27,7 +27,7 @@ class PathNeighbourhood:
     extra_covariance: Array
 
     def is_narrow(self, covariance: Array) -> bool:
-        """Whether so little of a covariance (4, 4) was added that it need not be computed anew."""
+        """True if so little of a covariance (4, 4) was added that it need not be computed anew."""
         return float(self.extra_covariance[3, 3]) < NARROW * float(covariance[3, 3])
 
 
@@ -56,7 +56,7 @@ class FusedEstimate:
 
     @property
     def registered(self) -> bool:
-        """Whether the paths had a part."""
+        """True if the paths had a part."""
         return self.raw is not None
 
     @property
@@ -84,7 +84,7 @@ class PoseFit:
 
     @property
     def mean_path_fit(self) -> float:
-        """How well a walking group fits the paths, on average, in logs."""
+        """The average fit of a walking group to the paths, in logs."""
         return self.fused.path_fit / max(self.joint.walking_groups, 1)
 
 
@@ -94,17 +94,17 @@ def by_speeds_alone(
     """The joint estimate with the prior's heading, which speeds leave open.
 
     Where people were held against a map and do not fit it, as the `reason` says, they are not the
-    reference's people: how fast these walk where is known no better than at any other site.
+    reference's people: their speeds are known no better than at any other site.
     """
     covariance = np.zeros((4, 4))
     values, covariance[:3, :3] = joint.values, joint.covariance
     if reason is not None:
         values, covariance[:3, :3] = joint.beside_strangers()
     covariance[3, 3] = HEADING_SD**2
-    known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
+    determined = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return FusedEstimate(
         values=np.append(values, prior.heading_rad),
         covariance=covariance,
-        identifiable=tuple(name for name in joint.identifiable if name in known),
+        identifiable=tuple(name for name in joint.identifiable if name in determined),
         reason=reason,
     )

@@ -14,15 +14,7 @@ from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
-from models.pose.config import (
-    FARTHEST,
-    MORE_SUSPICION,
-    NEW,
-    SUSPICION,
-    WARM_TRACKS,
-    WIDER,
-    WORSE,
-)
+from models.pose import config
 from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, PoseFit
 from models.serialization import Format, flattened, pack, restored, unpack
 from models.tracks.observations import Observations
@@ -48,7 +40,7 @@ class FullSearch:
 
     @property
     def to_s(self) -> float:
-        """When the newest of its tracks ended."""
+        """The end of the newest of its tracks."""
         return float(self.ended_s[-1])
 
 
@@ -66,7 +58,7 @@ class RefinedPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WarmStart:
-    """Where the next estimate may begin: the pose of almost the same tracks at the same site.
+    """The start of a next estimate: the pose of almost the same tracks at the same site.
 
     `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
     the mixed model's fields there. `fused` is by places too, where they are `registered`: what they
@@ -93,31 +85,32 @@ class WarmStart:
         )
 
     def suits(self, tracks: Observations) -> bool:
-        """Whether tracks are so much the same that only its own modes are refined."""
+        """True if tracks are so much the same that only its own modes are refined."""
         # Late tracks are as new: a tracker may post yesterday's today.
         new = int((~np.isin(tracks.ended_s, self.search.ended_s)).sum())
         return (
-            tracks.tracks >= max(WARM_TRACKS, (1 - NEW) * self.search.ended_s.size)
-            and new <= NEW * tracks.tracks
+            tracks.tracks >= max(config.WARM_TRACKS, (1 - config.NEW) * self.search.ended_s.size)
+            and new <= config.NEW * tracks.tracks
         )
 
     def is_refined_by(self, found: PoseFit) -> bool:
-        """Whether a pose that was fitted from here is another version of the same."""
+        """True if a pose that was fitted from here is another version of the same."""
         joint, fused = found.joint, found.fused
+        worse = config.WORSE / max(joint.walking_groups, 1)
         return (
             joint.identifiable == PLANE_PARAMETERS
             and fused.identifiable == self.identifiable
             and fused.registered == self.registered
             and _code(fused) == self.reason_code
             and len(fused.modes) == len(self.fused.modes)
-            and found.mean_path_fit > self.search.path_fit - WORSE / max(joint.walking_groups, 1)
+            and found.mean_path_fit > self.search.path_fit - worse
             and _is_near(joint, self.joint, PLANE_PARAMETERS)
             and _is_near(fused, self.fused, self.identifiable)
         )
 
     def is_calm(self, suspicion: float) -> bool:
-        """Whether tracks are no more suspected of a change than those were that had none."""
-        return suspicion <= max(SUSPICION, MORE_SUSPICION * self.search.suspicion)
+        """True if tracks are no more suspected of a change than those were that had none."""
+        return suspicion <= max(config.SUSPICION, config.MORE_SUSPICION * self.search.suspicion)
 
 
 def warm_start_of(found: PoseFit, prior: CameraPose, search: FullSearch) -> WarmStart | None:
@@ -166,9 +159,9 @@ def _refined(found: JointEstimate | FusedEstimate) -> RefinedPose:
 def _is_near(
     found: JointEstimate | FusedEstimate, last: RefinedPose, names: tuple[str, ...]
 ) -> bool:
-    """Whether the named parameters are as before, and as sure."""
+    """True if the named parameters are as before, and as sure."""
     places = [PARAMETERS.index(name) for name in names]
     sd, last_sd = (np.sqrt(np.diag(each.covariance)[places]) for each in (found, last))
-    near = np.abs(found.values - last.values)[places] <= FARTHEST * np.minimum(sd, last_sd)
+    near = np.abs(found.values - last.values)[places] <= config.FARTHEST * np.minimum(sd, last_sd)
     ratio = sd / last_sd
-    return bool(near.all() and (ratio < WIDER).all() and (ratio > 1 / WIDER).all())
+    return bool(near.all() and (ratio < config.WIDER).all() and (ratio > 1 / config.WIDER).all())

@@ -12,7 +12,7 @@ from models.monitoring.chart_serialization import chart_from_bytes
 from models.monitoring.creep import SHARE
 from models.monitoring.creep_log import DAY_S
 from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import paths_from_bytes
 from models.pose import (
     CameraSite,
     Creep,
@@ -172,7 +172,7 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     Raises:
         CheckpointError: what is stored cannot be read.
     """
-    return replace(site, flow=flow_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
+    return replace(site, paths=paths_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
 
 
 def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:

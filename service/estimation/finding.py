@@ -9,7 +9,7 @@ import numpy as np
 from models.monitoring.chart import Reading
 from models.monitoring.chart_serialization import chart_from_bytes
 from models.monitoring.creep import SHARE
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import paths_from_bytes
 from models.pose import (
     AlarmRate,
     CameraSite,
@@ -135,14 +135,14 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
     speed_reference = reference_from_bytes(evidence.site)
     flow, chart = None, None
     if evidence.flow is not None:
-        flow = lacks.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+        flow = lacks.unless_failed("flow_map", partial(paths_from_bytes, evidence.flow))
     if flow is not None and evidence.chart is not None:
         chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
     return CameraSite(
         intrinsics=evidence.intrinsics,
         prior=evidence.prior,
         speed_reference=speed_reference,
-        flow=flow,
+        paths=flow,
         chart=chart,
     )
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from models.monitoring.chart_serialization import chart_to_bytes
-from models.paths.serialization import flow_to_bytes
+from models.paths.serialization import paths_to_bytes
 from models.pose import CameraSite
 
 
@@ -17,9 +17,9 @@ class LearnedPaths:
 
 def paths_of(site: CameraSite) -> LearnedPaths | None:
     """The map and the chart of a site; None where too few walking groups walk."""
-    if site.flow is None:
+    if site.paths is None:
         return None
     return LearnedPaths(
-        flow=flow_to_bytes(site.flow),
+        flow=paths_to_bytes(site.paths),
         chart=None if site.chart is None else chart_to_bytes(site.chart),
     )

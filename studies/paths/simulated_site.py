@@ -87,7 +87,7 @@ def learn_simulated_site(simulated: SimulatedSite, reference: Observations) -> L
         speed_tracks=SPEED_TRACKS,
         chart=False,
     )
-    if site.flow is None:
+    if site.paths is None:
         raise TooFewTrajectoriesError("tracks: 12 that walk are needed for a flow map")
     return LearnedSite(simulated=simulated, site=site)
 

@@ -12,7 +12,6 @@ from models.paths.registration import (
     Belief,
     Peak,
     Posterior,
-    curvature_of,
     refined,
     register,
     shape_at,
@@ -56,26 +55,26 @@ def served_answer(seen: Observations, site: CameraSite) -> Answer:
 
 def registration(learned: Learned) -> Answer:
     """The flow map alone, around the prior pose: nothing is known of speeds."""
-    case, reference = learned.case, learned.site.flow
+    case, reference = learned.case, learned.site.paths
     if reference is None:
         return nothing_identifiable(case)
     mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
     if walkers.walking_groups < _FEWEST:
         return nothing_identifiable(case)
-    site, variance_inflation = (
-        reference.site(case.intrinsics),
+    paths, variance_inflation = (
+        reference.model(case.intrinsics),
         reference.variance_inflation_for(walkers.people),
     )
     posterior = Posterior(
         walkers=walkers,
-        site=site,
+        paths=paths,
         belief=Belief(mean=mean, precision=_BROAD),
         variance_inflation=variance_inflation,
     )
     peaks = _peaks(posterior)
     best = peaks[0]
-    shape = shape_at(walkers, site, best.candidate)
+    shape = shape_at(walkers, paths, best.candidate)
     known = reference.precision(shape, walkers.people, best.candidate - mean)
     values, covariance = refined(posterior, best.candidate, shape, known, reference.bias)
     chances = np.exp([peak.value - best.value for peak in peaks])
@@ -103,7 +102,7 @@ def _peaks(posterior: Posterior) -> list[Peak]:
         around = replace(belief, mean=belief.mean + node)
         for peak in register(replace(posterior, belief=around), _HEADINGS):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            bent = curvature_of(posterior.walkers, posterior.site, peak.candidate)
+            bent = shape_at(posterior.walkers, posterior.paths, peak.candidate).curvature
             precision = bent / posterior.variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(precision, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):

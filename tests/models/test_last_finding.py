@@ -9,10 +9,10 @@ import pytest
 from models.errors import CheckpointError
 from models.geometry.pose import CameraPose
 from models.pose import (
+    config,
     estimate_pose,
     learn_site,
     observe,
-    warm_start,
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
@@ -130,10 +130,10 @@ def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     elsewhere = replace(last.fused, values=last.fused.values + [0.0, 0.02, 0.0, 0.0])
     assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
     assert came(near, replace(last, registered=False))  # by a site without a map
-    assert came(near, replace(last, said="flow_changed"))
+    assert came(near, replace(last, reason_code="flow_changed"))
 
 
-def test_a_last_pose_that_was_stored_is_the_same_start(site, people):
+def test_a_warm_start_that_was_stored_is_the_same_start(site, people):
     every = observe(people, LENS, PRIOR)
     last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).warm_start
     data = warm_start_to_bytes(last)
@@ -143,7 +143,7 @@ def test_a_last_pose_that_was_stored_is_the_same_start(site, people):
     near = of_tracks(every, np.arange(10, WINDOW + 10))
     first, second = (estimate_pose(near, site, warm_start=begin) for begin in (last, stored))
     assert second.pose == first.pose
-    assert second.last.search.to_s == last.search.to_s  # no other poses were tried
+    assert second.warm_start.search.to_s == last.search.to_s  # no other poses were tried
     with pytest.raises(CheckpointError, match="warm_start"):
         warm_start_from_bytes(data[:-9])
 
@@ -170,7 +170,7 @@ def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, peo
 @pytest.mark.parametrize("knock", [None, LARGE])
 def test_recorded_people_come_to_the_same(monkeypatch, knock):
     """The scene with the most people: as many as a window is refined with are in none of them."""
-    monkeypatch.setattr(warm_start, "WARM_TRACKS", 100)
+    monkeypatch.setattr(config, "WARM_TRACKS", 100)
     scene = load_recording(SCENES / "wildtrack_c6")[0]
     tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
     lens, pose, half = scene.intrinsics, scene.true_pose, len(tracks) // 2

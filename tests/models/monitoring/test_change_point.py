@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from models.pose.change_point import FEWEST_BESIDE, find_change
+from models.pose.change_point import find_change
+from models.pose.config import FEWEST_BESIDE
 from models.simulation.pose_offset import Knock
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks

@@ -8,7 +8,7 @@ import pytest
 
 from models.paths.likelihood import walkers_of
 from models.paths.path_test import UsualFit
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.paths.turn_detection import StillScores, learn_scores, moved_within
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
@@ -37,7 +37,7 @@ def feet(tracks):
 
 
 def camera_site(speeds, flow):
-    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, flow=flow)
+    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=flow)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def known(lanes):
 
 @pytest.fixture(scope="module")
 def flow(known):
-    reference = learn_flow(known, LENS, PRIOR, 0)
+    reference = learn_paths(known, LENS, PRIOR, 0)
     assert reference is not None
     return reference
 
@@ -87,7 +87,7 @@ def test_a_move_is_found_where_it_happened_and_not_twice(lanes, flow):
     before = walk_site(LENS, PRIOR, lanes, CONFIG, 90, np.random.default_rng(9))
     after = walk_site(LENS, turned, lanes, CONFIG, 90, np.random.default_rng(10))
     later = [replace(track, time_s=track.time_s + 1e5) for track in after]
-    site = flow.site(LENS)
+    site = flow.model(LENS)
     both = walkers_of(feet(before + later), AT)
     found = moved_within(both, site, AT, flow.still, 1e-6)
     assert found is not None
@@ -152,23 +152,23 @@ def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
             shift = hour * 3600 + number % 2 * day_s - track.time_s[0] + 20 * number
             tracks.append(replace(track, time_s=track.time_s + shift))
     tracks = by_end(tracks)
-    reference = learn_flow(feet(tracks), LENS, PRIOR, 0)
+    reference = learn_paths(feet(tracks), LENS, PRIOR, 0)
     assert reference is not None
-    assert reference.flow.slots == 4
+    assert reference.density.slots == 4
     mixed = [replace(t, time_s=t.time_s - t.time_s[0] + 20.0 * k) for k, t in enumerate(tracks)]
-    reference = learn_flow(feet(mixed), LENS, PRIOR, 0)
+    reference = learn_paths(feet(mixed), LENS, PRIOR, 0)
     assert reference is not None
-    assert reference.flow.slots == 1
+    assert reference.density.slots == 1
 
 
 def test_older_tracks_count_less(lanes, known):
-    counted = learn_flow(known, LENS, PRIOR, 0, np.linspace(0.01, 1, known.tracks))
-    evenly = learn_flow(known, LENS, PRIOR, 0)
+    counted = learn_paths(known, LENS, PRIOR, 0, np.linspace(0.01, 1, known.tracks))
+    evenly = learn_paths(known, LENS, PRIOR, 0)
     assert counted is not None
     assert evenly is not None
     assert evenly.people == pytest.approx(200, abs=2)
     assert counted.people == pytest.approx(150, abs=6)  # (sum w)^2 / sum w^2 of weights 0..1
-    assert counted.flow.people.sum() == pytest.approx(evenly.flow.people.sum() / 2, rel=0.05)
+    assert counted.density.people.sum() == pytest.approx(evenly.density.people.sum() / 2, rel=0.05)
 
 
 def test_a_site_that_looks_alike_after_a_turn_says_so():
@@ -182,7 +182,7 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     visible = spokes[4:9]
     rng = np.random.default_rng(13)
     known = feet(walk_site(LENS, PRIOR, visible, walked, 200, rng))
-    flow = learn_flow(known, LENS, PRIOR, 0)
+    flow = learn_paths(known, LENS, PRIOR, 0)
     assert flow is not None
     speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.paths.registration import Belief
 from models.pose.fusion import fused_estimate
 from models.pose.modes import birge_ratio
@@ -39,11 +39,11 @@ def walk(lanes, pose, count, seed):
 @pytest.fixture(scope="module")
 def site(lanes):
     known = walk(lanes, PRIOR, 240, 4)
-    return learn_speed_reference(known, PRIOR, WalkConfig(), 0), learn_flow(known, LENS, PRIOR, 0)
+    return learn_speed_reference(known, PRIOR, WalkConfig(), 0), learn_paths(known, LENS, PRIOR, 0)
 
 
 def site_of(speeds, flow):
-    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, flow=flow)
+    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=flow)
 
 
 def panned(degrees):
