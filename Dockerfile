@@ -15,8 +15,8 @@ RUN VENV=/opt/surefoot PIP_NO_CACHE_DIR=1 .ci/install runtime "$TORCH"
 FROM python:3.11-slim
 RUN useradd --system --uid 10001 --home-dir /data --create-home surefoot
 COPY --from=build /opt/surefoot /opt/surefoot
-# Others than the container reach it, so that it starts once somebody has a token; see Access in
-# service/README.md: docker run --rm -v surefoot:/data IMAGE surefoot token add NAME --scope admin
+# Others than the container reach it, so that it starts once somebody has a token; see
+# docs/guides/access.md: docker run --rm -v surefoot:/data IMAGE surefoot token add NAME --scope admin
 ENV PATH=/opt/surefoot/bin:$PATH \
     SUREFOOT_DATA_DIR=/data \
     NUMBA_CACHE_DIR=/data/compiled \

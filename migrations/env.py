@@ -1,10 +1,11 @@
 """Runs migrations against the URL that the caller gives, or `SUREFOOT_DATA_DIR`'s database."""
 
 from alembic import context
+from sqlalchemy import Enum
 
 from service.settings import Settings
-from service.store.database.store import engine_for
-from service.store.tables.record import Record, UtcDateTime, Word
+from service.store.engines.store import engine_for
+from service.store.record import Record, UtcDateTime
 
 
 def _ours(obj: object, name: str | None, kind: str, reflected: bool, compare_to: object) -> bool:
@@ -14,7 +15,7 @@ def _ours(obj: object, name: str | None, kind: str, reflected: bool, compare_to:
 
 def _render(kind: str, obj: object, autogen: object) -> str | bool:
     # A migration must not change when the application's types do.
-    if kind == "type" and isinstance(obj, Word):
+    if kind == "type" and isinstance(obj, Enum):
         return "sa.String()"
     return "sa.DateTime()" if kind == "type" and isinstance(obj, UtcDateTime) else False
 

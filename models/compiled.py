@@ -1,14 +1,30 @@
-"""Loops over the steps of tracks, compiled: numpy takes ten small arrays for what is one pass."""
+"""Loops over rows as machine code, by numba: numpy takes ten small arrays for what is one pass.
 
+The code is kept in a folder of NUMBA_CACHE_DIR, of the virtual environment, or of the user's cache,
+one for each state of these sources: a process that finds it there does not wait for the compiler.
+Where nothing can be written, each process compiles for itself. Beside its source, where numba would
+put it, it would outlive an uninstallation, and the folders that are left of a package are a package
+to Python.
+"""
+
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
 import threading
-from collections.abc import Callable
-from functools import update_wrapper
+import time
+from collections.abc import Callable, Iterator
+from functools import cache, update_wrapper
+from pathlib import Path
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_NAME = "surefoot-"
+_KEPT_S = 30 * 86_400.0  # code of other sources, beside new code
 _one_at_a_time = threading.RLock()
 
 
@@ -36,9 +52,7 @@ class _Compiled:
         """The machine code."""
         with _one_at_a_time:
             if self._made is None:
-                from models.machine_code import machine_code  # see above
-
-                self._made = machine_code(self._among_made())
+                self._made = _machine_code(self._among_made())
         return self._made
 
     def _among_made(self) -> FunctionType:
@@ -58,8 +72,57 @@ class _Compiled:
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """A function of floats and arrays as machine code, which runs on one thread.
 
-    It may call others like it by their names in its module. Those that are called by hot loops of
-    Python alone are not worth it: a call costs some microseconds by itself.
+    Arrays are C-contiguous and writable, of float64, int64 or bool: of any other kind it would be
+    compiled again. It may call others like it by their names in its module. Those that are called
+    by hot loops of Python alone are not worth it: a call costs some microseconds by itself.
     """
     assert isinstance(function, FunctionType)
     return _Compiled(function)
+
+
+def _machine_code(function: FunctionType) -> Any:
+    """A function as numba compiles it, for each kind of arguments when they first come."""
+    import numba  # see above
+
+    folder = _folder()
+    if folder is not None:
+        setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - it has no type
+    return numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
+
+
+@cache
+def _folder() -> Path | None:
+    """The first folder for code of these sources that can be written; None where none can.
+
+    Code holds what it calls, and constants, of other files, too: a change of any source makes
+    another folder, where numba looks at the function's own file alone.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    for root in _roots():
+        folder = root / f"{_NAME}{digest.hexdigest()[:16]}"
+        try:
+            if not folder.is_dir():
+                folder.mkdir(parents=True, exist_ok=True)
+                _remove_old(root)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        return folder
+    return None
+
+
+def _roots() -> Iterator[Path]:
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(given)
+    if sys.prefix != sys.base_prefix:
+        yield Path(sys.prefix, "var", "cache", "surefoot")
+    users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    yield Path(users, "surefoot")
+
+
+def _remove_old(root: Path) -> None:
+    for folder in root.glob(f"{_NAME}*"):
+        if time.time() - folder.stat().st_mtime > _KEPT_S:
+            shutil.rmtree(folder, ignore_errors=True)

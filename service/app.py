@@ -38,7 +38,7 @@ from service.cameras.quota import Quota
 from service.job_queue import JobQueue
 from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 _SPARE_THREADS = 8
 

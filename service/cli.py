@@ -14,8 +14,8 @@ from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
 from service.workers.processes.collector import importing
-from service.workers.processes.manners import be_private
-from service.workers.processes.work import WorkKind
+from service.workers.processes.signals import be_private
+from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:
     from models.simulation.pose_offset import Knock

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 
 class PoseState(StrEnum):
-    """How a camera stands."""
+    """The state of a camera."""
 
     LEARNING = "learning"
     OK = "ok"
@@ -26,14 +26,14 @@ class Cause(StrEnum):
 
 
 class ReferenceState(StrEnum):
-    """Whether what is usual at a site is known."""
+    """The state of a reference."""
 
     LEARNING = "learning"
     READY = "ready"
 
 
 class Origin(StrEnum):
-    """What began a prior pose or a reference; prior poses know the first three."""
+    """The beginning of a prior pose or a reference; prior poses know the first three."""
 
     REGISTERED = "registered"
     CHANGED = "changed"
@@ -44,7 +44,7 @@ class Origin(StrEnum):
 
 
 class AlertKind(StrEnum):
-    """What an alert is about."""
+    """The kind of an alert."""
 
     DRIFT = "drift"
     NO_DATA = "no_data"
@@ -54,14 +54,14 @@ class AlertKind(StrEnum):
 
 
 class AlertState(StrEnum):
-    """Whether an alert is open."""
+    """The state of an alert."""
 
     FIRING = "firing"
     RESOLVED = "resolved"
 
 
 class AlertSource(StrEnum):
-    """What stands behind an alert, and ends it."""
+    """The part of the service that opened an alert, and ends it."""
 
     ESTIMATE = "estimate"
     REFERENCE = "reference"
@@ -72,14 +72,14 @@ class AlertSource(StrEnum):
 
 
 class Severity(StrEnum):
-    """How much an alert matters, the least first."""
+    """The severity of an alert, the least first."""
 
     WARNING = "warning"
     CRITICAL = "critical"
 
 
 class Answer(StrEnum):
-    """What a person says of how a camera stands."""
+    """A person's answer on how a camera stands."""
 
     PUT_BACK = "put_back"
     ACCEPTED = "accepted"
@@ -87,7 +87,7 @@ class Answer(StrEnum):
 
 
 class Outcome(StrEnum):
-    """What came of an alert: a person's answer, or something by itself."""
+    """The outcome of an alert: a person's answer, or something by itself."""
 
     PUT_BACK = Answer.PUT_BACK
     ACCEPTED = Answer.ACCEPTED
@@ -97,7 +97,7 @@ class Outcome(StrEnum):
 
 
 class AlertActivity(StrEnum):
-    """What is done with an alert."""
+    """Acts on an alert."""
 
     OPENED = "opened"
     ESCALATED = "escalated"
@@ -108,7 +108,7 @@ class AlertActivity(StrEnum):
 
 
 class WindowState(StrEnum):
-    """Where in time a maintenance window is."""
+    """The state of a maintenance window."""
 
     PLANNED = "planned"
     UNDER_WAY = "under_way"
@@ -116,7 +116,7 @@ class WindowState(StrEnum):
 
 
 class TrainingState(StrEnum):
-    """How far a training is."""
+    """The state of a training."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -126,7 +126,7 @@ class TrainingState(StrEnum):
 
 
 class EventType(StrEnum):
-    """What `GET /events` tells of."""
+    """The types of `GET /events`."""
 
     POSE = "pose"
     ALERT = "alert"
@@ -134,14 +134,14 @@ class EventType(StrEnum):
 
 
 class WebhookFormat(StrEnum):
-    """What an endpoint takes: signed messages, or what an Alertmanager does."""
+    """The format of an endpoint: signed messages, or an Alertmanager's."""
 
     WEBHOOK = "webhook"
     ALERTMANAGER = "alertmanager"
 
 
 class MessageType(StrEnum):
-    """What a delivery tells."""
+    """The type of a delivery's message."""
 
     ALERT_OPENED = "alert.opened"
     ALERT_UPDATED = "alert.updated"
@@ -152,7 +152,7 @@ class MessageType(StrEnum):
 
 
 class DeliveryState(StrEnum):
-    """What has become of a delivery."""
+    """The state of a delivery."""
 
     PENDING = "pending"
     DELIVERED = "delivered"
@@ -160,7 +160,7 @@ class DeliveryState(StrEnum):
 
 
 class TokenScope(StrEnum):
-    """What a token is for."""
+    """The scopes of tokens."""
 
     INGEST = "ingest"
     READ = "read"
@@ -169,7 +169,7 @@ class TokenScope(StrEnum):
 
 
 class TokenState(StrEnum):
-    """Whether a token is let in."""
+    """The state of a token."""
 
     VALID = "valid"
     EXPIRED = "expired"
@@ -177,20 +177,20 @@ class TokenState(StrEnum):
 
 
 class Health(StrEnum):
-    """What `/healthz` says."""
+    """The answer of `/healthz`."""
 
     OK = "ok"
 
 
 class Readiness(StrEnum):
-    """What `/readyz` says."""
+    """The answers of `/readyz`."""
 
     READY = "ready"
     NOT_READY = "not_ready"
 
 
 class Activity(StrEnum):
-    """What the log says was done: a subject and a verb."""
+    """Entries of the log: a subject and a verb."""
 
     CAMERA_REGISTERED = "camera.registered"
     CAMERA_CHANGED = "camera.changed"

@@ -11,27 +11,25 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from dbos import DBOS, DBOSClient, DBOSConfig, EnqueueOptions
-from dbos._error import DBOSQueueDeduplicatedError  # its public home names it in a docstring only
+from dbos import DBOS, DBOSClient, DBOSConfig, error
 from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store.database.store import savepoint
-from service.store.operation import engine_jobs
+from service.store import engine_jobs
+from service.store.engines.store import savepoint
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
-TRAIN_QUEUE, ESTIMATE_QUEUE, DELIVER_QUEUE = "train", "estimate", "deliver"
+TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"  # and the queue of each
+# Of the engine's tables those that nothing works without.
+ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
 _ENGINE_CONNECTIONS = 5  # to a server, of each worker
 # The engine's priorities are whole numbers from 1 to 2**31 - 1, the smallest first: 68 years.
 _BEGINNING = datetime(2026, 1, 1, tzinfo=UTC)
 _HEAD_START = timedelta(seconds=30)
 _UNDER_WAY = ("ENQUEUED", "DELAYED", "PENDING")
-# Of the engine's tables those that nothing works without.
-ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
-TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"
 
 
 class JobQueue:
@@ -44,32 +42,15 @@ class JobQueue:
 
     def enqueue_training(self, session: Session, camera_id: str, training_id: str) -> None:
         """Queue a training; at most one of a camera runs at once."""
-        self._enqueue(
-            session,
-            {
-                "workflow_name": TRAIN_JOB,
-                "queue_name": TRAIN_QUEUE,
-                "workflow_id": f"train-{training_id}",
-                "queue_partition_key": camera_id,
-            },
-            training_id,
-        )
+        self._enqueue_training(session, camera_id, training_id, f"train-{training_id}")
 
     def requeue_training(self, session: Session, camera_id: str, training_id: str) -> bool:
         """Queue a training again whose job has failed or is gone; False where it is under way."""
-        known = engine_jobs.statuses(session, f"train-{training_id}")
-        if any(status in _UNDER_WAY for status in known):
+        job_id = f"train-{training_id}"
+        if any(status in _UNDER_WAY for status in engine_jobs.statuses(session, job_id)):
             return False
-        self._enqueue(
-            session,
-            {
-                "workflow_name": TRAIN_JOB,
-                "queue_name": TRAIN_QUEUE,
-                "workflow_id": f"train-{training_id}-again-{secrets.token_hex(4)}",
-                "queue_partition_key": camera_id,
-            },
-            training_id,
-        )
+        again_id = f"{job_id}-again-{secrets.token_hex(4)}"
+        self._enqueue_training(session, camera_id, training_id, again_id)
         return True
 
     def enqueue_estimate(
@@ -79,61 +60,52 @@ class JobQueue:
 
         Those that were due first come first; one that is `urgent` as if it had been due for half a
         minute more, so that many of these hold up others by no more than that. While one runs, the
-        camera's mark "due" stays: the next round of the upkeep sees it.
+        camera's mark "due" stays: the next sweep sees it.
         """
-        options: EnqueueOptions = {
-            "workflow_name": ESTIMATE_JOB,
-            "queue_name": ESTIMATE_QUEUE,
-            "deduplication_id": camera_id,
-            "priority": _place_in_queue(due_at - _HEAD_START if urgent else due_at),
-        }
+        due_at = due_at - _HEAD_START if urgent else due_at
+        priority = max(round((due_at - _BEGINNING).total_seconds()), 1)
         # Outside the savepoint: one that is refused takes nothing of the caller's with it.
-        with contextlib.suppress(DBOSQueueDeduplicatedError), savepoint(session):
-            self._enqueue(session, options, camera_id)
+        with contextlib.suppress(error.DBOSQueueDeduplicatedError), savepoint(session):
+            self._enqueue(
+                session, ESTIMATE_JOB, camera_id, deduplication_id=camera_id, priority=priority
+            )
 
     def due_without_job(self, session: Session) -> Sequence[tuple[str, datetime | None]]:
-        """Cameras that are due without an estimate job, longest due first; until when they rest."""
-        return engine_jobs.due_without(session, ESTIMATE_QUEUE)
+        """Cameras due without an estimate job, longest due first; until when they cool down."""
+        return engine_jobs.due_without(session, ESTIMATE_JOB)
 
     def estimates_wait(self, session: Session, besides: str = "") -> bool:
-        """Whether an estimate job of another camera waits to start, for want of a free worker."""
-        return engine_jobs.any_waits(session, ESTIMATE_QUEUE, besides)
+        """True where an estimate job of another camera waits for a free worker."""
+        return engine_jobs.any_waits(session, ESTIMATE_JOB, besides)
 
     def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
         """Queue the sending of what a webhook is due, unless a job waits to start that does.
 
         At most one of a webhook runs at once.
         """
-        if engine_jobs.waits(session, DELIVER_QUEUE, webhook_id):
-            return
-        self._enqueue(
-            session,
-            {
-                "workflow_name": DELIVER_JOB,
-                "queue_name": DELIVER_QUEUE,
-                "queue_partition_key": webhook_id,
-            },
-            webhook_id,
-        )
+        if not engine_jobs.waits(session, DELIVER_JOB, webhook_id):
+            self._enqueue(session, DELIVER_JOB, webhook_id, queue_partition_key=webhook_id)
 
     def close(self) -> None:
         """Let go of the engine's connections."""
         self._client.destroy()
 
-    def _enqueue(self, session: Session, options: EnqueueOptions, *args: Any) -> None:
-        options["app_version"] = JOBS_VERSION
-        self._client.enqueue_in_transaction(session, options, *args)
+    def _enqueue_training(
+        self, session: Session, camera_id: str, training_id: str, job_id: str
+    ) -> None:
+        self._enqueue(
+            session, TRAIN_JOB, training_id, workflow_id=job_id, queue_partition_key=camera_id
+        )
+
+    def _enqueue(self, session: Session, job: str, about: str, **more: Any) -> None:
+        options: Any = {"workflow_name": job, "queue_name": job, "app_version": JOBS_VERSION}
+        self._client.enqueue_in_transaction(session, options | more, about)
 
 
 def queue_of(session: Session) -> JobQueue:
     """The queue in a session's own database, where nobody handed one down."""
     bind = session.get_bind()
     return JobQueue(bind if isinstance(bind, Engine) else bind.engine)
-
-
-def _place_in_queue(due_at: datetime) -> int:
-    """The priority of what is due at a time, to the second; the engine keeps the order within."""
-    return max(round((due_at - _BEGINNING).total_seconds()), 1)
 
 
 def migrate_engine_tables(settings: Settings) -> None:

@@ -6,13 +6,13 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
+from models.durations import HOUR_S
 from models.geometry.pose_parameters import PARAMETERS
 from models.reasons import Reason, TracksCode
 from service.enums import Cause
 from service.reasons import ServiceCode
 
 _Values = Mapping[str, Any]
-_HOUR_S = 3600.0
 _SINCE = {
     Cause.REFERENCE: "since the reference",
     Cause.MAINTENANCE: "since the maintenance",
@@ -182,7 +182,7 @@ def _silent(v: _Values) -> str:
 def _silent_unknown(v: _Values) -> str:
     return (
         f"the newest track ended {_hours(v['silent_s'])} ago; "
-        f"up to {v['limit_s'] / _HOUR_S:g} h are waited for"
+        f"up to {v['limit_s'] / HOUR_S:g} h are waited for"
     )
 
 
@@ -210,7 +210,7 @@ def _other_sources(v: _Values) -> str:
     return (
         f"tracks of {names} come beside those of {counting!r}, which count: they are kept "
         f"and move nothing. Should {counting!r} fall silent for "
-        f"{v['silent_s'] / _HOUR_S:g} h, they take over once "
+        f"{v['silent_s'] / HOUR_S:g} h, they take over once "
         f"{v['wanted']} of them were seen while the camera was where it "
         "should be; a person can say so at once"
     )
@@ -231,7 +231,7 @@ def _tracks_wait(v: _Values) -> str:
 
 
 def _hours(seconds: float) -> str:
-    return f"{seconds / _HOUR_S:.1f} h"
+    return f"{seconds / HOUR_S:.1f} h"
 
 
 _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
@@ -278,7 +278,7 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     ServiceCode.DISABLED_BY_PERSON: lambda v: "disabled by a person",
     ServiceCode.ENDPOINT_GONE: lambda v: "it answered 410: it is gone for good",
     ServiceCode.ENDPOINT_FAILS: lambda v: (
-        f"it failed for more than {v['patience_s'] / _HOUR_S:g} h: {v['error']}"
+        f"it failed for more than {v['patience_s'] / HOUR_S:g} h: {v['error']}"
     ),
     ServiceCode.SECRET_LOST: lambda v: (
         "its secret was lost with the key: fetch a new one, tell the receiver, enable it"

@@ -12,7 +12,7 @@ Reasons = tuple[Reason, ...]
 
 
 class ServiceCode(StrEnum):
-    """What the service gives as a reason. Codes are kept by clients and in stores: they stay."""
+    """Codes of the service's own reasons. They are kept by clients and in stores: they stay."""
 
     AS_SAID = "as_said"
     LEARNING_REFERENCE = "learning_reference"

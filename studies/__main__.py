@@ -102,6 +102,19 @@ def protocol(
         raise typer.Exit(1) from error
 
 
+def parts(
+    scenes: Annotated[list[Path], typer.Argument(help="Folders of scenes and recordings.")],
+    seeds: Annotated[int, typer.Option(min=1, help="How many of each case.")] = 2,
+    processes: Annotated[int, typer.Option(min=1, help="Parts at once, a core each.")] = 2,
+    output: Annotated[Path, typer.Option(help="Where figures are kept.")] = Path("parts.jsonl"),
+    write: Annotated[Path | None, typer.Option(help="A page with markers for the table.")] = None,
+) -> None:
+    """What each part of the estimator is worth: the protocol with one off at a time."""
+    from studies.parts.run import run_parts
+
+    run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write)
+
+
 def flow_study(
     sites: Annotated[int, typer.Option(min=1, help="How many simulated sites.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all of them.")] = 0,
@@ -282,7 +295,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 for _command in (
-    evaluate, protocol, http, flow_study, alarm_study, creep_study, centred, paper,
+    evaluate, protocol, parts, http, flow_study, alarm_study, creep_study, centred, paper,
 ):  # fmt: skip
     app.command()(_command)
 

@@ -16,7 +16,7 @@ from tests.conftest import ROOT
 _FILE = re.compile(
     r"(?<![\w/:.*{-])((?:[\w.-]+/)*[\w-]+\.(?:py|md|js|css|html|svg|mako))(?![\w(*{])"
 )
-_FOLDER = re.compile(r"`((?:models|service|migrations|tests)/[\w/.-]*)`")
+_FOLDER = re.compile(r"`((?:models|service|migrations|studies|docs|deploy|tests)/[\w/.-]*)`")
 _LINK = re.compile(r"\]\((?!https?:)([^)\s]*)\)")
 _COMMENT = re.compile(
     r"/\*.*?\*/|<!--.*?-->|\{#.*?#\}|(?<!:)//[^\n]*|(?<![&\w{])#[^\n{}]*", re.DOTALL

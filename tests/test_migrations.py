@@ -8,9 +8,9 @@ from sqlalchemy.exc import IntegrityError
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.database.revisions import alembic_config, known_revisions
-from service.store.database.store import Store
-from service.store.tables.record import Record
+from service.store.engines.revisions import alembic_config, known_revisions
+from service.store.engines.store import Store
+from service.store.record import Record
 from tests.stores.databases import only_sqlite
 
 

@@ -17,7 +17,6 @@ from service.cli import app
 from service.settings import Settings
 from tests.conftest import ROOT
 from tests.running import RunningService, free_port
-from tests.settings_table import settings_table, written_table
 
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
@@ -95,16 +94,13 @@ def assert_like(sample: dict, answer: dict) -> None:
 
 def test_its_commands_exist():
     described = CliRunner().invoke(app, ["--help"]).output
-    pages = README + (ROOT / "service" / "README.md").read_text()
+    guides = sorted((ROOT / "docs" / "guides").glob("*.md"))
+    pages = README + "".join(page.read_text() for page in guides)
     for name in COMMANDS:
         assert name in described
         assert f"surefoot {name}" in pages
     for name in re.findall(r"(?:bin/|surefoot |`)surefoot ([a-z][a-z-]+)", pages):
         assert name in COMMANDS
-
-
-def test_the_table_of_settings_is_what_the_settings_say():
-    assert written_table() == settings_table(), "python -m tests.settings_table --write"
 
 
 def locked(name: str) -> dict[str, list[str]]:
@@ -128,7 +124,7 @@ def test_the_lock_fits_what_the_project_asks_for():
     assert runtime.items() <= everything.items()
     for asked, there in (
         (project["dependencies"], runtime),
-        (extras["plots"] + extras["test"], everything),
+        (extras["plots"] + extras["test"] + extras["docs"], everything),
     ):
         for text in asked:
             wanted = Requirement(text)

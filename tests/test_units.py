@@ -21,7 +21,6 @@ TELLING = {
     "service/commands/demo.py",
     "service/commands/demo_screen.py",
     "service/commands/demo_street.py",
-    "service/alerts/alerts.py",
     "service/estimation/estimates.py",
     "service/notifications/outbox.py",
     "service/commands/replay.py",

@@ -16,9 +16,8 @@ from service.app import create_app
 from service.commands.migrate import migrate
 from service.data_dir import StartError
 from service.settings import Settings
-from service.store.database import revisions
-from service.store.database.revisions import alembic_config, known_revisions
-from service.store.sqlite import files
+from service.store.engines import files, revisions
+from service.store.engines.revisions import alembic_config, known_revisions
 from tests.stores.databases import ask
 from tests.test_migrations import put
 

@@ -23,7 +23,7 @@ TABLES = sa.MetaData(
 )
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
-ALERT_KINDS = "drift no_data out_of_range clock stale tracker"
+ALERT_KINDS = "drift no_data clock stale tracker"
 OUTCOMES = "put_back accepted false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.removed pose.accepted pose.put_back pose.false_alarm "
@@ -258,7 +258,7 @@ table(
     *needed(Double, "from_s", "to_s"),
     *needed(NUMBER, "newest_track_pk"),
     *needed(DateTime, "created_at"),
-    one_of("state", "learning ok drifting out_of_range"),
+    one_of("state", "learning ok drifting"),
     Index(None, "camera_id", "id"),
 )
 table(

@@ -14,6 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from models.durations import HOUR_S
 from models.geometry.rotation import Array
 
 CELLS = 48  # the hours of a weekday, then those of a day of a weekend
@@ -117,10 +118,10 @@ def expected_tracks(
     rhythm: Rhythm, cells: np.ndarray, first_hour: int, from_s: float, to_s: float
 ) -> float:
     """How many tracks are expected between two times, within the hours of `cells` (H,)."""
-    starts_s = 3600.0 * (first_hour + np.arange(len(cells)))
-    overlap_s = np.minimum(starts_s + 3600, to_s) - np.maximum(starts_s, from_s)
+    starts_s = HOUR_S * (first_hour + np.arange(len(cells)))
+    overlap_s = np.minimum(starts_s + HOUR_S, to_s) - np.maximum(starts_s, from_s)
     rates = np.array(rhythm.rates)[cells]
-    return float(rates @ np.clip(overlap_s, 0.0, None)) / 3600
+    return float(rates @ np.clip(overlap_s, 0.0, None)) / HOUR_S
 
 
 def chance_of_silence(
@@ -149,7 +150,7 @@ def chance_of_silence(
     weights = [math.exp(value - max(logs)) for value in logs]
     same = [((b + expected) / (b + expected + missed)) ** (a + seen) for a, b in levels]
     other = [(b / (b + missed)) ** a for a, b in levels]
-    changed = 1 - (1 - _CHANGES_PER_HOUR) ** (silent_s / 3600)
+    changed = 1 - (1 - _CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
     after_change = (1 - _TURNS_QUIET) * other[0] + _TURNS_QUIET * other[1]
     unchanged = sum(w * chance for w, chance in zip(weights, same, strict=True)) / sum(weights)
     return float((1 - changed) * unchanged + changed * after_change)
@@ -217,7 +218,7 @@ def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> 
     """
     edges = np.concatenate([[0.0], np.cumsum(rates)])
     unseen = np.concatenate([[0], np.cumsum(~known)])
-    place = times_s / 3600 - first_hour
+    place = times_s / HOUR_S - first_hour
     place = place[(place >= 0) & (place <= len(rates))]
     rescaled = np.diff(np.interp(place, np.arange(len(edges)), edges))
     rescaled = rescaled[np.diff(unseen[np.minimum(place.astype(int), len(rates))]) == 0]

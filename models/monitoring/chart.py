@@ -24,8 +24,8 @@ FEWEST = 16  # walking groups that a move is detected by
 LENGTHS = np.unique(np.round(np.geomspace(FEWEST, 400, 21)).astype(int))
 CLOCK = 4  # beside the four of a pose: times that are too long
 # What a site's people do of themselves for hours on end, as moves of the camera, and of its clock:
-# about as those of recorded days did beyond chance (`studies/still_days`). Their pace differed by
-# 5 %, but 30 frames a second taken for 25, which is 18 %, must remain an alarm.
+# about as those of recorded days did beyond chance (`python -m studies still-days`). Their pace
+# differed by 5 %, but 30 frames a second taken for 25, which is 18 %, must remain an alarm.
 HABITS = np.array([np.radians(0.1), np.radians(0.2), 0.01, np.radians(0.2), 0.03])
 # For days and seasons, of which too few are recorded to say: in rain and in winter they may walk
 # elsewhere, and faster.

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from models.durations import DAY_S
 from models.geometry.rotation import Array
 from models.monitoring.chart import HABITS_OF_DAYS, OTHER_PEOPLE, DriftChart, slope_of
 from models.monitoring.group_scores import GroupScores
 
-DAY_S = 86_400.0
 NUMBERS = 5  # tilt, roll, log height, heading, log of times
 _BLOCK_DAYS = 7  # weekends walk otherwise
 _MOST_BLOCKS = 104

@@ -5,8 +5,8 @@ tilt, roll and log height: sharp, but who walks far too slowly counts as someone
 it says little after a large move. Three more are the same without that: how far off a pace is, held
 within bounds. Eight are how much likelier their places and ways were a little further on than a
 little back, along tilt, roll, log height and heading, by a large step and by a small one. What of
-these tells a move, and how well, is learned of the site (`chart_learning`). The method: "The alarm"
-in `models/README.md`.
+these tells a move, and how well, is learned of the site (`chart_learning`). The method:
+`docs/method/monitoring.md`.
 """
 
 from dataclasses import dataclass, replace

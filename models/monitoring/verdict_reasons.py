@@ -2,10 +2,10 @@
 
 from datetime import UTC, datetime
 
+from models.durations import DAY_S
 from models.geometry.pose_parameters import PARAMETERS
 from models.monitoring.chart import CLOCK, Reading
 from models.monitoring.creep import Creep
-from models.monitoring.creep_log import DAY_S
 from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
 from models.reasons import Reason, TracksCode, Value
 

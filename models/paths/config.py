@@ -7,6 +7,8 @@ import math
 
 import numpy as np
 
+from models.durations import HOUR_S
+
 # The map.
 DIRECTIONS = 16  # nodes of a turn: between them cubic, so that no path's direction is a node's
 CELL_M = 0.5  # between nodes: half of the finest bandwidth
@@ -55,7 +57,7 @@ FEWEST_GROUPS = 12  # walking groups: of fewer there is no map
 FOLDS = 4
 # Bandwidths are chosen anew of twice as many tracks, which bear finer ones, and in the next part of
 # a day, in which people may walk elsewhere: to choose takes a sixth of the time of learning a map.
-MORE_TRACKS, HOLD_S = 2, 6 * 3600.0
+MORE_TRACKS, HOLD_S = 2, 6 * HOUR_S
 RUN = 6  # walking groups after one another that may be alike
 # The inflation before any is seen, and how many runs that guess is worth.
 ASSUMED_INFLATION, ASSUMED_INFLATION_WEIGHT = 1.3, 5.0

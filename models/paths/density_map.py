@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.durations import DAY_S
 from models.geometry.rotation import Array
 from models.paths import config
 from models.paths.density_grid import Grid, log_densities_at, unseen_at_places
@@ -94,7 +95,7 @@ def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
     """The one of so many equal parts of a UTC day that each time (M,) is in."""
     if slots == 1:
         return np.zeros(time_s.shape, dtype=np.int64)
-    return np.floor(time_s % 86_400 / 86_400 * slots).astype(np.int64) % slots
+    return np.floor(time_s % DAY_S / DAY_S * slots).astype(np.int64) % slots
 
 
 def learn_map(

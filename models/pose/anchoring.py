@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.creep_log import DAY_S, CreepLog, add_day, begin_log
+from models.monitoring.creep_log import CreepLog, add_day, begin_log
 from models.monitoring.creep_posterior import believed_turns
 from models.monitoring.group_scores import score_groups
 from models.pose.config import NO_TURN_RAD

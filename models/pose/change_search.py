@@ -15,9 +15,9 @@ from models.pose.pose_fit import FusedEstimate, PoseFit
 from models.pose.site import CameraSite
 from models.pose.warm_start import FullSearch, WarmStart, warm_start_of
 from models.tracks.observations import Observations, of_tracks
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import joint_estimate
 from models.walking.fit import FitStart
-from models.walking.reference.assumed import FEWEST_WALKERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

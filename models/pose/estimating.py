@@ -13,8 +13,8 @@ from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.pose.site import CameraSite
 from models.pose.warm_start import WarmStart
 from models.tracks.observations import Observations, check_in_time, of_tracks
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate, joint_estimate
-from models.walking.reference.assumed import FEWEST_WALKERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

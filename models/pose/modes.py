@@ -118,7 +118,7 @@ def _climbed(
         peak=posterior.climbed(mode.candidate),
         posterior=posterior,
         speeds=speeds,
-        gain=speeds.score - joint.score,
+        gain=speeds.log_likelihood - joint.log_likelihood,
     )
 
 

@@ -20,7 +20,7 @@ _FEWEST_POINTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Uprights:
+class HeadFootPairs:
     """People upright for 1.5 s each: rays (M, 3), z = 1, in the camera frame, undistorted.
 
     `foot_rays` and `head_rays` are means over that time. `column_rays` are to the pixels right
@@ -45,12 +45,12 @@ class Uprights:
         """The tracks (K,) that have heads, ascending."""
         return np.unique(self.owner_idx)
 
-    def of_tracks(self, chosen: npt.NDArray[np.int64]) -> "Uprights":
+    def of_tracks(self, chosen: npt.NDArray[np.int64]) -> "HeadFootPairs":
         """Those of some tracks only, given by ascending indices, which are numbered anew."""
         renumber = np.full(self.owners, -1)
         renumber[chosen] = np.arange(chosen.size)
         kept = renumber[self.owner_idx] >= 0
-        return Uprights(
+        return HeadFootPairs(
             foot_rays=self.foot_rays[kept],
             head_rays=self.head_rays[kept],
             column_rays=self.column_rays[kept],
@@ -61,8 +61,8 @@ class Uprights:
         )
 
 
-def observe_uprights(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> Uprights:
-    """The uprights of trajectories, one for each 1.5 s in which a head was seen twice.
+def observe_heads(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> HeadFootPairs:
+    """The pairs of trajectories, one for each 1.5 s in which a head was seen twice.
 
     Points whose foot or head is outside the image or cut by its border, or whose head is below the
     foot or less than 8 pixels from it, are left out.
@@ -74,7 +74,7 @@ def observe_uprights(trajectories: Sequence[Trajectory], intrinsics: Intrinsics)
         pieces.append(found)
         owners += [owner] * len(found)
     rays = np.concatenate(pieces) if pieces else np.empty((0, 5, 3))
-    return Uprights(
+    return HeadFootPairs(
         foot_rays=rays[:, 0],
         head_rays=rays[:, 1],
         column_rays=rays[:, 2],

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from models.errors import ShapeError
 from models.geometry.rotation import Array, Mask
-from models.tracks.head_foot import Uprights
+from models.tracks.head_foot import HeadFootPairs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,14 +62,14 @@ class Tops:
 class Observations:
     """All that is read of a set of tracks, and when each of them ended (tracks,).
 
-    `uprights` are of heads; None where nobody looked for any.
+    `heads` are of heads; None where nobody looked for any.
     """
 
     steps: Steps
     tops: Tops
     ended_s: Array
     tracks: int
-    uprights: Uprights | None = None
+    heads: HeadFootPairs | None = None
 
     @property
     def walkers(self) -> int:
@@ -110,7 +110,7 @@ def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Obse
         ),
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
-        uprights=None if observations.uprights is None else observations.uprights.of_tracks(chosen),
+        heads=None if observations.heads is None else observations.heads.of_tracks(chosen),
     )
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
-from models.tracks.head_foot import observe_uprights
+from models.tracks.head_foot import observe_heads
 from models.tracks.linking import link_pieces, walks_of
 from models.tracks.observations import Observations
 from models.tracks.observing import observe as observe_each
@@ -67,7 +67,7 @@ def observe_walks(
     observations = replace(
         observe_each(walks, intrinsics),
         ended_s=np.array([trajectory.time_s[-1] for trajectory in trajectories], dtype=np.float64),
-        uprights=observe_uprights(walks, intrinsics),
+        heads=observe_heads(walks, intrinsics),
     )
     return Walks(observations=observations, walk_idx=walk_idx)
 

@@ -1,4 +1,4 @@
-"""What noise in the directions of walks looks like: information that is none.
+"""Noise in the directions of walks, which looks like information.
 
 A direction's noise is in the derivative of a step's log speed by the pose, and there its square
 looks like information. Where people walk many ways it is a few per cent of what there is; on a
@@ -13,14 +13,15 @@ noise, is ours.
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.walking.loops.sums import information_of_noise
+from models.walking.config import MOST_NOISE
 from models.walking.measures import Measured
-from models.walking.mixed_model import Spread, Weights
+from models.walking.mixed.model import VarianceComponents, Weights
+from models.walking.mixed.sums import information_of_noise
 
-_MOST = 0.95  # of the information along any axis that may be called noise
 
-
-def noise_information(measured: Measured, weights: Weights, spread: Spread) -> Array:
+def noise_information(
+    measured: Measured, weights: Weights, components: VarianceComponents
+) -> Array:
     """The information (3, 3) on tilt, roll and log height that is noise's on average.
 
     Of a track's noise, its own level and trend take a part.
@@ -29,7 +30,7 @@ def noise_information(measured: Measured, weights: Weights, spread: Spread) -> A
     information = information_of_noise(
         measured.d_direction_noise, weights.row, measured.valid, rows.owner_idx, rows.owners
     )
-    return information / spread.within_sd**2
+    return information / components.within_sd**2
 
 
 def corrected_covariance(matrix: Array, noise: Array) -> Array:
@@ -40,5 +41,5 @@ def corrected_covariance(matrix: Array, noise: Array) -> Array:
     root = np.linalg.cholesky(matrix)
     white = np.linalg.solve(root, np.linalg.solve(root, noise).T)
     sizes, axes = np.linalg.eigh((white + white.T) / 2)
-    stretched = np.linalg.solve(root.T, axes) / (1 - np.clip(sizes, 0.0, _MOST))
+    stretched = np.linalg.solve(root.T, axes) / (1 - np.clip(sizes, 0.0, MOST_NOISE))
     return np.asarray(stretched @ stretched.T)

@@ -1,8 +1,8 @@
 """The joint estimate: one pose for all tracks, with a covariance, and what it leaves open.
 
-Ours: covariance = variance inflation * H^-1 + spread of other modes + what is not known of the
-offset; the modes are a mixture, weighed by their posterior at their ends. Heads, where they tell
-verticals, are a second Gaussian on tilt and roll.
+Ours: covariance = variance inflation * H^-1 + covariance of other modes + what is not known of the
+offset; the modes are a mixture, weighed by their posterior. Heads, where they lean as verticals do,
+are a second Gaussian on tilt and roll.
 """
 
 import math
@@ -22,35 +22,29 @@ from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode, Value
 from models.tracks.observations import Observations, of_tracks
+from models.walking import config
 from models.walking.fit import Channel, Fit, FitStart, fit_pose
 from models.walking.groups import count_walking_groups
-from models.walking.heads.estimate import VerticalEstimate, joined, vertical_estimate
+from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
 from models.walking.speed_reference import (
-    PLAUSIBLE_OFFSET,
     SpeedReference,
     channels_of,
     pose_prior,
 )
 from models.walking.starts import starts
 
-_STARTS = 2
-_START_TRACKS = 80
-_FEWEST_GROUPS = 5
-_HOPELESS = 12.0  # of that log likelihood, for another end to be named
-_SAME_END = np.array([math.radians(0.2), math.radians(0.2), 0.02])
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointEstimate:
     """Tilt, roll, log height (3,) with their covariance (3, 3), the reference's offset taken off.
 
-    `raw` (3,) is before that. `score` is its log likelihood, over the variance inflation, up to
-    what is the same for the same tracks. `identifiable` names those of tilt, roll, height that the
+    `raw` (3,) is before that. `log_likelihood` is over the variance inflation, up to what is
+    the same for the same tracks. `identifiable` names those of tilt, roll, height that the
     tracks determine; `reason` says what is missing, and is None where they determine all. `walkers`
     is the number of tracks that were used, `walking_groups` that of people or groups who walked
     independently. `bound` (3, 3) is the Cramer-Rao bound of the likelihood. `others` are other
-    poses (3,) that explain the tracks, if not as well. `verticals` is what their heads say, which
-    is part of `values`, and `by_speeds` what was said without them; None where they tell nothing.
+    poses (3,) that explain the tracks, if not as well. `heads` is the estimate by heads, which
+    is part of `values`, and `by_speeds` the one without them; None where heads are of no use.
     `means` are the coefficients of the fields there.
     """
 
@@ -58,19 +52,19 @@ class JointEstimate:
     covariance: Array
     raw: Array
     bound: Array
-    score: float
+    log_likelihood: float
     walkers: int
     walking_groups: int
     identifiable: tuple[str, ...]
     reason: Reason | None
     others: tuple[Array, ...] = ()
-    verticals: VerticalEstimate | None = None
+    heads: HeadEstimate | None = None
     by_speeds: PlaneEstimate | None = None
     means: tuple[Array, ...] = ()
 
     @property
     def warm_start(self) -> FitStart:
-        """Where a fit of almost the same tracks may begin."""
+        """The start of a fit of almost the same tracks."""
         return FitStart(candidate=self.raw, means=self.means, warm=True)
 
     @property
@@ -80,7 +74,7 @@ class JointEstimate:
 
     @property
     def modes(self) -> tuple[Array, ...]:
-        """Where the search ended (3,), the best first; as `raw`."""
+        """The ends (3,) of the search, the best first; as `raw`."""
         offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
         return self.raw, *(other + offset for other in self.others)
 
@@ -89,10 +83,10 @@ class JointEstimate:
 
         How fast they walk where is known no better than at any other site; they stand as upright.
         """
-        if self.verticals is None or self.by_speeds is None:
-            return self.values, self.covariance + np.diag(PLAUSIBLE_OFFSET**2)
-        wide = self.by_speeds.covariance + np.diag(PLAUSIBLE_OFFSET**2)
-        return joined(self.by_speeds.values, wide, self.verticals)
+        if self.heads is None or self.by_speeds is None:
+            return self.values, self.covariance + np.diag(config.PLAUSIBLE_OFFSET**2)
+        wide = self.by_speeds.covariance + np.diag(config.PLAUSIBLE_OFFSET**2)
+        return joined(self.by_speeds.values, wide, self.heads)
 
 
 def joint_estimate(
@@ -110,12 +104,12 @@ def joint_estimate(
     begin = warm_starts
     if not begin:
         few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-        found = starts(few, plane_parameters_of(prior), _STARTS)
+        found = starts(few, plane_parameters_of(prior), config.STARTS)
         first = _distinct([fit_pose(few, FitStart(candidate=start), hold) for start in found])
         begin = [FitStart(candidate=fit.candidate) for fit in first]
     ends = _distinct([fit_pose(channels, start, hold) for start in begin])
-    verticals = vertical_estimate(observations.uprights, reference.verticals)
-    return _said_of(observations, channels, ends, reference, verticals)
+    heads = head_estimate(observations.heads, reference.heads)
+    return _estimate_of(observations, channels, ends, reference, heads)
 
 
 def joint_at_heading(
@@ -129,53 +123,55 @@ def joint_at_heading(
     """The joint estimate with the heading of a candidate (4,), tilt, roll, log height, heading.
 
     How fast people are where, and which way, is another question once a camera has been panned.
-    What their heads say, the `joint` estimate's `verticals`, is not. It begins at the warm start,
-    or else at the candidate.
+    What their heads say, the `joint` estimate's `heads`, is not. It begins at the warm start, or
+    else at the candidate.
     """
-    verticals, means = (None, ()) if joint is None else (joint.verticals, joint.means)
+    heads, means = (None, ()) if joint is None else (joint.heads, joint.means)
     start = warm_start or FitStart(candidate=candidate[:3] + reference.offset, means=means)
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
     fit = fit_pose(channels, start, pose_prior(prior))
-    return _said_of(observations, channels, [fit], reference, verticals)
+    return _estimate_of(observations, channels, [fit], reference, heads)
 
 
-def _said_of(
+def _estimate_of(
     observations: Observations,
     channels: Sequence[Channel],
     ends: list[Fit],
     reference: SpeedReference,
-    verticals: VerticalEstimate | None,
+    heads: HeadEstimate | None,
 ) -> JointEstimate:
-    """What is said of the ends of fits, the best first, and of heads."""
-    if verticals is not None and not verticals.identifiable:
-        verticals = None
-    if verticals is not None:
-        ends = _by_heads(ends, verticals, reference)
+    """The estimate by the modes that fits ended at, the best first, and by heads."""
+    if heads is not None and not heads.identifiable:
+        heads = None
+    if heads is not None:
+        ends = _by_heads(ends, heads, reference)
     best = ends[0]
-    covariance = best.covariance * reference.pose_variance_inflation + _elsewhere(ends, reference)
+    covariance = best.covariance * reference.pose_variance_inflation + _covariance_of_modes(
+        ends, reference
+    )
     walking_groups = count_walking_groups(
         channels[0].measure(candidate=best.candidate, sloped=False)
     )
     # One walking group is one draw of pace and pauses, however many tracks it has.
-    covariance = covariance * max(1.0, _FEWEST_GROUPS / max(walking_groups, 1))
+    covariance = covariance * max(1.0, config.FEWEST_GROUPS / max(walking_groups, 1))
     values = best.candidate - reference.offset
     covariance = covariance + reference.offset_covariance
     by_speeds = None
-    if verticals is not None:
+    if heads is not None:
         by_speeds = PlaneEstimate(values=values, covariance=covariance, tracks=observations.walkers)
-        values, covariance = joined(values, covariance, verticals)
+        values, covariance = joined(values, covariance, heads)
     sd = np.sqrt(np.diag(covariance))
     identifiable = identifiable_of(PLANE_PARAMETERS, sd)
     reason = _reason(identifiable, sd, covariance)
-    if walking_groups < _FEWEST_GROUPS:
+    if walking_groups < config.FEWEST_GROUPS:
         identifiable = ()
         reason = Reason(
             code=TracksCode.TOO_FEW_GROUPS,
             values={
                 "tracks": observations.walkers,
                 "parties": int(walking_groups),
-                "least_parties": _FEWEST_GROUPS,
+                "least_parties": config.FEWEST_GROUPS,
             },
         )
     return JointEstimate(
@@ -183,7 +179,7 @@ def _said_of(
         covariance=covariance,
         raw=best.candidate,
         bound=best.bound,
-        score=best.score / reference.pose_variance_inflation,
+        log_likelihood=best.log_likelihood / reference.pose_variance_inflation,
         walkers=observations.walkers,
         walking_groups=walking_groups,
         identifiable=identifiable,
@@ -191,46 +187,51 @@ def _said_of(
         others=tuple(
             end.candidate - reference.offset
             for end in ends[1:]
-            if end.score > best.score - _HOPELESS * reference.pose_variance_inflation
+            if end.log_likelihood
+            > best.log_likelihood - config.LEAST_LOG_ODDS * reference.pose_variance_inflation
         ),
-        verticals=verticals,
+        heads=heads,
         by_speeds=by_speeds,
         means=best.means,
     )
 
 
-def _by_heads(ends: list[Fit], verticals: VerticalEstimate, reference: SpeedReference) -> list[Fit]:
-    """Ends whose scores have in them how likely the heads are there, the best first."""
+def _by_heads(ends: list[Fit], heads: HeadEstimate, reference: SpeedReference) -> list[Fit]:
+    """Modes weighed by how likely the heads are there, too, the best first."""
     inflation = reference.pose_variance_inflation
-    scored = []
+    weighed = []
     for end in ends:
         values = (end.candidate - reference.offset)[:2]
         covariance = (end.covariance * inflation + reference.offset_covariance)[:2, :2]
-        likely = verticals.log_density(values, covariance)
-        scored.append(replace(end, score=end.score + inflation * likely))
-    return sorted(scored, key=lambda end: -end.score)
+        likely = heads.log_density(values, covariance)
+        together = end.log_likelihood + inflation * likely
+        weighed.append(replace(end, log_likelihood=together))
+    return sorted(weighed, key=lambda end: -end.log_likelihood)
 
 
 def _some(observations: Observations) -> np.ndarray:
     """Ascending indices of tracks, evenly spaced, enough for a start."""
     walkers = np.unique(observations.steps.rows.owner_idx)
-    places = np.linspace(0, walkers.size - 1, min(_START_TRACKS, walkers.size)).astype(np.int64)
+    places = np.linspace(0, walkers.size - 1, min(config.START_TRACKS, walkers.size)).astype(
+        np.int64
+    )
     return np.asarray(walkers[places])
 
 
 def _distinct(ends: list[Fit]) -> list[Fit]:
-    """Ends that are not about the same pose, the best first."""
+    """Modes that are not about the same pose, the best first."""
     distinct: list[Fit] = []
-    for end in sorted(ends, key=lambda end: -end.score):
-        if all((np.abs(end.candidate - d.candidate) > _SAME_END).any() for d in distinct):
+    for end in sorted(ends, key=lambda end: -end.log_likelihood):
+        if all((np.abs(end.candidate - d.candidate) > config.SAME_MODE).any() for d in distinct):
             distinct.append(end)
     return distinct
 
 
-def _elsewhere(ends: list[Fit], reference: SpeedReference) -> Array:
-    """What other poses that explain the tracks about as well add to the covariance (3, 3)."""
+def _covariance_of_modes(ends: list[Fit], reference: SpeedReference) -> Array:
+    """The covariance (3, 3) by other modes, which explain the tracks about as well."""
     best = ends[0]
-    odds = np.exp([(end.score - best.score) / reference.pose_variance_inflation for end in ends])
+    log_odds = [end.log_likelihood - best.log_likelihood for end in ends]
+    odds = np.exp(np.array(log_odds) / reference.pose_variance_inflation)
     odds = odds / odds.sum()
     apart = np.array([end.candidate - best.candidate for end in ends])
     return np.asarray((apart * odds[:, None]).T @ apart)
@@ -241,13 +242,13 @@ def _reason(identifiable: tuple[str, ...], sd: Array, covariance: Array) -> Reas
     missing = [name for name in PLANE_PARAMETERS if name not in identifiable]
     if not missing:
         return None
-    said = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
+    names = {"tilt": "tilt_sd_rad", "roll": "roll_sd_rad", "height": "log_height_sd"}
     values: dict[str, Value] = {
-        said[name]: float(sd[PLANE_PARAMETERS.index(name)]) for name in missing
+        names[name]: float(sd[PLANE_PARAMETERS.index(name)]) for name in missing
     }
-    together = covariance / np.outer(sd, sd)
+    correlation = covariance / np.outer(sd, sd)
     pairs = [(0, 2), (1, 2), (0, 1)]
-    first, second = max(pairs, key=lambda pair: abs(together[pair]))
-    if abs(together[first, second]) > 0.9:
+    first, second = max(pairs, key=lambda pair: abs(correlation[pair]))
+    if abs(correlation[first, second]) > 0.9:
         values["alike"] = [PLANE_PARAMETERS[first], PLANE_PARAMETERS[second]]
     return Reason(code=TracksCode.UNIDENTIFIABLE, values=values)

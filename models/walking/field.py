@@ -9,14 +9,15 @@ Source: Bishop 2006, Pattern Recognition and Machine Learning, section 3.3, for 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
+from models.compiled import compiled
 from models.geometry.rotation import Array
-from models.walking.loops.bumps import exponents_at, features_of, slopes_of
+from models.walking.config import MOST_BUMPS
 from models.walking.measures import Measured
 
 # The squares of Gaussian bumps one length apart sum to pi, wherever one looks.
 _BUMP_SHARE = np.pi
-_MOST_BUMPS = 150
 _NO_DIRECTION, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 
 
@@ -24,7 +25,7 @@ _NO_DIRECTION, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 class FieldShape:
     """How much a field may vary: by place (over a length) and by direction, and its own level.
 
-    All spreads are standard deviations of a logarithm.
+    All are standard deviations of a logarithm.
     """
 
     level: float
@@ -49,8 +50,8 @@ class Field:
     prior_mean: Array
     prior_variance: Array
 
-    def freer(self, share: float) -> "Field":
-        """The same field with that share of its freedom, the level's apart."""
+    def scaled(self, share: float) -> "Field":
+        """The same field with a share of its prior's standard deviations, but for the level's."""
         variance = self.prior_variance * share**2
         variance[0] = self.prior_variance[0]
         return replace(self, prior_variance=variance)
@@ -98,7 +99,7 @@ def field_over(measured: Measured, shape: FieldShape) -> Field:
     places = measured.place[measured.valid]
     length_m = shape.length_m
     centres = _centres(places, length_m)
-    while len(centres) > _MOST_BUMPS:
+    while len(centres) > MOST_BUMPS:
         length_m *= 1.25
         centres = _centres(places, length_m)
     directional = measured.direction is not None
@@ -131,3 +132,104 @@ def _centres(places: Array, length_m: float) -> Array:
     grid = np.unique((cells[:, None] + around).reshape(-1, 2), axis=0) * length_m
     apart = np.linalg.norm(grid[:, None] - kept[:: max(1, len(kept) // 2000)], axis=-1)
     return np.asarray(grid[apart.min(axis=1) < length_m])
+
+
+@compiled
+def exponents_at(
+    place: Array, centres: Array, length_m: float
+) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Logarithms (M, L) of bumps of x or y alone, and which two (K, 2) make each bump.
+
+    Args:
+        place: on the ground (M, 2), metres.
+        centres: of the bumps (K, 2), metres.
+        length_m: of the bumps.
+    """
+    bumps = len(centres)
+    pair, middles = np.empty((bumps, 2), dtype=np.int64), np.empty(2 * bumps)
+    axes: list[int] = []
+    for axis in range(2):
+        begin = len(axes)
+        for k in range(bumps):
+            found = begin
+            while found < len(axes) and middles[found] != centres[k, axis]:
+                found += 1
+            if found == len(axes):
+                middles[found] = centres[k, axis]
+                axes.append(axis)
+            pair[k, axis] = found
+    exponents, fall = np.empty((len(place), len(axes))), -1 / (2 * length_m**2)
+    for j in range(len(place)):
+        for line, axis in enumerate(axes):
+            apart = place[j, axis] - middles[line]
+            exponents[j, line] = apart * apart * fall
+    return exponents, pair
+
+
+@compiled
+def features_of(
+    falls: Array, pair: npt.NDArray[np.int64], directional: bool, direction: Array
+) -> Array:
+    """A field's features (M, P): 1, four of the direction where it has any, and K bumps.
+
+    Args:
+        falls: bumps of x or y alone (M, L).
+        pair: which two make each bump (K, 2).
+        directional: whether the field has directions.
+        direction: unit vectors (M, 2), where it has.
+    """
+    first = 5 if directional else 1
+    features = np.empty((len(falls), first + len(pair)))
+    for j in range(len(falls)):
+        row, fall = features[j], falls[j]
+        row[0] = 1.0
+        if directional:
+            x, y = direction[j]
+            row[1], row[2], row[3], row[4] = x, y, x * x - y * y, 2 * x * y
+        for k in range(len(pair)):
+            row[first + k] = fall[pair[k, 0]] * fall[pair[k, 1]]
+    return features
+
+
+@compiled
+def slopes_of(
+    east: Array,
+    north: Array,
+    total: Array,
+    length_m: float,
+    place: Array,
+    d_place: Array,
+    coefficients: Array,
+    directional: bool,
+    direction: Array,
+    d_direction: Array,
+) -> Array:
+    """Derivatives (M, 3) of a field's mean by tilt, roll, log height.
+
+    Args:
+        east: sums of bumps times their coefficients and their centres' x (M,).
+        north: the same with y (M,).
+        total: the same with 1 (M,).
+        length_m: of the bumps.
+        place: on the ground (M, 2), metres.
+        d_place: derivatives of that (M, 2, 3).
+        coefficients: of the field (P,).
+        directional: whether the field has directions.
+        direction: unit vectors (M, 2), where it has.
+        d_direction: derivatives of those (M, 2, 3).
+    """
+    slopes = np.empty((len(place), 3))
+    for j in range(len(place)):
+        by_x = (east[j] - total[j] * place[j, 0]) / length_m**2
+        by_y = (north[j] - total[j] * place[j, 1]) / length_m**2
+        for number in range(3):
+            slopes[j, number] = by_x * d_place[j, 0, number] + by_y * d_place[j, 1, number]
+        if directional:
+            x, y = direction[j]
+            a, b, c, d = coefficients[1], coefficients[2], coefficients[3], coefficients[4]
+            by_x, by_y = a + 2 * (c * x + d * y), b + 2 * (d * x - c * y)
+            for number in range(3):
+                slopes[j, number] += (
+                    by_x * d_direction[j, 0, number] + by_y * d_direction[j, 1, number]
+                )
+    return slopes

@@ -4,7 +4,7 @@ The coefficients beta of the site's field are eliminated from the normal equatio
 H = A - B C^-1 B', as a Schur complement.
 
 Source: Triggs, McLauchlan, Hartley and Fitzgibbon 2000, Bundle Adjustment, for the elimination; the
-weights of each round are those of `hierarchy`.
+weights of each round are those of `mixed_model`.
 """
 
 from collections.abc import Sequence
@@ -14,49 +14,49 @@ from typing import Protocol
 import numpy as np
 
 from models.geometry.rotation import Array
+from models.serialization import stored_as
+from models.walking import config
 from models.walking.direction_noise import corrected_covariance, noise_information
 from models.walking.field import Field
 from models.walking.measures import Measured
-from models.walking.mixed_model import (
+from models.walking.mixed.model import (
     FISHER,
     Curvature,
-    Spread,
+    Normal,
+    VarianceComponents,
     Weights,
     composite_log_likelihoods,
     curvature,
-    hierarchical_log_likelihood,
-    relearn,
+    em_step,
+    h_log_likelihood,
+    regress,
     reweigh,
     track_curvatures,
 )
 
-_MOST_ROUNDS = 40
-_LEARNING_ROUNDS = 40
-_LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round, in tilt, roll, log height
-_NEAR = 0.2  # of the longest move
-_CONVERGED = 1e-5
-_ROUGHLY = 0.1  # standard deviations: a round more moves it by some hundredths
+_NEAR = 0.2  # of the longest move: from there on by the information of Student-t
+_FIELD_SETTLED = 1e-4  # of a log at any row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Learned:
-    """A field with the mean (P,) and covariance (P, P) of its coefficients, and the spread.
+    """A field with the mean (P,) and covariance (P, P) of its coefficients.
 
-    `usual` is the field's mean over all that it was learned of.
+    `components` are of variance; `usual` is the field's mean over all that it was learned of.
     """
 
     field: Field
     mean: Array
     covariance: Array
-    spread: Spread
+    components: VarianceComponents = stored_as("spread")
     usual: float
 
 
 class Measure(Protocol):
-    """What some tracks show at a candidate (3,), with derivatives if it is `sloped`."""
+    """Measure some tracks at a candidate (3,), with derivatives if it is `sloped`."""
 
     def __call__(self, *, candidate: Array, sloped: bool = True) -> Measured:
-        """Measure."""
+        """Logarithms of the tracks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,65 +92,57 @@ class FitStart:
 class Fit:
     """Where Gauss-Newton ended: candidate (3,), covariance (3, 3) by the curvature less noise.
 
-    `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao). `score`
-    compares ends of different starts: the composite log likelihood, less the prior's penalty.
+    `bound` (3, 3) is what no estimate by the same likelihood can beat (Cramer and Rao).
+    `log_likelihood` compares ends of different starts: the composite one, less the prior's penalty.
     `means` are the coefficients (P,) of each channel's field there.
     """
 
     candidate: Array
     covariance: Array
     bound: Array
-    score: float
+    log_likelihood: float
     means: tuple[Array, ...]
 
     @property
     def warm_start(self) -> FitStart:
-        """Where a fit of almost the same tracks may begin."""
+        """The start of a fit of almost the same tracks."""
         return FitStart(candidate=self.candidate, means=self.means, warm=True)
 
 
-def assumed(field: Field, spread: Spread) -> Learned:
+def assumed(field: Field, components: VarianceComponents) -> Learned:
     """A field that nothing has been learned of yet."""
     return Learned(
         field=field,
         mean=field.prior_mean,
         covariance=np.diag(field.prior_variance),
-        spread=spread,
+        components=components,
         usual=float(field.prior_mean[0]),
     )
 
 
-def learn(measured: Measured, start: Learned, *, spread_rounds: int) -> Learned:
-    """The field and the spread that explain what was measured at a known pose.
+def learn(measured: Measured, start: Learned, *, em_rounds: int) -> Learned:
+    """The field and the components that explain what was measured at a known pose.
 
-    The spread is learned anew so many times; with 0 it is taken as given.
+    The components are learned in so many rounds of EM; with 0 they are taken as given.
     """
-    spread = start.spread
-    precision = np.linalg.inv(start.covariance)
-    features = start.field.features(measured)
-    mean, covariance = start.mean, start.covariance
-    for round_ in range(spread_rounds + 1):
-        for _ in range(_LEARNING_ROUNDS):
-            residual = measured.value - features @ mean
-            weights = reweigh(residual, measured.value, measured.valid, measured.rows, spread)
-            sums = curvature(-features, residual, weights, measured.rows, spread)
-            covariance = np.linalg.inv(sums.matrix + precision)
-            move = -covariance @ (sums.gradient + precision @ (mean - start.mean))
-            mean = mean + move
-            if np.abs(features @ move).max(initial=0.0) < 1e-4:
-                break
-        if round_ < spread_rounds:
-            residual = measured.value - features @ mean
-            spread = relearn(
-                residual, measured.value, measured.valid, measured.rows, weights, spread
-            )
+    features, components = start.field.features(measured), start.components
+    prior = Normal(mean=start.mean, covariance=start.covariance)
+    found = prior
+    for round_ in range(em_rounds + 1):
+        found, weights = regress(
+            features, measured, components, prior, found.mean,
+            lambda move: bool(np.abs(features @ move).max(initial=0.0) < _FIELD_SETTLED),
+        )  # fmt: skip
+        if round_ < em_rounds:
+            residual = measured.value - features @ found.mean
+            components = em_step(residual, measured, weights, components)
     inlier = weights.inlier
     return Learned(
         field=start.field,
-        mean=mean,
-        covariance=covariance,
-        spread=spread,
-        usual=float((inlier * (features @ mean)).sum() / max(float(inlier.sum()), 1e-9)),
+        mean=found.mean,
+        covariance=found.covariance,
+        components=components,
+        usual=float((inlier * (features @ found.mean)).sum() / max(float(inlier.sum()), 1e-9)),
     )
 
 
@@ -158,9 +150,8 @@ def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
     """The log likelihood, by a learned field, of what other tracks measured at the same pose."""
     residual = measured.value - learned.field.features(measured) @ learned.mean
     residual = np.where(measured.valid, residual, 0.0)
-    rows, spread = measured.rows, learned.spread
-    weights = reweigh(residual, measured.value, measured.valid, rows, spread)
-    return hierarchical_log_likelihood(residual, weights, rows, spread)
+    weights = reweigh(residual, measured, learned.components)
+    return h_log_likelihood(residual, weights, measured.rows, learned.components)
 
 
 def fit_pose(channels: Sequence[Channel], start: FitStart, prior: PosePrior) -> Fit:
@@ -171,7 +162,7 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: PosePrior) -> 
         means = [channel.learned.mean for channel in channels]
     precisions = [np.linalg.inv(channel.learned.covariance) for channel in channels]
     pose_precision = np.diag(prior.sd**-2.0)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(config.MOST_ROUNDS):
         # Given the pose, the fields are independent: each is eliminated by itself.
         matrix = pose_precision.copy()
         gradient = pose_precision @ (candidate - prior.mean)
@@ -179,18 +170,18 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: PosePrior) -> 
         solved = []
         for channel, mean, precision in zip(channels, means, precisions, strict=True):
             measured, jacobian, residual, weights = _linear(channel, candidate, mean)
-            spread = channel.learned.spread
-            sums = curvature(jacobian, residual, weights, measured.rows, spread)
+            components = channel.learned.components
+            sums = curvature(jacobian, residual, weights, measured.rows, components)
             own = sums.matrix[3:, 3:] + precision
             own_gradient = sums.gradient[3:] + precision @ (mean - channel.learned.mean)
             cross = sums.matrix[:3, 3:]
             both = np.linalg.solve(own, np.column_stack([cross.T, own_gradient]))
             matrix += sums.matrix[:3, :3] - cross @ both[:, :3]
             gradient += sums.gradient[:3] - cross @ both[:, 3]
-            noise += noise_information(measured, weights, spread)
+            noise += noise_information(measured, weights, components)
             solved.append(both)
         move = -np.linalg.solve(matrix, gradient)
-        far = float((np.abs(move) / _LONGEST_MOVE).max())
+        far = float((np.abs(move) / config.LONGEST_MOVE).max())
         # Near the end by the information of Student-t, which is less than its weights say: fewer
         # rounds by a half. Source: Lange, Little and Taylor 1989, scoring.
         share = FISHER if far < _NEAR else min(1.0, 1 / far)
@@ -199,18 +190,18 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: PosePrior) -> 
             mean - share * (both[:, 3] + both[:, :3] @ move)
             for mean, both in zip(means, solved, strict=True)
         ]
-        if np.abs(share * move).max() < _CONVERGED:
+        if np.abs(share * move).max() < config.CONVERGED:
             break
-        if start.warm and share * share * float(move @ matrix @ move) < _ROUGHLY**2:
+        if start.warm and share * share * float(move @ matrix @ move) < config.ROUGHLY**2:
             break
-    score = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
+    log_likelihood = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):
-        score += float(_log_likelihoods(channel, candidate, mean).sum())
+        log_likelihood += float(_log_likelihoods(channel, candidate, mean).sum())
     return Fit(
         candidate=candidate,
         covariance=corrected_covariance(matrix, noise),
         bound=FISHER * np.asarray(np.linalg.inv(matrix)),
-        score=score,
+        log_likelihood=log_likelihood,
         means=tuple(means),
     )
 
@@ -222,7 +213,8 @@ def per_track(channels: Sequence[Channel], candidate: Array) -> Curvature:
         learned = channel.learned
         measured, jacobian, residual, weights = _linear(channel, candidate, learned.mean)
         by_pose = jacobian[:, :3]
-        each.append(track_curvatures(by_pose, residual, weights, measured.rows, learned.spread))
+        components = learned.components
+        each.append(track_curvatures(by_pose, residual, weights, measured.rows, components))
     return Curvature(
         matrix=np.sum([sums.matrix for sums in each], axis=0),
         gradient=np.sum([sums.gradient for sums in each], axis=0),
@@ -243,7 +235,7 @@ def _linear(
     learned = channel.learned
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ mean, 0.0)
-    weights = reweigh(residual, measured.value, measured.valid, measured.rows, learned.spread)
+    weights = reweigh(residual, measured, learned.components)
     jacobian = np.empty((residual.size, 3 + mean.size))
     slopes = learned.field.slopes(measured, features, mean)
     np.subtract(measured.d_value, slopes, out=jacobian[:, :3])
@@ -254,6 +246,4 @@ def _linear(
 def _log_likelihoods(channel: Channel, candidate: Array, mean: Array) -> Array:
     measured = channel.measure(candidate=candidate, sloped=False)
     residual = measured.value - channel.learned.field.features(measured) @ mean
-    return composite_log_likelihoods(
-        residual, measured.value, measured.valid, measured.rows, channel.learned.spread
-    )
+    return composite_log_likelihoods(residual, measured, channel.learned.components)

@@ -7,16 +7,17 @@ shorter; groups are the connected components of such pairs.
 import numpy as np
 import numpy.typing as npt
 
+from models.compiled import compiled
 from models.geometry.rotation import Array
 from models.tracks.components import first_of_component
-from models.walking.loops.pairs import pairs_beside
+from models.walking.config import (
+    GROUP_BIN_S,
+    GROUP_NEAR_M,
+    GROUP_SAME_WAY,
+    GROUP_SHARE,
+    GROUP_STANDING_MPS,
+)
 from models.walking.measures import Measured
-
-_BIN_S = 3.0
-_NEAR_M = 4.0
-_SAME_WAY = 0.8  # cosine: 37 deg
-_STANDING_MPS = 0.4
-_SHARE = 0.6  # of the shorter walk that two people spend side by side to be one walking group
 
 
 def count_walking_groups(speeds: Measured) -> int:
@@ -26,7 +27,7 @@ def count_walking_groups(speeds: Measured) -> int:
     than one.
     """
     assert speeds.direction is not None
-    walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(_STANDING_MPS)))
+    walking = np.flatnonzero(speeds.valid & (speeds.value > np.log(GROUP_STANDING_MPS)))
     rows = speeds.rows
     labels = walking_groups_of(
         rows.time_s[walking],
@@ -39,7 +40,11 @@ def count_walking_groups(speeds: Measured) -> int:
 
 
 def walking_groups_of(
-    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array, owners: int
+    time_s: Array,
+    owner_idx: npt.NDArray[np.int64],
+    place: Array,
+    direction: Array,
+    owners: int,
 ) -> npt.NDArray[np.int64]:
     """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
 
@@ -47,26 +52,48 @@ def walking_groups_of(
         time_s: when each step was (M,).
         owner_idx: the track of each (M,).
         place: where it was on the ground (M, 2), metres.
-        way: unit vectors (M, 2) of where it went.
+        direction: unit vectors (M, 2) of where it went.
         owners: how many tracks there are; those without steps are each a walking group.
     """
-    bins, positions, ways, owner_idx = _sampled(time_s, owner_idx, place, way)
-    together = pairs_beside(bins, owner_idx, positions, ways, _NEAR_M, _SAME_WAY)
-    pair, count = np.unique(together[:, 0] * owners + together[:, 1], return_counts=True)
-    beside = np.stack(np.divmod(pair, owners), axis=1)
-    lengths = np.bincount(owner_idx, minlength=owners)
-    return first_of_component(beside[count >= _SHARE * lengths[beside].min(axis=1)], owners)
-
-
-def _sampled(
-    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, way: Array
-) -> tuple[npt.NDArray[np.int64], Array, Array, npt.NDArray[np.int64]]:
-    """One step for each track and time bin: bins (K,), places, directions (K, 2), owners."""
     since_s = time_s - time_s.min(initial=np.inf)
-    time_bin = np.floor(since_s / _BIN_S + 1e-3).astype(np.int64)
+    time_bin = np.floor(since_s / GROUP_BIN_S + 1e-3).astype(np.int64)
     order = np.lexsort((owner_idx, time_bin))
     fresh = (np.diff(time_bin[order], prepend=-1) != 0) | (
         np.diff(owner_idx[order], prepend=-1) != 0
     )
-    first = order[fresh]
-    return time_bin[first], place[first], way[first], owner_idx[first]
+    first = order[fresh]  # one step for each track and bin
+    together = pairs_beside(time_bin[first], owner_idx[first], place[first], direction[first])
+    pair, count = np.unique(together[:, 0] * owners + together[:, 1], return_counts=True)
+    beside = np.stack(np.divmod(pair, owners), axis=1)
+    lengths = np.bincount(owner_idx[first], minlength=owners)
+    return first_of_component(beside[count >= GROUP_SHARE * lengths[beside].min(axis=1)], owners)
+
+
+@compiled
+def pairs_beside(
+    time_bin: npt.NDArray[np.int64],
+    owner_idx: npt.NDArray[np.int64],
+    place: Array,
+    direction: Array,
+) -> npt.NDArray[np.int64]:
+    """Pairs of tracks (K, 2), one for each time that the two are beside one another.
+
+    Args:
+        time_bin: ascending (M,).
+        owner_idx: tracks (M,), ascending within a bin.
+        place: where each was (M, 2), metres.
+        direction: unit vectors (M, 2) of where it went.
+    """
+    found = []
+    for i in range(time_bin.size):
+        j = i + 1
+        while j < time_bin.size and time_bin[j] == time_bin[i]:
+            apart = np.hypot(place[i, 0] - place[j, 0], place[i, 1] - place[j, 1])
+            same = direction[i, 0] * direction[j, 0] + direction[i, 1] * direction[j, 1]
+            if apart < GROUP_NEAR_M and same > GROUP_SAME_WAY:
+                found.append((owner_idx[i], owner_idx[j]))
+            j += 1
+    pairs = np.empty((len(found), 2), dtype=np.int64)
+    for k, (first, second) in enumerate(found):
+        pairs[k, 0], pairs[k, 1] = first, second
+    return pairs

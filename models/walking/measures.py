@@ -15,8 +15,7 @@ import numpy as np
 from models.geometry.ground_flow import rotation_and_turns
 from models.geometry.rotation import Array, Mask, rotation_from_angles
 from models.tracks.observations import Rows, Steps, Tops
-from models.walking.loops.speeds import speeds_of_steps
-from models.walking.loops.statures import heights_of_tops
+from models.walking.ground_loops import heights_of_tops, speeds_of_steps
 
 _LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
 _LEAST_RATIO = 0.01  # of a person's height to the camera's

@@ -9,8 +9,8 @@ _FORMAT = Format(name="site", version=1)
 
 
 def reference_to_bytes(reference: SpeedReference) -> bytes:
-    """A reference as it is stored, but for its doubt, which has a column of its own."""
-    return pack(_FORMAT, flattened(replace(reference, doubt=None)))
+    """A reference as it is stored, but for what is implausible, which has a column of its own."""
+    return pack(_FORMAT, flattened(replace(reference, implausible=None)))
 
 
 def reference_from_bytes(data: bytes) -> SpeedReference:
@@ -19,4 +19,4 @@ def reference_from_bytes(data: bytes) -> SpeedReference:
     Raises:
         CheckpointError: the bytes are no reference of this format.
     """
-    return restored(SpeedReference, unpack(_FORMAT, data), doubt=None)
+    return restored(SpeedReference, unpack(_FORMAT, data), implausible=None)

@@ -1,22 +1,18 @@
-"""Where to begin: a coarse look at all poses in reach, so that one bad start cannot fool us.
+"""Starts of the fit: a coarse look at all poses in reach, so that one bad start cannot fool us.
 
 Ours: at each tilt and roll of a grid, log height = usual log speed - quantile of log speed at
 height 1.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from models.geometry.rotation import Array
+from models.walking import config
 from models.walking.fit import Channel
-from models.walking.mixed_model import composite_log_likelihoods
-
-_REACH_RAD = np.radians(20)
-_PLACES = 11  # of each angle: 4 deg apart
-_APART_RAD = np.radians(5)
-_LEAST_VALID = 0.9
-_SPEED_QUANTILES = (0.4, 0.6, 0.75)  # of all speeds, standing people's too, to be the usual one
+from models.walking.mixed.model import composite_log_likelihoods
 
 
 def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array]:
@@ -26,7 +22,7 @@ def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array
     speeds to the site's usual one. Places and directions are not looked at: this is only a start.
     """
     found = []
-    offsets = np.linspace(-_REACH_RAD, _REACH_RAD, _PLACES)
+    offsets = np.linspace(-config.START_REACH_RAD, config.START_REACH_RAD, config.START_PLACES)
     for tilt in centre[0] + offsets:
         for roll in centre[1] + offsets:
             found += _at(channels, np.array([tilt, roll, centre[2]]))
@@ -35,7 +31,8 @@ def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array
     for _, candidate in found:
         if len(chosen) == count:
             break
-        if all(np.abs((candidate - other)[:2]).max() > _APART_RAD for other in chosen):
+        apart = [np.abs((candidate - other)[:2]).max() for other in chosen]
+        if all(far > config.START_DISTANCE_RAD for far in apart):
             chosen.append(candidate)
     return [*chosen, centre]
 
@@ -44,7 +41,7 @@ def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Arra
     measures = [channel.measure(candidate=candidate, sloped=False) for channel in channels]
     speeds = measures[0]
     values = speeds.value[speeds.valid]
-    if not values.size or values.size / speeds.valid.size < _LEAST_VALID:
+    if not values.size or values.size / speeds.valid.size < config.START_VALID:
         return []
     usual = channels[0].learned.usual
     found = []
@@ -52,11 +49,9 @@ def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Arra
         taller = usual - quantile
         total = 0.0
         for channel, measured in zip(channels, measures, strict=True):
-            learned, value = channel.learned, measured.value + taller
-            residual = value - learned.usual
-            each = composite_log_likelihoods(
-                residual, value, measured.valid, measured.rows, learned.spread
-            )
+            moved = replace(measured, value=measured.value + taller)
+            residual = moved.value - channel.learned.usual
+            each = composite_log_likelihoods(residual, moved, channel.learned.components)
             total += float(each.sum())
         found.append((total, candidate + [0.0, 0.0, taller]))
     return found
@@ -64,6 +59,6 @@ def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Arra
 
 def _quantiles(values: Array) -> list[float]:
     """The speeds' quantiles, as numpy's, which takes three times as long for so few."""
-    places = np.array(_SPEED_QUANTILES) * (values.size - 1)
+    places = np.array(config.START_QUANTILES) * (values.size - 1)
     found = np.interp(places, np.arange(values.size), np.sort(values))
     return [float(quantile) for quantile in found]

@@ -7,9 +7,9 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
-from service.store.operation import activity
-from service.store.operation.actor import actor_of
-from service.store.tables.activity import ActivityRecord
+from service.store import activity
+from service.store.access import actor_of
+from service.store.activity import ActivityRecord
 
 
 def note(

@@ -13,8 +13,8 @@ from service.access.tokens import caller_of, caller_of_token, is_valid
 from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, UnauthorizedError
 from service.settings import Settings
-from service.store.operation import access
-from service.store.tables.access import SessionRecord
+from service.store import access
+from service.store.access import SessionRecord
 
 _ID_BYTES = 32
 

@@ -13,8 +13,8 @@ from service.access.activity import note
 from service.access.callers import Caller
 from service.enums import Activity, TokenScope
 from service.errors import FieldError, MalformedError, NotFoundError
-from service.store.operation import access
-from service.store.tables.access import TokenRecord
+from service.store import access
+from service.store.access import TokenRecord
 
 _PREFIX = "sf"
 _SECRET_BYTES = 32

@@ -24,21 +24,10 @@ from service.errors import ConflictError, NotFoundError
 from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import alerts, maintenance
-from service.store.alerts import AlertFilter
-from service.store.operation import activity, events
-from service.store.tables.activity import ActivityRecord
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
+from service.store import activity, alerts, events, maintenance, tracks
+from service.store.activity import ActivityRecord
+from service.store.alerts import AlertFilter, AlertRecord
 
-_KEPT_AS = {
-    AlertActivity.OPENED: Activity.ALERT_OPENED,
-    AlertActivity.ESCALATED: Activity.ALERT_ESCALATED,
-    AlertActivity.ACKNOWLEDGED: Activity.ALERT_ACKNOWLEDGED,
-    AlertActivity.SILENCED: Activity.ALERT_SILENCED,
-    AlertActivity.SILENCE_ENDED: Activity.ALERT_SILENCE_ENDED,
-    AlertActivity.RESOLVED: Activity.ALERT_RESOLVED,
-}
 # What of an alert's body an event has.
 _EVENT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
@@ -76,34 +65,29 @@ def open_alert(
     if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
+    if record is not None and source == AlertSource.REFERENCE:
+        return record
+    change: MessageType | None = MessageType.ALERT_OPENED
     if record is not None:
-        if source == AlertSource.REFERENCE:
-            return record
-        change: MessageType | None = None
-        if record.severity != severity or record.source != source:
-            change = MessageType.ALERT_UPDATED
+        changed = (record.severity, record.source) != (severity, source)
+        change = MessageType.ALERT_UPDATED if changed else None
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
             _keep_activity(session, record, AlertActivity.ESCALATED, None)
-        record.drift, record.severity, record.updated_at = drift, severity, now
-        record.reasons, record.source = reasons, source
         record.changed_at = changed_at or record.changed_at
     else:
-        change = MessageType.ALERT_OPENED
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
             track_source=tracks.newest_source(session, camera_id),
             kind=kind,
             state=AlertState.FIRING,
-            source=source,
-            severity=severity,
-            reasons=reasons,
-            drift=drift,
             notified=False,
             opened_at=now,
             changed_at=changed_at,
-            updated_at=now,
         )
+    record.severity, record.source = severity, source
+    record.drift, record.reasons, record.updated_at = drift, reasons, now
+    if change == MessageType.ALERT_OPENED:
         session.add(record)
         session.flush()
         _keep_activity(session, record, AlertActivity.OPENED, None)
@@ -128,7 +112,7 @@ def end_alert(
     """End the open alert of a camera and kind, if there is one."""
     record = alerts.firing(session, camera_id, kind)
     if record is not None:
-        _end(session, record, outcome, note, None)
+        close_alert(session, record, outcome, note)
 
 
 def close_pose_alerts(
@@ -138,20 +122,34 @@ def close_pose_alerts(
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            _end(session, record, outcome, note, by)
+            close_alert(session, record, outcome, note, by)
 
 
 def close_alert(
-    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
+    session: Session,
+    record: AlertRecord,
+    outcome: Outcome,
+    note: str | None = None,
+    by: str | None = None,
 ) -> None:
-    """End an open alert with what a person says came of it."""
-    _end(session, record, outcome, note, by)
+    """End an open alert with what came of it; with the last of a group, that too."""
+    now = datetime.now(UTC)
+    record.state, record.outcome = AlertState.RESOLVED, outcome
+    record.note, record.resolved_by = note, by
+    record.resolved_at = record.updated_at = now
+    _keep_activity(session, record, AlertActivity.RESOLVED, by, outcome=outcome, note=note)
+    session.flush()
+    _tell(session, record, MessageType.ALERT_RESOLVED)
+    group = None if record.group_id is None else alerts.find(session, record.group_id)
+    over = group is not None and not alerts.firing_members(session, group.id)
+    if group is not None and group.state == AlertState.FIRING and over:
+        close_alert(session, group, outcome, note, by)
 
 
 def end_empty_groups(session: Session) -> None:
     """End groups whose members are gone with their cameras."""
     for group in alerts.groups_without_members(session):
-        _end(session, group, Outcome.CLEARED, None, None)
+        close_alert(session, group, Outcome.CLEARED)
 
 
 def list_alerts(session: Session, wanted: AlertFilter, limit: int) -> Sequence[AlertRecord]:
@@ -172,7 +170,7 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
 
 
 def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
-    """What was done with an alert since it opened, oldest first."""
+    """Everything that was done with an alert since it opened, oldest first."""
     entries = activity.of_subject(session, alert_id)
     return [entry for entry in entries if entry.what != Activity.ALERT_OPENED]
 
@@ -220,22 +218,6 @@ def note_on_alert(
     _tell(session, record, _NOTIFIED_AS[what])
 
 
-def _end(
-    session: Session, record: AlertRecord, outcome: Outcome, note: str | None, by: str | None
-) -> None:
-    now = datetime.now(UTC)
-    record.state, record.outcome = AlertState.RESOLVED, outcome
-    record.note, record.resolved_by = note, by
-    record.resolved_at = record.updated_at = now
-    _keep_activity(session, record, AlertActivity.RESOLVED, by, outcome=outcome, note=note)
-    session.flush()
-    _tell(session, record, MessageType.ALERT_RESOLVED)
-    group = None if record.group_id is None else alerts.find(session, record.group_id)
-    over = group is not None and not alerts.firing_members(session, group.id)
-    if group is not None and group.state == AlertState.FIRING and over:
-        _end(session, group, outcome, note, by)
-
-
 def _keep_activity(
     session: Session,
     record: AlertRecord,
@@ -248,7 +230,7 @@ def _keep_activity(
 ) -> None:
     note_activity(
         session,
-        _KEPT_AS[what],
+        Activity(f"alert.{what}"),
         by=by,
         camera_id=record.camera_id,
         subject_id=record.id,

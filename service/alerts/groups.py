@@ -11,10 +11,9 @@ from models.reasons import Reason
 from service.enums import AlertKind, AlertSource, AlertState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts
-from service.store.database.store import also_about
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
+from service.store import alerts, tracks
+from service.store.alerts import AlertRecord
+from service.store.engines.store import also_about
 
 # What a group is called, and which alerts of cameras can have its cause.
 _CAUSES = {
@@ -44,36 +43,40 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     if not known and not _enough(session, settings, source, together):
         return None
     opened = group is None
-    now = datetime.now(UTC)
-    if group is None:
-        group = AlertRecord(
-            id=secrets.token_hex(16),
-            camera_id=None,
-            camera_ids=[],
-            track_source=source,
-            kind=kind,
-            state=AlertState.FIRING,
-            source=AlertSource.GROUP,
-            severity=Severity.CRITICAL,
-            reasons=(),
-            drift={},
-            notified=False,
-            opened_at=now,
-            changed_at=None,
-            updated_at=now,
-        )
-        session.add(group)
-        session.flush()
+    group = group or _new_group(session, source, kind)
     for member in together:
         member.group_id = group.id
     members = {str(member.camera_id) for member in together}
     group.camera_ids = sorted({*(group.camera_ids or []), *members})
     began = [_began_at(member) for member in together]
     group.changed_at = min([*began, *([group.changed_at] if group.changed_at else [])])
-    group.updated_at = now
+    group.updated_at = datetime.now(UTC)
     group.reasons = (_reason(group),)
     session.flush()
     return group if opened else None
+
+
+def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
+    now = datetime.now(UTC)
+    group = AlertRecord(
+        id=secrets.token_hex(16),
+        camera_id=None,
+        camera_ids=[],
+        track_source=source,
+        kind=kind,
+        state=AlertState.FIRING,
+        source=AlertSource.GROUP,
+        severity=Severity.CRITICAL,
+        reasons=(),
+        drift={},
+        notified=False,
+        opened_at=now,
+        changed_at=None,
+        updated_at=now,
+    )
+    session.add(group)
+    session.flush()
+    return group
 
 
 def _together(

@@ -9,7 +9,7 @@ from service.enums import AlertActivity
 from service.errors import FieldError, MalformedError
 from service.settings import Settings
 from service.store import alerts
-from service.store.tables.alerts import AlertRecord
+from service.store.alerts import AlertRecord
 
 
 def silence_alert(

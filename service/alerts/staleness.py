@@ -1,4 +1,4 @@
-"""Whether each camera's estimate is being made; where it is not, its alert `stale`."""
+"""The alert `stale` of cameras whose estimate is not being made."""
 
 import time
 from dataclasses import dataclass
@@ -11,9 +11,8 @@ from service.alerts.alerts import end_alert, open_alert
 from service.enums import AlertActivity, AlertKind, AlertSource, Outcome, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts, cameras
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import unseen
+from service.store import alerts, cameras, tracks
+from service.store.cameras import CameraRecord
 
 # Who closed the alert knows; if nothing is better by then, it is told again.
 _ANSWERED = timedelta(hours=1)
@@ -40,7 +39,7 @@ class StaleWatch:
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
         """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
         now_s = time.monotonic()
-        oldest = unseen.since(session)
+        oldest = tracks.unseen_since(session)
         self._waiting = {
             camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
         }
@@ -52,31 +51,12 @@ class StaleWatch:
         for camera in cameras.failing(session, besides=firing | long):
             waits_s = waits.get(camera.id, 0.0)
             reason = _why_stale(camera, settings, waits_s)
-            if reason is None and camera.id in firing:
-                if camera.estimate_failing_since is None:
-                    end_alert(
-                        session,
-                        camera.id,
-                        AlertKind.STALE,
-                        Outcome.CLEARED,
-                        note="it is looked at again",
-                    )
+            if reason is None:
+                if camera.id in firing and camera.estimate_failing_since is None:
+                    _end(session, camera)
                     found[camera.id] = "ended"
-            elif reason is not None and camera.id not in firing and not _answered(session, camera):
-                since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(
-                    seconds=waits_s
-                )
-                open_alert(
-                    session,
-                    settings,
-                    camera.id,
-                    AlertKind.STALE,
-                    Severity.CRITICAL,
-                    {},
-                    since,
-                    reasons=(reason,),
-                    source=AlertSource.UPKEEP,
-                )
+            elif camera.id not in firing and not _answered(session, camera):
+                _open(session, settings, camera, reason, waits_s)
                 found[camera.id] = AlertActivity.OPENED
         return found
 
@@ -88,7 +68,7 @@ class StaleWatch:
 
 
 def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:
-    """Why a camera's estimate is not what it should be; None where it is."""
+    """The reason why a camera's estimate is not what it should be; None where it is."""
     failed = camera.estimate_tries >= settings.stale_failures
     # While it is being looked at, it is not due: the last try may be the one that succeeds.
     if failed and camera.estimate_error is not None and camera.estimate_due_at is not None:
@@ -101,6 +81,28 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reas
         waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
         return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
     return None
+
+
+def _open(
+    session: Session, settings: Settings, camera: CameraRecord, reason: Reason, waits_s: float
+) -> None:
+    since = camera.estimate_failing_since or datetime.now(UTC) - timedelta(seconds=waits_s)
+    open_alert(
+        session,
+        settings,
+        camera.id,
+        AlertKind.STALE,
+        Severity.CRITICAL,
+        drift={},
+        changed_at=since,
+        reasons=(reason,),
+        source=AlertSource.UPKEEP,
+    )
+
+
+def _end(session: Session, camera: CameraRecord) -> None:
+    note = "it is looked at again"
+    end_alert(session, camera.id, AlertKind.STALE, Outcome.CLEARED, note)
 
 
 def _answered(session: Session, camera: CameraRecord) -> bool:

@@ -18,8 +18,7 @@ from service.api.fields import Text
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.cameras import decisions
 from service.enums import AlertState
-from service.store.alerts import AlertFilter
-from service.store.tables.alerts import AlertRecord
+from service.store.alerts import AlertFilter, AlertRecord
 
 router = APIRouter(prefix="/alerts", tags=["alerts"])
 

@@ -9,8 +9,8 @@ from pydantic import BaseModel, Field
 from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Who
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.notifications.outbox import alert_body
-from service.store.tables.activity import ActivityRecord
-from service.store.tables.alerts import AlertRecord
+from service.store.activity import ActivityRecord
+from service.store.alerts import AlertRecord
 
 
 class AcknowledgeBody(Body):

@@ -17,8 +17,8 @@ from service.api.middleware.dependencies import AppState, StateDep
 from service.api.middleware.direct.feed import Feed, wait
 from service.api.middleware.guard import still_let_in
 from service.operations import health
-from service.store.database.store import Store
-from service.store.tables.operation import EventRecord
+from service.store.engines.store import Store
+from service.store.events import EventRecord
 
 router = APIRouter(tags=["events"])
 _HEARTBEAT_S = 10.0

@@ -11,11 +11,12 @@ from service.api.fields import Body, ReasonCode, ReasonValues, Who
 from service.api.geometry_schemas import PoseOut
 from service.cameras.poses import PoseView
 from service.enums import PoseState, ReferenceState
-from service.estimation.drift_words import FIELDS
 from service.formats.degrees import in_degrees
 from service.reasons import code_of, values_of
-from service.store.packing import identifiable_drift, identifiable_sd
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
+from service.store.serialization import identifiable_drift, identifiable_sd
+
+_FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 
 
 class AcceptBody(Body):
@@ -110,7 +111,7 @@ class ServedPoseOut(BaseModel):
             camera_id=view.camera_id,
             state=view.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[field for name, field in FIELDS.items() if name in view.identifiable],
+            estimated=[field for name, field in _FIELDS.items() if name in view.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             estimates={} if estimate is None else in_degrees(estimate.raw),

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from service.api.middleware.dependencies import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
-from service.store.operation.actor import set_actor
+from service.store.access import set_actor
 
 
 class SnapshotOut(BaseModel):

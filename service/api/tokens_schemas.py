@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 from service.access.tokens import MAX_NAME, MadeToken, TokenSpec
 from service.api.fields import Body, CameraId, Moment
 from service.enums import TokenScope, TokenState
-from service.store.tables.access import TokenRecord
+from service.store.access import TokenRecord
 
 
 class TokenBody(Body):

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal, Self
 from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
+from service import training
 from service.api.fields import Body, Who
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.enums import TrainingState
-from service.store.tables.trainings import TrainingRecord
-from service.training import trainings
+from service.store.trainings import TrainingRecord
 
 
 class TrainingBody(Body):
@@ -102,7 +102,7 @@ def request(
     """Queue a training at the camera's prior pose."""
     body = body or TrainingBody()
     by = name_of(actor, body.by)
-    record = trainings.request_training(
+    record = training.request_training(
         session, state.queue, state.settings, camera_id, body.recipe, body.seed, by
     )
     return TrainingOut.from_record(record)
@@ -113,17 +113,17 @@ def list_all(
     camera_id: str, session: ReadDep, limit: Annotated[int, Query(ge=1, le=1000)] = 100
 ) -> TrainingList:
     """A camera's trainings, newest first."""
-    records = trainings.list_trainings(session, camera_id, limit)
+    records = training.list_trainings(session, camera_id, limit)
     return TrainingList(items=[TrainingOut.from_record(record) for record in records])
 
 
 @router.get("/trainings/{training_id}")
 def show(training_id: str, session: ReadDep) -> TrainingOut:
     """A training with its progress."""
-    return TrainingOut.from_record(trainings.show_training(session, training_id))
+    return TrainingOut.from_record(training.show_training(session, training_id))
 
 
 @router.delete("/trainings/{training_id}", status_code=202)
 def cancel(training_id: str, session: WriteDep) -> TrainingOut:
     """Cancel a training: a queued one at once, a running one within a second or so."""
-    return TrainingOut.from_record(trainings.cancel_training(session, training_id))
+    return TrainingOut.from_record(training.cancel_training(session, training_id))

@@ -13,7 +13,7 @@ from service.notifications import webhooks
 from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
 from service.reason_words import in_words
 from service.reasons import code_of
-from service.store.tables.deliveries import WebhookRecord
+from service.store.webhooks import WebhookRecord
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
 

@@ -17,18 +17,16 @@ from service.errors import (
     PreconditionFailedError,
     TooManyCamerasError,
 )
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
+from service.references import begin_reference
 from service.settings import Settings
-from service.store import cameras, references, trainings
+from service.store import cameras, references, tracks, trainings
+from service.store.access import name_in
 from service.store.alerts import AlertFilter
-from service.store.operation.actor import name_in
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.cameras import CameraRecord, PriorPoseRecord
-from service.store.tracks import tracks
-from service.training.trainings import stop_trainings
-from service.training.unasked import train_by_itself
-from service.windows.references import begin_reference
-from service.windows.requests import request_estimate
+from service.store.cameras import CameraRecord, PriorPoseRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.training import stop_trainings, train_by_itself
 
 _MANY = 1000  # more alerts than a camera has kinds
 

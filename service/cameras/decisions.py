@@ -13,13 +13,12 @@ from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.poses import PoseView, view_pose
 from service.enums import Activity, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
+from service.references import begin_reference, keep_answer
 from service.settings import Settings
-from service.store import alerts
-from service.store.tables.alerts import AlertRecord
-from service.store.tracks import tracks
-from service.windows.references import begin_reference, keep_answer
-from service.windows.requests import request_estimate
+from service.store import alerts, tracks
+from service.store.alerts import AlertRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,13 +11,13 @@ from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.enums import Activity
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
+from service.references import forget_streak
 from service.settings import Settings
 from service.store import alerts, maintenance
-from service.store.tables.attendance import MaintenanceRecord
-from service.windows.references import forget_streak
-from service.windows.requests import request_estimate
+from service.store.maintenance import MaintenanceRecord
 
 _FARTHEST = timedelta(days=366)
 

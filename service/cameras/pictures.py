@@ -5,7 +5,7 @@ from sqlalchemy import Connection
 from service.cameras.cameras import no_camera
 from service.store import cameras
 from service.store.cameras import Picture
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 _MOST = 10_000
 

@@ -14,11 +14,11 @@ from service.cameras.state_words import reasons_of
 from service.enums import PoseState
 from service.reason_words import in_words
 from service.reasons import Reasons
+from service.references import tracks_so_far
 from service.settings import Settings
 from service.store import cameras, estimates, fleet
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.estimates import EstimateRecord
-from service.windows.references import tracks_so_far
+from service.store.estimates import EstimateRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from service.errors import QuotaError
 from service.formats.track import Batch
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.tracks import tracks
+from service.store import tracks
+from service.store.engines.store import Store
 
 _BEYOND = 1.5  # times `keep_mb` that may lie there until the next retention
 _RECOUNT_S = 5.0

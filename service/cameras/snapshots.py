@@ -12,8 +12,7 @@ from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOf
 from service.formats.still import Still
 from service.settings import Settings
 from service.store import snapshots
-from service.store.snapshots import SnapshotFacts
-from service.store.tables.cameras import SnapshotRecord
+from service.store.snapshots import SnapshotFacts, SnapshotRecord
 
 _OTHER_SHAPE = 0.01  # of the ratio of its sides
 

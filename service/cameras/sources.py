@@ -11,32 +11,30 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
+from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.access.activity import note
 from service.alerts.alerts import end_alert, open_alert
+from service.alerts.suspected_moves import suspected_moves
 from service.cameras.cameras import require_camera
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.reasons import ServiceCode
-from service.settings import Settings
-from service.store import alerts, cameras, estimates, references
-from service.store.database.store import joined
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import SourceRecord
-from service.store.tracks import sources
-from service.windows.attendance import attendance_of
-from service.windows.references import (
+from service.references import (
+    attendance_of,
     begin_reference,
-    is_outdated,
+    is_before,
     made_against,
     wanted_tracks,
     window_of,
 )
-from service.windows.requests import request_estimate
-from service.windows.stillness import doubts
-
-_HOUR_S = 3600.0
+from service.settings import Settings
+from service.store import alerts, cameras, estimates, references, sources
+from service.store.engines.store import joined
+from service.store.references import SiteReferenceRecord
+from service.store.sources import SourceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,7 +225,7 @@ def _is_silent(
 
     By when they post and by the times of their tracks: some post once a day.
     """
-    silent_s = settings.source_silent_h * _HOUR_S
+    silent_s = settings.source_silent_h * HOUR_S
     if (other.last_seen_at - counting.last_seen_at).total_seconds() < silent_s:
         return False
     ends = [
@@ -261,7 +259,7 @@ def _still_from_s(
     session: Session, settings: Settings, reference: SiteReferenceRecord
 ) -> float | None:
     """Since when a camera is known to have been still, if it is by now."""
-    ended = [each.to_s for each in doubts(session, settings, reference) if each.excluded]
+    ended = [each.to_s for each in suspected_moves(session, settings, reference) if each.excluded]
     began = [] if reference.from_s is None else [reference.from_s]
     return max([*began, *ended], default=None)
 
@@ -276,7 +274,7 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
         return False
     if any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS):
         return False
-    return not is_outdated(last, window_of(session, reference, settings))
+    return not is_before(last.to_s, window_of(session, reference, settings))
 
 
 def _reason(
@@ -284,7 +282,7 @@ def _reason(
 ) -> Reason:
     values: dict[str, Value] = {
         "sources": [record.name for record in posting],
-        "silent_s": settings.source_silent_h * _HOUR_S,
+        "silent_s": settings.source_silent_h * HOUR_S,
         "wanted": wanted_tracks(reference, settings),
     }
     if reference.source is not None:

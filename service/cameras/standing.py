@@ -12,19 +12,17 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.alerts.arrival_rates import CameraRhythm, unpacked
-from service.alerts.presence import is_no_data
+from service.alerts.arrival_models import ArrivalModel, unpacked
+from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.notifications.outbox import is_silenced
+from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
 from service.store import fleet, metrics
-from service.store.alerts import POSE_KINDS
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.windows.attendance import Attendance, attendance_by
-from service.windows.references import made_against
+from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.references import SiteReferenceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +33,7 @@ class Clockwork:
     """
 
     settings: Settings
-    rhythm: CameraRhythm | None
+    rhythm: ArrivalModel | None
     last_track_s: float | None
     moments: tuple[datetime, ...]
 

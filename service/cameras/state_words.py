@@ -5,17 +5,16 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
-from models.walking.reference.assumed import FEWEST_WALKERS
-from service.alerts.presence import silence_of
+from models.walking.config import FEWEST_WALKERS
+from service.alerts.data_gaps import data_gap_of
 from service.cameras.standing import Standing
 from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
+from service.references import wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import maintenance
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tracks import windows
-from service.windows.references import wanted_tracks, window_beside
+from service.store import maintenance, windows
+from service.store.maintenance import MaintenanceRecord
 
 
 def reasons_of(session: Session, settings: Settings, standing: Standing, so_far: int) -> Reasons:
@@ -39,7 +38,7 @@ def reasons_of(session: Session, settings: Settings, standing: Standing, so_far:
             found += _of_alerts(standing)
     if not standing.judged:
         found += _missing(session, settings, standing, so_far)
-    silence = silence_of(session, settings, standing.camera_id, now) if standing.silent else None
+    silence = data_gap_of(session, settings, standing.camera_id, now) if standing.silent else None
     if silence is not None and standing.state in (PoseState.NO_DATA, PoseState.DRIFTING):
         found += silence.reasons
     return tuple(found)

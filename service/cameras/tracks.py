@@ -8,14 +8,13 @@ from sqlalchemy import Connection
 from service.cameras.pictures import check_picture
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError
+from service.estimate_queue import request_estimate
 from service.formats.track import Batch, Rejection
 from service.job_queue import JobQueue
-from service.store import references
+from service.store import references, tracks
 from service.store.cameras import Picture
-from service.store.database.store import joined
-from service.store.packing import pack
-from service.store.tracks import tracks
-from service.windows.requests import request_estimate
+from service.store.engines.store import joined
+from service.store.serialization import pack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,7 +36,7 @@ from service.data_dir import StartError
 from service.enums import AlertState, ReferenceState
 from service.formats.degrees import degrees
 from service.settings import Settings
-from service.workers.processes.manners import end_like_ctrl_c
+from service.workers.processes.signals import end_like_ctrl_c
 
 _BATCH = 10
 _PAUSE_S = 0.4  # for the eye

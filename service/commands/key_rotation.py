@@ -6,8 +6,8 @@ from service.data_dir import KEY_FILE, held_alone, make_private, require_stopped
 from service.notifications.keys import NEW_KEY_FILE, give_up_secrets, reseal
 from service.notifications.sealing import read_key_file, sealer_of, write_key_file
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.sqlite import files
+from service.store.engines import files
+from service.store.engines.store import Store
 
 
 def rotate_key(settings: Settings, old_key_file: Path | None, *, lost: bool = False) -> int:

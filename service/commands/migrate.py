@@ -16,9 +16,9 @@ from service.notifications.keys import settle_key
 from service.operations.before_migration import copy_before
 from service.operations.placing import finish_restore
 from service.settings import Settings
-from service.store.database.revisions import alembic_config, known_revisions, require_known
-from service.store.sqlite import files
-from service.store.sqlite.faults import telling_of_database
+from service.store.engines import files
+from service.store.engines.failures import telling_of_database
+from service.store.engines.revisions import alembic_config, known_revisions, require_known
 
 log = logging.getLogger("surefoot.migrate")
 

@@ -18,12 +18,11 @@ from service.api.middleware.reach import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
-from service.workers.processes.listener import listen
 from service.workers.processes.local_workers import local_workers
-from service.workers.processes.memory import settle_allocator
+from service.workers.processes.resources import settle_allocator
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -46,7 +45,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         threading.Thread(target=_stop_at_end_of_stdin, daemon=True).start()
     make_private(settings.data_dir)
     settle_allocator()
-    with held_alone(settings.data_dir), contextlib.closing(_listen(settings)) as listener:
+    with held_alone(settings.data_dir), contextlib.closing(listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
         app = _app(settings)
@@ -108,9 +107,20 @@ def _require_way_in(settings: Settings) -> None:
         )
 
 
-def _listen(settings: Settings) -> socket.socket:
+def listen(settings: Settings) -> socket.socket:
+    """The listening socket; taken first, so that a port in use fails before anything starts.
+
+    Raises:
+        StartError: it cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # asyncio switches Nagle's algorithm off only where the protocol is named; with it on, each
+    # answer waits 40 ms for the client's acknowledgement of its headers.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        return listen(settings)
+        listener.bind((settings.host, settings.port))
+        return listener
     except OSError as error:
         raise StartError(
             f"port: cannot listen on {settings.host}, port {settings.port} ({error.strerror}); "

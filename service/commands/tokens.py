@@ -13,11 +13,11 @@ from rich.table import Table
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.errors import ServiceError
-from service.workers.processes.manners import be_private
+from service.workers.processes.signals import be_private
 
 if TYPE_CHECKING:
-    from service.store.database.store import Store
-    from service.store.tables.access import TokenRecord
+    from service.store.access import TokenRecord
+    from service.store.engines.store import Store
 
 app = typer.Typer(help="Tokens, by which programs and people are let in.", no_args_is_help=True)
 
@@ -103,7 +103,7 @@ def revoke(
 
 def _store(data_dir: Path | None) -> "Store":
     from service.commands.migrate import migrate
-    from service.store.database.store import Store
+    from service.store.engines.store import Store
 
     be_private()
     settings = settings_given(data_dir=data_dir)

@@ -12,25 +12,29 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.errors import OverloadedError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.sqlite.file_lock import FileLock
+from service.store.engines.sqlite import FileLock
+from service.store.engines.store import Store
 from service.workers import engine
 from service.workers.context import JobContext
-from service.workers.in_hand import UPKEEP, InHand
+from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
-from service.workers.processes.memory import give_back, resident_mb, settle_allocator
-from service.workers.processes.niceness import yield_to_others
-from service.workers.processes.work import WorkKind
-from service.workers.processes.workforce import (
+from service.workers.processes.resources import (
+    give_back,
+    resident_mb,
+    settle_allocator,
+    yield_to_others,
+)
+from service.workers.processes.workers import (
     WORKERS,
     Watch,
+    WorkKind,
     heartbeat,
     register_worker,
     worker_name,
 )
-from service.workers.pulse import BEAT_S, start_pulse
-from service.workers.upkeep.housekeeping import follow_clock_since_last_run
-from service.workers.upkeep.rounds import start_rounds
+from service.workers.running_jobs import UPKEEP, RunningJobs
+from service.workers.upkeep.clock import follow_clock_since_last_run
+from service.workers.upkeep.periodic import start_periodic_work
 
 log = logging.getLogger("surefoot.worker")
 
@@ -65,19 +69,19 @@ def run_worker(
         settings=settings,
         store=store,
         queue=JobQueue(store.engine),
-        in_hand=InHand(limits_s=_limits_s(settings)),
+        running=RunningJobs(limits_s=_limits_s(settings)),
     )
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: context.stopping.set())
     if follow_stdin:
         threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
-    start_pulse(context, tells=follow_stdin)
+    start_heartbeat(context, tells=follow_stdin)
     follow_clock_since_last_run(context)
     with store.write(WORKERS) as session:
         register_worker(session, name, os.getpid())
     engine.launch(context, name, only)
     if only is not WorkKind.TRAIN:
-        start_rounds(context)
+        start_periodic_work(context)
     log.info("worker_started", extra={"worker": name, "pid": os.getpid()})
     status = _mind(context, name)
     log.info("worker_stopping", extra={"worker": name})
@@ -109,7 +113,7 @@ def _mind(context: JobContext, name: str) -> int:
             log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
         if draining is not None:
             # A training beyond its own ceiling is not waited for: it would be minutes.
-            if not draining.is_alive() or not context.in_hand.of_kind(ESTIMATE_JOB, DELIVER_JOB):
+            if not draining.is_alive() or not context.running.of_kind(ESTIMATE_JOB, DELIVER_JOB):
                 return exits.FULL
             continue
         if time.monotonic() - trimmed_s > _TRIM_EVERY_S:
@@ -125,7 +129,7 @@ def _mind(context: JobContext, name: str) -> int:
 def _is_full(context: JobContext) -> bool:
     """Whether a worker has grown beyond its ceiling, after all that is free was given back."""
     limit_mb: float = context.settings.worker_max_mb
-    if context.in_hand.of_kind(TRAIN_JOB):
+    if context.running.of_kind(TRAIN_JOB):
         limit_mb *= _CEILING_IN_TRAINING
     if resident_mb() <= limit_mb:
         return False

@@ -6,13 +6,13 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
+from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart_serialization import chart_from_bytes
+from models.monitoring.chart_serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.creep import SHARE
-from models.monitoring.creep_log import DAY_S
 from models.monitoring.creep_serialization import creep_log_from_bytes, creep_log_to_bytes
-from models.paths.serialization import paths_from_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import (
     CameraSite,
     Creep,
@@ -23,22 +23,39 @@ from models.pose import (
 )
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
-from service.estimation.paths import LearnedPaths
+from service.estimation.people import Unpacked
+from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, flow_maps, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import AnchorRecord, SiteReferenceRecord
-from service.store.tracks import windows
-from service.store.tracks.windows import WindowBounds
-from service.windows.references import window_of
-from service.windows.unpacked import Unpacked
+from service.store import cameras, flow_maps, references, windows
+from service.store.flow_maps import AnchorRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.windows import WindowBounds
 
 _MOST_A_DAY = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedPaths:
+    """A flow map and the drift chart that goes with it, as bytes."""
+
+    flow: bytes
+    chart: bytes | None
+
+
+def paths_of(site: CameraSite) -> LearnedPaths | None:
+    """The map and the chart of a site; None where too few walking groups walk."""
+    if site.paths is None:
+        return None
+    return LearnedPaths(
+        flow=paths_to_bytes(site.paths),
+        chart=None if site.chart is None else chart_to_bytes(site.chart),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """What was first learned at a reference, and what whole days have said against it, as bytes.
+    """The first map and chart of a reference, and the log of whole days against them, as bytes.
 
     `log` is None where there is no day yet. It counts from `from_s` on: since then the camera has
     stood as it does, but for a creep.
@@ -176,7 +193,7 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
 
 
 def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:
-    """What an anchor says by its share of the allowed false alarms; None where it says nothing.
+    """An anchor's creep by its share of the allowed false alarms; None where it has no log.
 
     Raises:
         CheckpointError: what is stored cannot be read.

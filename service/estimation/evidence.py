@@ -1,7 +1,8 @@
-"""What an estimate is made of, read in one transaction."""
+"""The input of an estimate, read in one transaction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
@@ -12,24 +13,30 @@ from models.geometry.pose import CameraPose
 from models.monitoring.verdict import DriftLimits
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from service.alerts.alerts import fired_by_estimate
-from service.enums import AlertKind
 from service.estimation.anchoring import Anchor, anchor_of
 from service.estimation.limits import drift_limits
+from service.estimation.people import Unpacked, until_so_many
+from service.references import made_against, window_of
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references, trainings
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import PredictionRecord
-from service.store.tables.trainings import ModelRecord
-from service.store.tracks import predictions as stored_predictions
-from service.store.tracks import tracks, windows
-from service.store.tracks.stored import StoredTrack
-from service.windows.people import until_so_many
-from service.windows.references import made_against, window_of
-from service.windows.unpacked import Unpacked
+from service.store import (
+    alerts,
+    cameras,
+    estimates,
+    flow_maps,
+    references,
+    tracks,
+    trainings,
+    windows,
+)
+from service.store import predictions as stored_predictions
+from service.store.cameras import CameraRecord
+from service.store.predictions import PredictionRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.stored_tracks import StoredTrack
+from service.store.trainings import ModelRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +93,7 @@ class Evidence:
 def load_evidence(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> Evidence | None:
-    """What there is to judge a camera by; None where there is nothing, or nothing new.
+    """The tracks to judge a camera by, and what else; None where there is nothing, or nothing new.
 
     Tracks that were `unpacked` already are not unpacked again.
     """
@@ -106,17 +113,13 @@ def load_evidence(
         unpacked,
         newest=True,
     )
-    records = gathered.records
-    model = trainings.newest_model(session, camera_id)
+    records, model = gathered.records, trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
-    answered_at = alerts.answered_at(session, camera_id)
     kept = flow_maps.find(session, reference.id)
     last = flow_maps.last_pose(session, reference.id)
-    predictions: Sequence[PredictionRecord] = []
-    if model is not None:
-        pks = [record.id for record in records]
-        predictions = stored_predictions.predictions(session, model.id, pks)
+    answered_at = alerts.answered_at(session, camera_id)
+    seen = [_seen(record, answered_at, intrinsics, unpacked) for record in records]
     return Evidence(
         camera_id=camera_id,
         reference_id=reference.id,
@@ -127,29 +130,41 @@ def load_evidence(
         intrinsics=intrinsics,
         prior=prior,
         walk=walk_of(camera),
-        tracks=tuple(
-            SeenTrack(
-                pk=record.id,
-                unanswered=answered_at is None or record.received_at > answered_at,
-                started_s=record.started_s,
-                ended_s=record.ended_s,
-                trajectory=unpacked.seen(record, intrinsics),
-            )
-            for record in records
-        ),
+        tracks=tuple(seen),
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
         limits=drift_limits(settings),
-        drifting=bool(fired_by_estimate(session, camera_id) & {AlertKind.DRIFT, AlertKind.CLOCK}),
+        drifting=bool(fired_by_estimate(session, camera_id)),
         model_id=None if model is None else model.id,
-        predictions=tuple(predictions),
+        predictions=_predictions(session, model, records),
         before=gathered.before,
         last=None if last is None else KeptPose(basis=last.basis, data=last.data),
     )
 
 
+def _seen(
+    record: StoredTrack, answered_at: datetime | None, intrinsics: Intrinsics, unpacked: Unpacked
+) -> SeenTrack:
+    return SeenTrack(
+        pk=record.id,
+        unanswered=answered_at is None or record.received_at > answered_at,
+        started_s=record.started_s,
+        ended_s=record.ended_s,
+        trajectory=unpacked.seen(record, intrinsics),
+    )
+
+
+def _predictions(
+    session: Session, model: ModelRecord | None, records: Sequence[StoredTrack]
+) -> tuple[PredictionRecord, ...]:
+    if model is None:
+        return ()
+    pks = [record.id for record in records]
+    return tuple(stored_predictions.predictions(session, model.id, pks))
+
+
 def walk_of(camera: CameraRecord) -> WalkConfig:
-    """How fast people are assumed to walk where a camera looks."""
+    """The assumed walking speed where a camera looks."""
     return WalkConfig(
         speed_mean_mps=camera.walking_speed_mean_mps, speed_sd_mps=camera.walking_speed_sd_mps
     )
@@ -161,7 +176,7 @@ def _is_news(
     model: ModelRecord | None,
     records: Sequence[StoredTrack],
 ) -> bool:
-    """Whether the last estimate was of other tracks, another model or another reference."""
+    """True where the last estimate was of other tracks, another model or another reference."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or last.reference_id != reference.id:
         return True

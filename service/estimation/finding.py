@@ -1,4 +1,4 @@
-"""What the evidence of an estimate comes to; no transaction is open meanwhile."""
+"""The computation of an estimate; no transaction is open meanwhile."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,28 +30,28 @@ from models.regression.averaging import (
     TrackPredictions,
     averaged_estimate,
 )
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate
-from models.walking.reference.assumed import FEWEST_WALKERS
 from models.walking.serialization import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, KeptPose, SeenTrack
-from service.estimation.lacks import Lacks
 from service.estimation.last_poses import basis_of, begin_of, kept_of
+from service.estimation.partial_failures import PartialFailures
+from service.estimation.people import MOST_PIECES
 from service.reasons import Reasons
-from service.store.tables.tracks import PredictionRecord
-from service.windows.people import MOST_PIECES
+from service.store.predictions import PredictionRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What the evidence comes to. `tracks` are those after the `change`, where one was found.
+    """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
     `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
     for it. `reading` is what the drift chart says of the tracks after the change, or of all where
     these are too few, long before a pose can say how far; None where there is no chart. `creep`
     is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
-    `pieces` says how many of the tracks are of others' walks, where these are many. `lacks` names
-    what should be there beside the served pose and failed. `last` is where the next one may begin.
+    `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
+    names what should be there beside the served pose. `last` is where the next one may begin.
     """
 
     joint: JointEstimate
@@ -63,7 +63,7 @@ class Finding:
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
     pieces: Reason | None = None
-    lacks: Reasons = ()
+    failures: Reasons = ()
     last: KeptPose | None = None
 
     @property
@@ -86,30 +86,30 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     observed = walks.observations
     if observed.walkers < FEWEST_WALKERS:
         return None
-    lacks = Lacks(evidence.camera_id)
-    site = _site_of(evidence, observed, lacks)
-    creep = lacks.unless_failed(
+    failures = PartialFailures(evidence.camera_id)
+    site = _site_of(evidence, observed, failures)
+    creep = failures.unless_failed(
         "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)
     )
-    crept = creep is not None and creep.moved and evidence.anchor is not None
+    crept = creep is not None and creep.moved
     if crept and evidence.anchor is not None:
-        first = lacks.unless_failed("anchor", partial(first_site, site, evidence.anchor))
-        site = first or site
-    judged = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
-    reading = _read(evidence, observed, site, 0, lacks)
+        first = partial(first_site, site, evidence.anchor)
+        site = failures.unless_failed("anchor", first) or site
+    reading = _read(evidence, observed, site, 0, failures)
     suspicious = reading is not None and reading.suspicious
     basis = basis_of(evidence, crept=crept, suspicious=suspicious)
-    begin = begin_of(evidence.last, basis)
-    found = estimate_pose(observed, site, judged if asked_enough(evidence) else None, begin)
-    lacks.take(found.failures)
+    look_twice = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
+    found = estimate_pose(
+        observed,
+        site,
+        look_twice if asked_enough(evidence) else None,
+        begin_of(evidence.last, basis),
+    )
+    failures.take(found.failures)
     if found.first:
-        reading = _read(evidence, observed, site, found.first, lacks)
+        reading = _read(evidence, observed, site, found.first, failures)
     seen = evidence.tracks[found.first :]
-    used = {track.pk for track in seen}
-    predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
-    averaged = None
-    if len(predictions) >= FEWEST_TRACKS:
-        averaged = lacks.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
+    averaged = _averaged(evidence, seen, seed, failures)
     return Finding(
         joint=found.joint,
         fused=found.fused,
@@ -120,13 +120,24 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         pieces=walks.reason,
-        lacks=tuple(lacks.said),
+        failures=tuple(failures.reasons),
         last=kept_of(found.warm_start, basis),
     )
 
 
-def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> CameraSite:
-    """What is known of the site. The pose needs neither the flow map nor its chart.
+def _averaged(
+    evidence: Evidence, seen: Sequence[SeenTrack], seed: int, failures: PartialFailures
+) -> PoseEstimate | None:
+    """The mean of what the model in use says of tracks; None where it says too little."""
+    used = {track.pk for track in seen}
+    predictions = as_predictions([row for row in evidence.predictions if row.track_pk in used])
+    if len(predictions) < FEWEST_TRACKS:
+        return None
+    return failures.unless_failed("averaged", partial(averaged_estimate, predictions, seed))
+
+
+def _site_of(evidence: Evidence, observed: Observations, failures: PartialFailures) -> CameraSite:
+    """The site as it is known. The pose needs neither the flow map nor its chart.
 
     One of another release cannot be read: the next growth of the map brings new ones.
     """
@@ -135,9 +146,9 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
     speed_reference = reference_from_bytes(evidence.site)
     flow, chart = None, None
     if evidence.flow is not None:
-        flow = lacks.unless_failed("flow_map", partial(paths_from_bytes, evidence.flow))
+        flow = failures.unless_failed("flow_map", partial(paths_from_bytes, evidence.flow))
     if flow is not None and evidence.chart is not None:
-        chart = lacks.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
+        chart = failures.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
     return CameraSite(
         intrinsics=evidence.intrinsics,
         prior=evidence.prior,
@@ -148,9 +159,13 @@ def _site_of(evidence: Evidence, observed: Observations, lacks: Lacks) -> Camera
 
 
 def _read(
-    evidence: Evidence, observed: Observations, site: CameraSite, first: int, lacks: Lacks
+    evidence: Evidence,
+    observed: Observations,
+    site: CameraSite,
+    first: int,
+    failures: PartialFailures,
 ) -> Reading | None:
-    """What the chart says; once a person has said how the camera stands, it begins anew."""
+    """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
     rate = AlarmRate(
@@ -161,11 +176,11 @@ def _read(
     )
     unanswered = np.array([track.unanswered for track in evidence.tracks])
     read = partial(read_alarm_chart, observed, site, rate, counted=unanswered, first=first)
-    return lacks.unless_failed("chart", read)
+    return failures.unless_failed("chart", read)
 
 
 def asked_enough(evidence: Evidence) -> bool:
-    """Whether enough people came since a person last said how the camera stands."""
+    """True where enough people came since a person last said how the camera stands."""
     unanswered = [track.trajectory for track in evidence.tracks if track.unanswered]
     wanted = evidence.limits.people
     if not wanted <= len(unanswered) < MOST_PIECES * wanted:
@@ -174,7 +189,7 @@ def asked_enough(evidence: Evidence) -> bool:
 
 
 def as_predictions(records: Sequence[PredictionRecord]) -> TrackPredictions:
-    """What a model says of tracks, as a value."""
+    """A model's predictions of tracks, as a value."""
     return TrackPredictions(
         height_m=np.array([record.height_m for record in records], dtype=np.float64),
         quaternion_wxyz=np.array(

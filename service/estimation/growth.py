@@ -4,12 +4,14 @@ It follows habits. What the camera is believed to have crept by is taken out of 
 the window that it is to judge stays out of it; and its anchor, the first map, never grows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
 from sqlalchemy.orm import Session
 
+from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
@@ -19,21 +21,27 @@ from models.pose import learn_site, observe, without_creep
 from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
-from service.estimation.anchoring import Anchor, anchor_of, keep_anchor
-from service.estimation.paths import LearnedPaths, paths_of
+from service.alerts.suspected_moves import SuspectedMove, suspected_moves
+from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
+from service.estimation.people import Unpacked
+from service.references import (
+    Attendance,
+    attendance_of,
+    is_before,
+    made_against,
+    window_beside,
+    window_of,
+)
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
-from service.store.tracks import tracks, windows
-from service.windows.attendance import Attendance, attendance_of
-from service.windows.references import is_outdated, made_against, window_beside, window_of
-from service.windows.stillness import Doubt, doubts, still_bounds
-from service.windows.unpacked import Unpacked
+from service.store import alerts, cameras, estimates, flow_maps, references, tracks, windows
+from service.store.flow_maps import FlowMapRecord
+from service.store.references import SiteReferenceRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.stored_tracks import StoredTrack
+from service.store.windows import StillBounds, WindowBounds
 
 _FEWEST_NEW = 50
 _NEW_SHARE = 0.25  # of the tracks that the map was learned of
-_DAY_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,45 +71,32 @@ def load_growth(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> GrowthPeriod | None:
     """The tracks to learn a camera's map anew of; None where it is to stay as it is."""
-    unpacked = unpacked or Unpacked()
     camera = cameras.find(session, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is None:
         return None
-    kept = flow_maps.find(session, reference.id)
-    past = doubts(session, settings, reference)
     assert reference.to_s is not None
     assert reference.data is not None
+    kept = flow_maps.find(session, reference.id)
+    moves = suspected_moves(session, settings, reference)
     attended = attendance_of(session, camera_id, datetime.now(UTC))
-    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, past, attended)
-    since_s = None if kept is None else kept.to_s
-    enough = max(_FEWEST_NEW, _NEW_SHARE * (0 if kept is None else kept.tracks))
-    # Asked at every look, and hardly ever due: what is counted quickly says so first.
-    if not spoilt and tracks.count_since(session, camera_id, since_s) < enough:
-        return None
-    if _in_doubt(session, settings, reference, kept, past):
-        return None
     judged = window_beside(attended, reference, settings)
-    judged_from_s = windows.oldest_end_s(session, judged)
-    bounds = still_bounds(settings, reference, past, attended, judged_from_s)
-    if not spoilt and windows.count_still(session, bounds, since_s) < enough:
+    spoilt = kept is not None and _is_spoilt(kept, reference.to_s, moves, attended)
+    found = _still_tracks(session, settings, reference, kept, moves, attended, judged, spoilt)
+    if found is None:
         return None
-    records = windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
-    to_s = records[-1].ended_s if records else reference.to_s
-    age_s = to_s - np.array([record.ended_s for record in records])
-    weights = _faded(age_s, settings)
-    if kept is not None and not spoilt:
-        still_counts = kept.weight * float(_faded(np.array(to_s - kept.to_s), settings))
-        if weights.sum() < still_counts:
-            return None  # retention has deleted more than has come: the map knows more than they
-    intrinsics = intrinsics_of(camera)
+    to_s = found[-1].ended_s if found else reference.to_s
+    weights = _faded(to_s - np.array([record.ended_s for record in found]), settings)
+    if kept is not None and not spoilt and weights.sum() < _still_counts(kept, to_s, settings):
+        return None  # retention has deleted more than has come: the map knows more than they
+    intrinsics, unpacked = intrinsics_of(camera), unpacked or Unpacked()
     return GrowthPeriod(
         reference_id=reference.id,
         site=reference.data,
         anchor=anchor_of(session, reference, judged),
         intrinsics=intrinsics,
         prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
-        trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
+        trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
         weights=weights,
         kept=None if kept is None or spoilt else kept.data,
         to_s=to_s,
@@ -109,6 +104,44 @@ def load_growth(
         replaces=None if kept is None else kept.learned_at,
         spoilt=spoilt,
     )
+
+
+def _still_tracks(
+    session: Session,
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    kept: FlowMapRecord | None,
+    moves: tuple[SuspectedMove, ...],
+    attended: Attendance,
+    judged: WindowBounds,
+    spoilt: bool,
+) -> Sequence[StoredTrack] | None:
+    """The tracks that are known to be of a still camera; None where too few of them are new.
+
+    Asked at every look, and hardly ever due: what is counted quickly says so first.
+    """
+    since_s = None if kept is None else kept.to_s
+    enough = max(_FEWEST_NEW, _NEW_SHARE * (0 if kept is None else kept.tracks))
+    if not spoilt and tracks.count_since(session, reference.camera_id, since_s) < enough:
+        return None
+    if _may_have_moved(session, settings, reference, kept, moves):
+        return None
+    bounds = StillBounds(
+        camera_id=reference.camera_id,
+        started_from_s=reference.from_s,
+        reference_to_s=reference.to_s or 0.0,
+        later_before_s=windows.oldest_end_s(session, judged),  # later ones are to be judged by it
+        unsure=settings.flow_unsure_tracks,  # of a move that nobody has noticed yet
+        without=tuple((move.from_s, move.to_s) for move in moves if move.excluded),
+        attended=attended.spans,
+    )
+    if not spoilt and windows.count_still(session, bounds, since_s) < enough:
+        return None
+    return windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
+
+
+def _still_counts(kept: FlowMapRecord, to_s: float, settings: Settings) -> float:
+    return kept.weight * float(_faded(np.array(to_s - kept.to_s), settings))
 
 
 def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
@@ -166,18 +199,18 @@ def save_growth(
     return True
 
 
-def _in_doubt(
+def _may_have_moved(
     session: Session,
     settings: Settings,
     reference: SiteReferenceRecord,
     kept: FlowMapRecord | None,
-    past: tuple[Doubt, ...],
+    moves: tuple[SuspectedMove, ...],
 ) -> bool:
-    """Whether the camera may have moved by now, or people walk elsewhere than they did."""
+    """True where the camera may have moved by now, or people walk elsewhere than they did."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or not made_against(reference, last) or not last.identifiable:
         return True
-    if is_outdated(last, window_of(session, reference, settings)):
+    if is_before(last.to_s, window_of(session, reference, settings)):
         return True  # somebody was at the camera, and nobody knows yet how it stands since
     if last.drift_streak > 0 or last.drifted or last.suspected:
         return True
@@ -186,35 +219,38 @@ def _in_doubt(
     had_map = kept is not None and kept.data is not None and kept.learned_at <= last.created_at
     if had_map and "registered" not in last.raw:
         return True  # the paths have changed, or too few people walk them to tell
-    return reference.changed_s is not None and not _is_explained(session, reference, past)
+    return reference.changed_s is not None and not _is_explained(session, reference, moves)
 
 
 def _is_explained(
-    session: Session, reference: SiteReferenceRecord, past: tuple[Doubt, ...]
+    session: Session, reference: SiteReferenceRecord, moves: tuple[SuspectedMove, ...]
 ) -> bool:
-    """Whether a person has said what the newest change was: put back by now, or none at all."""
+    """True where a person has said what the newest change was: put back by now, or none at all."""
     changed_s = reference.changed_s
     assert changed_s is not None
-    for doubt in past:
-        if not doubt.by_person or changed_s < doubt.from_s:
+    for move in moves:
+        if not move.by_person or changed_s < move.from_s:
             continue
         # A camera is put back before that is said, but seen there again only as people come.
-        between = tracks.count_between(session, reference.camera_id, doubt.to_s, changed_s)
-        if changed_s <= doubt.to_s or between <= FEWEST_BESIDE:
+        between = tracks.count_between(session, reference.camera_id, move.to_s, changed_s)
+        if changed_s <= move.to_s or between <= FEWEST_BESIDE:
             return True
     return False
 
 
 def _is_spoilt(
-    kept: FlowMapRecord, reference_to_s: float, past: tuple[Doubt, ...], attended: Attendance
+    kept: FlowMapRecord,
+    reference_to_s: float,
+    moves: tuple[SuspectedMove, ...],
+    attended: Attendance,
 ) -> bool:
     if attended.announced_late(kept.learned_at, kept.to_s):
         return True
     return kept.to_s > reference_to_s and any(
-        doubt.excluded and doubt.from_s <= kept.to_s and doubt.resolved_at > kept.learned_at
-        for doubt in past
+        move.excluded and move.from_s <= kept.to_s and move.resolved_at > kept.learned_at
+        for move in moves
     )
 
 
 def _faded(age_s: Array, settings: Settings) -> Array:
-    return np.asarray(0.5 ** (age_s / (settings.flow_half_life_days * _DAY_S)))
+    return np.asarray(0.5 ** (age_s / (settings.flow_half_life_days * DAY_S)))

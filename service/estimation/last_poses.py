@@ -1,4 +1,4 @@
-"""Where an estimate begins: at what was found of the camera last, by whichever worker.
+"""The start of an estimate: the pose that was found of the camera last, by whichever worker.
 
 Losing it costs a full search, and nothing else.
 """
@@ -11,11 +11,11 @@ from models.errors import CheckpointError
 from models.pose import WarmStart, warm_start_from_bytes, warm_start_to_bytes
 from service.estimation.evidence import Evidence, KeptPose
 from service.store import flow_maps
-from service.store.tables.references import LastPoseRecord
+from service.store.flow_maps import LastPoseRecord
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
-    """What tells the site of an estimate, and what its chart suspects, from any other."""
+    """A digest of an estimate's site and of what its chart suspects."""
     parts = (
         evidence.site,
         evidence.flow,
@@ -42,7 +42,7 @@ def begin_of(kept: KeptPose | None, basis: bytes) -> WarmStart | None:
 
 
 def kept_of(last: WarmStart | None, basis: bytes) -> KeptPose | None:
-    """What is to be kept for the next estimate, if anything is."""
+    """The pose to be kept for the next estimate, if any."""
     return None if last is None else KeptPose(basis=basis, data=warm_start_to_bytes(last))
 
 

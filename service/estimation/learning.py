@@ -10,7 +10,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import learn_site, observe
-from models.reasons import TracksCode
+from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_to_bytes
@@ -18,19 +18,15 @@ from models.walking.speed_reference import SpeedReference
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
-from service.estimation.anchoring import keep_anchor
+from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
 from service.estimation.evidence import walk_of
-from service.estimation.paths import LearnedPaths, paths_of
+from service.estimation.people import Unpacked, until_so_many
 from service.reasons import some
+from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
-from service.store import cameras, maintenance, references
-from service.store.packing import intrinsics_of, pose_of_prior
-from service.store.tables.references import FlowMapRecord
-from service.store.tracks import windows
-from service.windows.attendance import attendance_of
-from service.windows.people import until_so_many
-from service.windows.references import wanted_tracks
-from service.windows.unpacked import Unpacked
+from service.store import cameras, maintenance, references, windows
+from service.store.flow_maps import FlowMapRecord
+from service.store.serialization import intrinsics_of, pose_of_prior
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -54,7 +50,7 @@ class ReferencePeriod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedReference:
-    """What a reference has come to; `paths` are None where too few people walk."""
+    """A reference as learned; `paths` are None where too few people walk."""
 
     site: SpeedReference
     paths: LearnedPaths | None
@@ -99,7 +95,7 @@ def load_reference_period(
 
 
 def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
-    """What is usual at the site; None where too few of the tracks walk."""
+    """The walkers and paths that are usual at the site; None where too few of the tracks walk."""
     observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
         site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
@@ -130,7 +126,7 @@ def save_reference(
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
     record.walking_speed_mps = site.walking_speed_mps
-    record.doubts = some(site.doubt)
+    record.doubts = some(site.implausible)
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
     note(session, Activity.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
@@ -146,15 +142,19 @@ def save_reference(
         )
     )
     keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
-    if site.doubt is not None:
-        open_alert(
-            session,
-            settings,
-            camera_id,
-            _DOUBT_KINDS[site.doubt.code],
-            Severity.WARNING,
-            drift={},
-            changed_at=None,
-            reasons=(site.doubt,),
-            source=AlertSource.REFERENCE,
-        )
+    if site.implausible is not None:
+        _warn(session, settings, camera_id, site.implausible)
+
+
+def _warn(session: Session, settings: Settings, camera_id: str, doubt: Reason) -> None:
+    open_alert(
+        session,
+        settings,
+        camera_id,
+        _DOUBT_KINDS[doubt.code],
+        Severity.WARNING,
+        drift={},
+        changed_at=None,
+        reasons=(doubt,),
+        source=AlertSource.REFERENCE,
+    )

@@ -1,4 +1,4 @@
-"""From where on a drift counts, by the settings."""
+"""The limits from which on a drift counts, by the settings."""
 
 import math
 

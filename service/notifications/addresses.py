@@ -1,4 +1,4 @@
-"""Which URLs and addresses a webhook may have: private ones only where the operator allows them.
+"""URLs and addresses that a webhook may have: private ones only where the operator allows them.
 
 The check is on addresses that a name resolves to, never on how the name is spelt, so
 `http://2130706433/` is seen as 127.0.0.1. It is made when a webhook is created and again at each
@@ -78,7 +78,7 @@ def checked_addresses(host: str, port: int, allowed: Networks) -> list[str]:
 
 
 def may_reach(address: str, allowed: Networks) -> bool:
-    """Whether an address is public, or in a network that is allowed."""
+    """True where an address is public, or in a network that is allowed."""
     ip = _inner(ip_address(address))
     return _is_public(ip) or any(ip in network for network in allowed)
 

@@ -1,4 +1,4 @@
-"""What a delivery job sends, and what comes of an attempt: delivered, tried again, given up."""
+"""The messages of a delivery job, and what comes of them: delivered, tried again, given up."""
 
 import random
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.enums import DeliveryState, WebhookFormat
 from service.job_queue import JobQueue
@@ -15,14 +16,14 @@ from service.notifications.send import Outcome
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 GONE = 410
 # A receiver that answers so means this message, not itself: others need not wait for it.
 REFUSED = (400, 413, 422)
 _JITTER = 0.2
 _LONGEST_HOLD_S = 60.0
-_LONGEST_RETRY_AFTER_S = 6 * 3600.0
+_LONGEST_RETRY_AFTER_S = 6 * HOUR_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,14 +36,6 @@ class Attempt:
     message: Message
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refresh:
-    """All that fires, for an Alertmanager, which forgets what it is not told again."""
-
-    webhook_id: str
-    message: Message
-
-
 def begin_run(session: Session, webhook_id: str) -> None:
     """Take the mark "a job waits" off a webhook: what is queued from now on queues its own."""
     webhook = webhooks.find(session, webhook_id)
@@ -51,7 +44,7 @@ def begin_run(session: Session, webhook_id: str) -> None:
 
 
 def load_attempt(session: Session, settings: Settings, webhook_id: str) -> Attempt | None:
-    """What a webhook is to be sent now, if anything."""
+    """The next message to a webhook, if it is due."""
     now = datetime.now(UTC)
     webhook = webhooks.find(session, webhook_id)
     if webhook is None or not _is_open(webhook, now):
@@ -103,19 +96,18 @@ def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome
         _finish(delivery, DeliveryState.FAILED, now)
 
 
-def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Refresh | None:
-    """What an Alertmanager is to be told again now, if anything."""
+def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Message | None:
+    """All that fires, if an Alertmanager, which forgets, is to be told again now."""
     now = datetime.now(UTC)
     webhook = webhooks.find(session, webhook_id)
     if webhook is None or not _is_open(webhook, now) or not _needs_refresh(settings, webhook, now):
         return None
-    message = all_firing(session, settings, webhook, now)
-    return None if message is None else Refresh(webhook_id=webhook_id, message=message)
+    return all_firing(session, settings, webhook, now)
 
 
-def save_refresh(session: Session, settings: Settings, refresh: Refresh, out: Outcome) -> None:
+def save_refresh(session: Session, settings: Settings, webhook_id: str, out: Outcome) -> None:
     """Write down when an Alertmanager was told; it has no row of its own in the log."""
-    webhook = webhooks.find(session, refresh.webhook_id)
+    webhook = webhooks.find(session, webhook_id)
     if webhook is None:
         return
     now = datetime.now(UTC)

@@ -17,8 +17,8 @@ from service.notifications.signing import new_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.database.store import Store
-from service.store.tables.deliveries import WebhookRecord
+from service.store.engines.store import Store
+from service.store.webhooks import WebhookRecord
 
 NEW_KEY_FILE = f"{KEY_FILE}.new"
 

@@ -14,7 +14,7 @@ from service.notifications.outbox import alert_body, is_silenced, json_time
 from service.notifications.signing import signed_headers
 from service.settings import Settings
 from service.store import alerts, webhooks
-from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

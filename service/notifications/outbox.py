@@ -15,8 +15,8 @@ from service.enums import DeliveryState, MessageType
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.deliveries import DeliveryRecord, WebhookRecord
+from service.store.alerts import AlertRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 
 _ALERT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
@@ -92,7 +92,7 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
 
 
 def is_silenced(record: AlertRecord, now: datetime) -> bool:
-    """Whether an alert is to be quiet."""
+    """True where an alert is to be quiet."""
     return record.silenced_until is not None and record.silenced_until > now
 
 

@@ -21,7 +21,7 @@ _MOST_TOLD = 200  # characters of it in an error
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What an attempt came to: a status code, or an error that stood before one."""
+    """The outcome of an attempt: a status code, or an error that stood before one."""
 
     started_at: datetime
     duration_s: float
@@ -158,7 +158,7 @@ class DeadlineStream(httpcore.NetworkStream):
         return DeadlineStream(inner, self._left_s)
 
     def get_extra_info(self, info: str) -> Any:
-        """What the inner stream says."""
+        """An answer of the inner stream."""
         return self._inner.get_extra_info(info)
 
 

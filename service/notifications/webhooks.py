@@ -21,7 +21,7 @@ from service.reason_words import in_words
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.tables.deliveries import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 
 OLD_SECRET_STAYS = timedelta(hours=24)
 _BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)
@@ -29,7 +29,7 @@ _BY_A_PERSON = Reason(code=ServiceCode.DISABLED_BY_PERSON)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WebhookSpec:
-    """What an integrator says of a webhook; its URL was checked. No kinds: all."""
+    """A webhook as an integrator wants it; its URL was checked. No kinds: all."""
 
     url: str
     name: str

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from service.data_dir import COPIES, require_space, sync_folder
-from service.store.sqlite import files
+from service.store.engines import files
 
 _KEPT = 2
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from models.durations import HOUR_S
 from models.regression.weights_files import weights_path
 from service.data_dir import (
     StartError,
@@ -23,12 +24,11 @@ from service.notifications.sealing import sealer_of
 from service.operations.manifest import hash_file
 from service.operations.placing import READY
 from service.settings import Settings
-from service.store.database.revisions import known_revisions, require_known
-from service.store.sqlite import files
-from service.store.sqlite.faults import telling_of_database
+from service.store.engines import files
+from service.store.engines.failures import telling_of_database
+from service.store.engines.revisions import known_revisions, require_known
 
 _LEAST_FREE = 200e6
-_HOUR_S = 3600.0
 
 
 class Verdict(StrEnum):
@@ -119,7 +119,7 @@ def _weights(settings: Settings) -> Iterator[Finding]:
         [f"model {model_id} has none or broken ones" for model_id in broken],
         f"{len(named)} models, each has its weights",
     )
-    hour_ago = time.time() - _HOUR_S
+    hour_ago = time.time() - HOUR_S
     unused = [
         path.name
         for path in (settings.weights_dir.glob("*") if settings.weights_dir.exists() else ())

@@ -10,13 +10,11 @@ from sqlalchemy.orm import Session
 
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store import cameras
-from service.store.database.clock import now_in
-from service.store.database.failures import failure_of
-from service.store.database.store import Store
-from service.store.operation import events, probes, workers
-from service.store.tables.operation import EventRecord
-from service.store.tracks import unseen
+from service.store import cameras, events, tracks, workers
+from service.store.engines.dialects import now_in
+from service.store.engines.failures import failure_of
+from service.store.engines.store import Store
+from service.store.events import EventRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,13 +41,13 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     now = datetime.now(UTC)
     try:
         with store.write("probe/") as session:
-            probes.write(session, now)
+            workers.write_probe(session, now)
         with store.read() as session:
             heartbeat, asked = workers.newest_heartbeat(session), now_in(session)
             troubles = workers.troubles(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
-            came = {camera_id: at for camera_id, (_, at) in unseen.since(session).items()}
+            came = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
     except (SQLAlchemyError, OverloadedError) as error:
         known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
         said = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail

@@ -10,9 +10,7 @@ from service.cameras.standing import Standing, standings
 from service.enums import AlertKind, PoseState, Severity, TrainingState
 from service.notifications.outbox import is_silenced
 from service.settings import Settings
-from service.store import cameras, metrics, webhooks
-from service.store.operation import events
-from service.store.tracks import unseen
+from service.store import cameras, events, metrics, tracks, webhooks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +74,7 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
     now = datetime.now(UTC)
     unseen_s = {
         camera_id: max((now - at).total_seconds(), 0.0)
-        for camera_id, (_, at) in unseen.since(session).items()
+        for camera_id, (_, at) in tracks.unseen_since(session).items()
     }
     workers = metrics.workers(session)
     return Metrics(

@@ -32,9 +32,9 @@ from service.operations.manifest import (
 from service.operations.placing import commit_restore, finish_restore, has_data
 from service.operations.writing import Progress
 from service.settings import Settings
-from service.store.database.revisions import require_known
-from service.store.sqlite import files
-from service.store.sqlite.faults import telling_of_database
+from service.store.engines import files
+from service.store.engines.failures import telling_of_database
+from service.store.engines.revisions import require_known
 
 _LARGEST_MANIFEST = 64 * 2**20
 

@@ -36,8 +36,8 @@ from service.operations.manifest import (
     sqlite_version,
 )
 from service.settings import Settings
-from service.store.sqlite import files
-from service.store.sqlite.faults import telling_of_database
+from service.store.engines import files
+from service.store.engines.failures import telling_of_database
 
 Progress = Callable[[str, int, int], None]  # what, done, total
 _TRIES = 3

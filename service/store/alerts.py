@@ -1,15 +1,111 @@
-"""Statements on alerts."""
+"""Alerts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import and_, bindparam, exists, not_, select
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy import (
+    JSON,
+    ColumnElement,
+    Index,
+    Select,
+    String,
+    and_,
+    bindparam,
+    exists,
+    not_,
+    select,
+    text,
+)
+from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
-from service.enums import AlertKind, AlertState, Outcome
-from service.store.database.deleting import delete_some
-from service.store.tables.alerts import AlertRecord
+from service.enums import (
+    AlertKind,
+    AlertSource,
+    AlertState,
+    Outcome,
+    Severity,
+)
+from service.reason_words import in_words
+from service.reasons import Reasons, code_of, values_of
+from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
+
+_IS_FIRING = f"state = '{AlertState.FIRING}'"
+
+
+class AlertRecord(Record):
+    """An alert; at most one of a camera and kind is firing.
+
+    `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
+    rhythm, the upkeep, or a group. A group's alert has no camera but `camera_ids`, and its members
+    have its id as `group_id`; at most one of a `track_source` and kind is firing. `notified` says
+    whether an event told of the alert by itself.
+    """
+
+    __tablename__ = "alerts"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str | None] = camera_key()
+    camera_ids: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
+    group_id: Mapped[str | None] = foreign_key("alerts.id", "SET NULL", index=True)
+    track_source: Mapped[str | None]
+    kind: Mapped[AlertKind]
+    state: Mapped[AlertState]
+    source: Mapped[AlertSource]
+    notified: Mapped[bool] = mapped_column("told", default=False)
+    severity: Mapped[Severity]
+    reasons: Mapped[Reasons]
+    drift: Mapped[dict[str, Any]]
+    opened_at: Mapped[datetime]
+    changed_at: Mapped[datetime | None]
+    updated_at: Mapped[datetime]
+    acknowledged_by: Mapped[str | None]
+    acknowledged_at: Mapped[datetime | None]
+    silenced_until: Mapped[datetime | None]
+    silence_reason: Mapped[str | None]
+    silenced_by: Mapped[str | None]
+    resolved_at: Mapped[datetime | None]
+    resolved_by: Mapped[str | None]
+    outcome: Mapped[Outcome | None]
+    note: Mapped[str | None]
+
+    __table_args__ = (
+        Index(
+            "uq_alerts_firing",
+            "camera_id",
+            "kind",
+            unique=True,
+            sqlite_where=text(_IS_FIRING),
+            postgresql_where=text(_IS_FIRING),
+        ),
+        Index(
+            "uq_alerts_firing_group",
+            "track_source",
+            "kind",
+            unique=True,
+            sqlite_where=text(f"{_IS_FIRING} AND camera_id IS NULL"),
+            postgresql_where=text(f"{_IS_FIRING} AND camera_id IS NULL"),
+        ),
+        Index(None, "opened_at"),
+        Index(None, "camera_id", "opened_at"),
+    )
+
+    @property
+    def reason(self) -> str:
+        """Why it was opened, in words."""
+        return in_words(self.reasons)
+
+    @property
+    def reason_code(self) -> str | None:
+        """The code of the first reason; None of a group that is about to be told."""
+        return code_of(self.reasons)
+
+    @property
+    def reason_values(self) -> dict[str, Any]:
+        """The numbers and names of the first reason, angles in degrees."""
+        return values_of(self.reasons)
+
 
 POSE_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that hold a camera against its prior pose
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
@@ -24,7 +120,7 @@ _FIRING = select(AlertRecord).where(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertFilter:
-    """Which alerts are wanted; None is any."""
+    """A choice of alerts; None is any."""
 
     state: AlertState | None = None
     camera_id: str | None = None
@@ -58,12 +154,8 @@ def firing_cameras(session: Session, kind: AlertKind) -> set[str]:
 
 def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The alert of a camera and kind that was opened last, or None."""
-    return session.scalars(
-        select(AlertRecord)
-        .where(AlertRecord.camera_id == camera_id, AlertRecord.kind == kind)
-        .order_by(AlertRecord.opened_at.desc())
-        .limit(1)
-    ).first()
+    query = newest_first(AlertRecord, camera_id, AlertRecord.opened_at)
+    return session.scalars(query.where(AlertRecord.kind == kind).limit(1)).first()
 
 
 def ended(
@@ -83,60 +175,40 @@ def firing_of_source(
     session: Session, track_source: str, kinds: Sequence[AlertKind]
 ) -> Sequence[AlertRecord]:
     """The open alerts of some kinds about the cameras of a source of tracks."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.track_source == track_source,
-            AlertRecord.kind.in_(kinds),
-            AlertRecord.state == AlertState.FIRING,
-            AlertRecord.camera_id.is_not(None),
-        )
-    ).all()
+    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind.in_(kinds))
+    return session.scalars(query.where(AlertRecord.camera_id.is_not(None))).all()
 
 
 def firing_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert about all of a source of tracks, or None."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.track_source == track_source,
-            AlertRecord.kind == kind,
-            AlertRecord.state == AlertState.FIRING,
-            AlertRecord.camera_id.is_(None),
-        )
-    ).first()
+    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind == kind)
+    return session.scalars(query.where(AlertRecord.camera_id.is_(None))).first()
 
 
 def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
     """The open alerts that a group is made of."""
-    return session.scalars(
-        select(AlertRecord)
-        .where(AlertRecord.group_id == group_id, AlertRecord.state == AlertState.FIRING)
-        .order_by(AlertRecord.camera_id)
-    ).all()
+    query = _all_firing(AlertRecord.group_id == group_id)
+    return session.scalars(query.order_by(AlertRecord.camera_id)).all()
 
 
 def groups_without_members(session: Session) -> Sequence[AlertRecord]:
     """Open groups none of whose members is: their cameras are gone."""
     member = aliased(AlertRecord)
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.camera_id.is_(None),
-            AlertRecord.state == AlertState.FIRING,
-            ~exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING),
-        )
-    ).all()
+    of_group = exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING)
+    return session.scalars(_all_firing(AlertRecord.camera_id.is_(None), ~of_group)).all()
 
 
 def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     """Open alerts whose silence has come to its time."""
-    return session.scalars(
-        select(AlertRecord).where(
-            AlertRecord.state == AlertState.FIRING, AlertRecord.silenced_until <= now
-        )
-    ).all()
+    return session.scalars(_all_firing(AlertRecord.silenced_until <= now)).all()
+
+
+def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:
+    return select(AlertRecord).where(AlertRecord.state == AlertState.FIRING, *conditions)
 
 
 def answered_at(session: Session, camera_id: str) -> datetime | None:
-    """When a person last said of an alert that the camera is where it should be."""
+    """The time at which a person last said that the camera is where it should be."""
     return session.scalar(
         select(AlertRecord.resolved_at)
         .where(

@@ -1,19 +1,115 @@
-"""Statements on cameras and their prior poses."""
+"""Cameras and their prior poses."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
 
-from sqlalchemy import Connection, Integer, bindparam, func, select, type_coerce
-from sqlalchemy.orm import Session
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Index,
+    Integer,
+    String,
+    bindparam,
+    false,
+    func,
+    select,
+    type_coerce,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
-from service.store.database.deleting import delete_some
-from service.store.metrics import newest_of
-from service.store.sqlite.prepared import Prepared
-from service.store.tables.cameras import CameraRecord, PriorPoseRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.trainings import ModelRecord, TrainingRecord
-from service.store.tracks.counting import counting_source
+from service.enums import (
+    Origin,
+)
+from service.reasons import Reasons
+from service.store.engines.prepared import Prepared
+from service.store.estimates import EstimateRecord
+from service.store.record import (
+    Record,
+    camera_key,
+    delete_some,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
+from service.store.references import SiteReferenceRecord, counting_source
+from service.store.trainings import ModelRecord, TrainingRecord
+
+
+class CameraRecord(Record):
+    """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
+
+    `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
+    `estimate_tries` counts the looks since the last one that came to its end. If they fail,
+    `estimate_error` says why and `estimate_failing_since` since when. None is begun before
+    `estimate_after`. `lacks` says what failed beside the served estimate. One that is `urgent` may
+    have moved: it is looked at before others.
+    """
+
+    __tablename__ = "cameras"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str]
+    width: Mapped[int]
+    height: Mapped[int]
+    fx: Mapped[float]
+    fy: Mapped[float]
+    cx: Mapped[float]
+    cy: Mapped[float]
+    distortion: Mapped[list[float]]
+    frame_rate_hz: Mapped[float | None]
+    walking_speed_mean_mps: Mapped[float]
+    walking_speed_sd_mps: Mapped[float]
+    reference_tracks: Mapped[int]
+    version: Mapped[int]
+    estimate_due_at: Mapped[datetime | None]
+    looked_at_pk: Mapped[int | None]
+    estimate_tries: Mapped[int] = mapped_column(default=0)
+    estimate_error: Mapped[str | None]
+    estimate_failing_since: Mapped[datetime | None]
+    estimate_after: Mapped[datetime | None]
+    lacks: Mapped[Reasons] = mapped_column(default=())
+    urgent: Mapped[bool] = mapped_column(default=False, server_default=false())
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+
+
+class PriorPoseRecord(Record):
+    """A pose that was trusted from a time on; the newest of a camera is its prior pose."""
+
+    __tablename__ = "prior_poses"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    height_m: Mapped[float]
+    tilt_rad: Mapped[float]
+    roll_rad: Mapped[float]
+    heading_rad: Mapped[float]
+    x_m: Mapped[float]
+    y_m: Mapped[float]
+    origin: Mapped[Origin] = mapped_column(vocabulary(Origin, checked=False))
+    trusted_by: Mapped[str | None]
+    created_at: Mapped[datetime]
+
+    __table_args__ = (
+        one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
+        Index(None, "camera_id", "id"),
+    )
+
+
+def newest_of(
+    column: InstrumentedAttribute[Any], camera_id: InstrumentedAttribute[str]
+) -> ColumnElement[Any]:
+    """The largest value of a column among what is stored of each camera: a lookup in an index."""
+    return (
+        select(func.max(column))
+        .where(camera_id == CameraRecord.id)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+
 
 # Built once: each request for a pose asks for them.
 _NEWEST_POSE = newest_of(PriorPoseRecord.id, PriorPoseRecord.camera_id)
@@ -30,12 +126,7 @@ _AS_SET_UP = (
     .join(PriorPoseRecord, PriorPoseRecord.id == _NEWEST_POSE)
     .where(CameraRecord.id == bindparam("camera"))
 )
-_PRIOR_POSE = (
-    select(PriorPoseRecord)
-    .where(PriorPoseRecord.camera_id == bindparam("camera"))
-    .order_by(PriorPoseRecord.id.desc())
-    .limit(1)
-)
+_PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
 
 # A record takes ten times as long as what each post of tracks has to know of its camera.
 _PICTURE = Prepared(
@@ -65,7 +156,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Awaited:
-    """What a camera's tracks are awaited for: a `look` at them, a `source` for its reference.
+    """The reasons to await a camera's tracks: a `look` at them, a `source` for its reference.
 
     `picture` is what they have to keep to.
     """
@@ -87,7 +178,7 @@ def picture(connection: Connection, camera_id: str) -> Picture | None:
 
 
 def awaited(connection: Connection, camera_id: str) -> Awaited | None:
-    """What tracks of a camera are awaited for; None where there is no such camera."""
+    """The reasons to await tracks of a camera; None where there is no such camera."""
     row = _AWAITED.row(connection, {"camera": camera_id})
     if row is None:
         return None
@@ -115,7 +206,7 @@ def ids(session: Session) -> Sequence[str]:
 
 
 def count(session: Session) -> int:
-    """How many cameras there are."""
+    """The number of cameras."""
     return session.scalar(select(func.count()).select_from(CameraRecord)) or 0
 
 
@@ -126,28 +217,18 @@ def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
 
 def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:
     """The poses that a camera was trusted to have, newest first."""
-    return session.scalars(
-        select(PriorPoseRecord)
-        .where(PriorPoseRecord.camera_id == camera_id)
-        .order_by(PriorPoseRecord.id.desc())
-        .limit(limit)
-    ).all()
+    return session.scalars(newest_first(PriorPoseRecord, camera_id).limit(limit)).all()
 
 
 def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many that nothing names; how many."""
-    surplus = (
-        select(PriorPoseRecord.id)
-        .where(PriorPoseRecord.camera_id == camera_id)
-        .order_by(PriorPoseRecord.id.desc())
-        .offset(keep)
-    )
+    beyond = surplus(PriorPoseRecord, camera_id, keep)
     naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord)
     named = [select(one.prior_pose_id).where(one.camera_id == camera_id) for one in naming]
     bite = (
         select(PriorPoseRecord.id)
         .where(
-            PriorPoseRecord.id.in_(surplus),
+            PriorPoseRecord.id.in_(beyond),
             *(PriorPoseRecord.id.not_in(query) for query in named),
         )
         .limit(limit)

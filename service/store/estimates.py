@@ -1,33 +1,120 @@
-"""Statements on estimates, the history of the served pose."""
+"""Estimates: the history of the served pose."""
 
 from collections.abc import Sequence
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import ColumnElement, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Index, func, select
+from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
-from service.store.database.deleting import delete_some
-from service.store.tables.estimates import EstimateRecord
+from models.geometry.pose_parameters import PoseParameters
+from models.monitoring.verdict import Drift
+from service.enums import (
+    PoseState,
+)
+from service.reasons import Reasons
+from service.store.record import (
+    Record,
+    camera_key,
+    count_where,
+    delete_some,
+    foreign_key,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
+
+
+def _parameters(*columns: str) -> Any:
+    """Four columns as one value; a heading that was never known is 0 and not identifiable."""
+    return composite(_as_parameters, *columns)
+
+
+def _as_parameters(
+    height_m: float, tilt_rad: float, roll_rad: float, heading_rad: float | None
+) -> PoseParameters:
+    return PoseParameters(
+        height_m=height_m, tilt_rad=tilt_rad, roll_rad=roll_rad, heading_rad=heading_rad or 0.0
+    )
+
+
+class EstimateRecord(Record):
+    """The served pose at one time, and what is behind it.
+
+    `pose` is the served one: the prior's where the tracks leave it open. `drift_by` and `pose_sd`
+    are the estimator's for all four parameters; `identifiable` names those that count.
+    `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
+    one. Estimates of before there were flow maps have no `heading_sd_rad`.
+    """
+
+    __tablename__ = "estimates"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    model_id: Mapped[str | None] = foreign_key("models.id", "SET NULL", index=True)
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    reference_id: Mapped[int | None] = foreign_key("site_references.id", index=True)
+    state: Mapped[PoseState] = mapped_column(vocabulary(PoseState, checked=False))
+    reasons: Mapped[Reasons]
+    identifiable: Mapped[list[str]] = mapped_column("told")  # of tilt, roll, height, heading
+    height_m: Mapped[float]
+    tilt_rad: Mapped[float]
+    roll_rad: Mapped[float]
+    heading_rad: Mapped[float]
+    height_sd_m: Mapped[float]
+    tilt_sd_rad: Mapped[float]
+    roll_sd_rad: Mapped[float]
+    heading_sd_rad: Mapped[float | None]
+    drift_height_m: Mapped[float]
+    drift_tilt_rad: Mapped[float]
+    drift_roll_rad: Mapped[float]
+    drift_heading_rad: Mapped[float]
+    drift_angle_rad: Mapped[float]
+    suspected: Mapped[bool]  # the score test says that the camera has moved
+    drift_streak: Mapped[int]  # 1: beyond the limits; -1: below the share that clears
+    drifted: Mapped[list[str]]  # of those: what has been beyond since it began
+    drift_since: Mapped[datetime | None]
+    raw: Mapped[dict[str, Any]]
+    tracks: Mapped[int]
+    from_s: Mapped[float]
+    to_s: Mapped[float]
+    newest_track_pk: Mapped[int]
+    created_at: Mapped[datetime]
+    pose: Mapped[PoseParameters] = _parameters("height_m", "tilt_rad", "roll_rad", "heading_rad")
+    pose_sd: Mapped[PoseParameters] = _parameters(
+        "height_sd_m", "tilt_sd_rad", "roll_sd_rad", "heading_sd_rad"
+    )
+    drift_by: Mapped[PoseParameters] = _parameters(
+        "drift_height_m", "drift_tilt_rad", "drift_roll_rad", "drift_heading_rad"
+    )
+
+    __table_args__ = (
+        # That nobody comes is no estimate's to say.
+        one_of("state", [state for state in PoseState if state != PoseState.NO_DATA]),
+        Index(None, "camera_id", "id"),
+    )
+
+    @property
+    def drift(self) -> Drift:
+        """The drift against the prior pose, and which of it is identifiable."""
+        return Drift(
+            by=self.drift_by,
+            sd=self.pose_sd,
+            angle_rad=self.drift_angle_rad,
+            identifiable=tuple(self.identifiable),
+        )
 
 
 def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     """The estimate that is served, or None."""
-    return session.scalars(
-        select(EstimateRecord)
-        .where(EstimateRecord.camera_id == camera_id)
-        .order_by(EstimateRecord.id.desc())
-        .limit(1)
-    ).first()
+    return session.scalars(newest_first(EstimateRecord, camera_id).limit(1)).first()
 
 
 def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> EstimateRecord | None:
     """The last estimate under an earlier reference, or None."""
-    return session.scalars(
-        select(EstimateRecord)
-        .where(EstimateRecord.camera_id == camera_id, EstimateRecord.reference_id < reference_id)
-        .order_by(EstimateRecord.id.desc())
-        .limit(1)
-    ).first()
+    query = newest_first(EstimateRecord, camera_id)
+    return session.scalars(query.where(EstimateRecord.reference_id < reference_id).limit(1)).first()
 
 
 def between(
@@ -43,7 +130,7 @@ def thinned(
 ) -> Sequence[EstimateRecord]:
     """Every so many-th of the estimates made between two times, oldest first; the newest is one."""
     wanted = _made_between(camera_id, start, end)
-    count = session.scalar(select(func.count()).where(*wanted)) or 0
+    count = count_where(session, *wanted)
     number = func.row_number().over(order_by=EstimateRecord.id.desc()).label("number")
     numbered = select(EstimateRecord.id, number).where(*wanted).subquery()
     every = max(-(-count // most), 1)
@@ -54,14 +141,8 @@ def thinned(
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many, oldest first. Returns how many."""
-    surplus = (
-        select(EstimateRecord.id)
-        .where(EstimateRecord.camera_id == camera_id)
-        .order_by(EstimateRecord.id.desc())
-        .offset(keep)
-        .subquery()
-    )
-    bite = select(surplus.c.id).order_by(surplus.c.id).limit(limit)
+    beyond = surplus(EstimateRecord, camera_id, keep).subquery()
+    bite = select(beyond.c.id).order_by(beyond.c.id).limit(limit)
     return delete_some(session, EstimateRecord.id, bite)
 
 

@@ -22,17 +22,15 @@ from sqlalchemy.orm import Session, aliased
 
 from models.monitoring.verdict import DriftLimits
 from service.enums import AlertState
-from service.store.database.dialects import contains_word, largest
-from service.store.metrics import Ids, among, among_given, given, newest_of
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks.counting import Spans
-from service.store.trainings import UNFINISHED
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord, newest_of
+from service.store.engines.dialects import contains_word, largest
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.metrics import Ids, among, among_given, given
+from service.store.references import SiteReferenceRecord
+from service.store.stored_tracks import Spans, TrackRecord
+from service.store.trainings import UNFINISHED, TrainingRecord
 
 
 def names(session: Session, ids: Ids) -> list[tuple[str, str]]:
@@ -81,7 +79,7 @@ def drift_history(
 
 
 def learning_counts(session: Session, ids: Ids, without: Mapping[str, Spans]) -> dict[str, int]:
-    """How many tracks have come that the reference being learned of each camera may be made of.
+    """The number of tracks that the reference being learned of each camera may be made of.
 
     Of those of a camera that were seen at any time `without`, none.
     """
@@ -171,7 +169,7 @@ def _maintenance_windows(*, some: bool) -> Select[MaintenanceRecord]:
 
 
 def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
-    """Whether a track was seen at any of some times of its camera: what `outside` denies."""
+    """The condition of being seen at any of some times of a camera: what `outside` denies."""
     rows = [(camera_id, *span) for camera_id, each in spans.items() for span in each]
     columns = column("camera_id", String), column("from_s", Float), column("to_s", Float)
     times = values(*columns, name="times").data(rows).cte("times")

@@ -1,13 +1,43 @@
-"""Statements on maintenance windows."""
+"""Maintenance windows."""
 
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import bindparam, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ForeignKey, Index, String, bindparam, func, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.database.deleting import delete_some
-from service.store.tables.attendance import MaintenanceRecord
+from service.store.record import Record, delete_some
+
+
+class MaintenanceRecord(Record):
+    """A time in which somebody is at a camera: what is seen in it is not judged.
+
+    `to_at` is the plan, `ended_at` when it really ended; None until it has.
+    """
+
+    __tablename__ = "maintenance_windows"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
+    from_at: Mapped[datetime]
+    to_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    reason: Mapped[str | None]
+    requested_by: Mapped[str | None]
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "to_at"),)
+
+    @property
+    def until(self) -> datetime:
+        """The time at which it ended, or will."""
+        return self.ended_at or self.to_at
+
+    def holds(self, now: datetime) -> bool:
+        """True if somebody is there."""
+        return self.from_at <= now < self.until
+
 
 _UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
 

@@ -21,17 +21,17 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute, Session, defer
 
 from service.enums import AlertState, DeliveryState, TrainingState
-from service.store.database.dialects import as_json
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord, RhythmRecord
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.deliveries import DeliveryRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.operation import WorkerRecord
-from service.store.tables.references import SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks.counting import of_counting_source
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord, newest_of
+from service.store.engines.dialects import as_json
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.references import SiteReferenceRecord
+from service.store.rhythms import RhythmRecord
+from service.store.stored_tracks import TrackRecord, of_counting_source
+from service.store.trainings import TrainingRecord
+from service.store.webhooks import DeliveryRecord
+from service.store.workers import WorkerRecord
 
 # Which cameras are asked about; None is all.
 Ids = Collection[str] | None
@@ -41,7 +41,7 @@ _IDS = "ids"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Newest:
-    """What is newest of a camera, and whether there is more to know.
+    """The newest rows of a camera, and signs of more to know.
 
     The reference that counts comes without the site itself, and of several cameras the estimate
     without what is behind it. `last_track_s` is when the newest track ended of those that count.
@@ -58,14 +58,14 @@ class Newest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backlog:
-    """What waits for a webhook, and since when."""
+    """Deliveries that wait for a webhook, and since when."""
 
     count: int
     oldest_at: datetime
 
 
 def newest(session: Session, ids: Ids = None) -> dict[str, Newest]:
-    """What is newest of each camera, in order of their ids."""
+    """The newest rows of each camera, in order of their ids."""
     query = _newest(some=ids is not None, whole=ids is not None and len(ids) == 1)
     return {
         camera_id: Newest(
@@ -109,7 +109,7 @@ def firing(session: Session) -> Sequence[AlertRecord]:
 
 
 def trainings_by_state(session: Session) -> dict[TrainingState, int]:
-    """How many trainings are stored in each state."""
+    """The number of stored trainings in each state."""
     rows = session.execute(
         select(TrainingRecord.state, func.count()).group_by(TrainingRecord.state)
     )
@@ -122,7 +122,7 @@ def workers(session: Session) -> Sequence[WorkerRecord]:
 
 
 def backlogs(session: Session) -> dict[str, Backlog]:
-    """What waits for each webhook that something waits for."""
+    """The backlog of each webhook that something waits for."""
     rows = session.execute(
         select(DeliveryRecord.webhook_id, func.count(), func.min(DeliveryRecord.created_at))
         .where(DeliveryRecord.state == DeliveryState.PENDING)
@@ -166,7 +166,7 @@ def _newest(*, some: bool, whole: bool) -> Select[Any]:
 
 
 def among(column: InstrumentedAttribute[Any], ids: Ids) -> ColumnElement[bool]:
-    """Whether a column names one of the cameras that are asked about."""
+    """The condition that a column names one of the cameras that are asked about."""
     return true() if ids is None else column.in_(ids)
 
 
@@ -176,17 +176,5 @@ def among_given(column: InstrumentedAttribute[Any], *, some: bool) -> ColumnElem
 
 
 def given(ids: Ids) -> dict[str, list[str]]:
-    """What such a statement is executed with."""
+    """The parameters of such a statement."""
     return {} if ids is None else {_IDS: list(ids)}
-
-
-def newest_of(
-    column: InstrumentedAttribute[Any], camera_id: InstrumentedAttribute[str]
-) -> ColumnElement[Any]:
-    """The largest value of a column among what is stored of each camera: a lookup in an index."""
-    return (
-        select(func.max(column))
-        .where(camera_id == CameraRecord.id)
-        .correlate(CameraRecord)
-        .scalar_subquery()
-    )

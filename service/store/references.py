@@ -1,15 +1,84 @@
-"""Statements on references."""
+"""References: what is usual at a site while its camera is at its prior pose."""
 
 from collections.abc import Sequence
+from datetime import datetime
 
-from sqlalchemy import Connection, Select, bindparam, exists, func, select, update
-from sqlalchemy.orm import Session, aliased, defer
+from sqlalchemy import (
+    BindParameter,
+    Connection,
+    Index,
+    LargeBinary,
+    Select,
+    bindparam,
+    exists,
+    func,
+    select,
+    update,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, defer, mapped_column
 
-from service.store.database.deleting import delete_some
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import SiteReferenceRecord
+from service.enums import (
+    Answer,
+    Origin,
+)
+from service.reasons import Reasons
+from service.store.estimates import EstimateRecord
+from service.store.record import (
+    Record,
+    camera_key,
+    delete_some,
+    foreign_key,
+    newest_first,
+    one_of,
+    surplus,
+    vocabulary,
+)
 
+
+class SiteReferenceRecord(Record):
+    """The estimators' answers while a camera is known to be at its prior pose; the newest counts.
+
+    It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
+    is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
+    said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
+    Later, `window_from_s` is when the first track after the newest change of the camera ended, and
+    `changed_s` when it started. `answer` is what a person said last of how the camera stands:
+    estimates of before `answered_at` say nothing of it any more.
+    """
+
+    __tablename__ = "site_references"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    origin: Mapped[Origin]
+    source: Mapped[str | None]
+    requested_by: Mapped[str | None]
+    from_s: Mapped[float | None]
+    to_s: Mapped[float | None]
+    wanted: Mapped[int]
+    tracks: Mapped[int]
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    walking_speed_mps: Mapped[float | None]
+    doubts: Mapped[Reasons]
+    window_from_s: Mapped[float | None]
+    changed_s: Mapped[float | None]
+    answer: Mapped[Answer | None] = mapped_column(vocabulary(Answer, checked=False))
+    answered_by: Mapped[str | None]
+    answered_at: Mapped[datetime | None]
+    created_at: Mapped[datetime]
+    ready_at: Mapped[datetime | None]
+
+    __table_args__ = (
+        one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
+        Index(None, "camera_id", "id"),
+    )
+
+
+# Made once: each alias has columns of its own, which take a millisecond to make.
 _Reference = aliased(SiteReferenceRecord)
+# A camera by its id, by that of an enclosing query, or by a value that is given later.
+CameraId = str | InstrumentedAttribute[str] | BindParameter[str]
 _NEWEST_OF_ONE = select(func.max(_Reference.id)).where(_Reference.camera_id == bindparam("camera"))
 _OF_SOURCE = (
     update(SiteReferenceRecord.__table__)  # type: ignore[arg-type]
@@ -26,49 +95,45 @@ def be_of_source(connection: Connection, camera_id: str, name: str) -> None:
     connection.execute(_OF_SOURCE, {"camera": camera_id, "name": name})
 
 
+def counting_source(camera_id: CameraId) -> Select[str | None]:
+    """The source of a camera's newest reference."""
+    newest = (
+        select(_Reference.source)
+        .where(_Reference.camera_id == camera_id)
+        .order_by(_Reference.id.desc())
+        .limit(1)
+    )
+    return (
+        newest.correlate(camera_id.class_)
+        if isinstance(camera_id, InstrumentedAttribute)
+        else newest
+    )
+
+
 def newest(session: Session, camera_id: str) -> SiteReferenceRecord:
     """The reference of a camera that counts."""
-    return session.scalars(_newest(camera_id)).one()
+    return session.scalars(newest_first(SiteReferenceRecord, camera_id).limit(1)).one()
 
 
 def newest_if_any(session: Session, camera_id: str) -> SiteReferenceRecord | None:
     """The reference that counts; None where the camera is gone."""
-    return session.scalars(_newest(camera_id)).first()
+    return session.scalars(newest_first(SiteReferenceRecord, camera_id).limit(1)).first()
 
 
 def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[SiteReferenceRecord]:
     """The references of a camera, newest first, without what was learned."""
-    return session.scalars(
-        select(SiteReferenceRecord)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .limit(limit)
-        .options(defer(SiteReferenceRecord.data))
-    ).all()
+    query = newest_first(SiteReferenceRecord, camera_id).limit(limit)
+    return session.scalars(query.options(defer(SiteReferenceRecord.data))).all()
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many that no estimate names; how many."""
-    surplus = (
-        select(SiteReferenceRecord.id)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .offset(keep)
-    )
+    beyond = surplus(SiteReferenceRecord, camera_id, keep)
     named = exists().where(EstimateRecord.reference_id == SiteReferenceRecord.id)
     of_camera = EstimateRecord.camera_id == camera_id  # by its index
     bite = (
         select(SiteReferenceRecord.id)
-        .where(SiteReferenceRecord.id.in_(surplus), ~named.where(of_camera))
+        .where(SiteReferenceRecord.id.in_(beyond), ~named.where(of_camera))
         .limit(limit)
     )
     return delete_some(session, SiteReferenceRecord.id, bite)
-
-
-def _newest(camera_id: str) -> Select[SiteReferenceRecord]:
-    return (
-        select(SiteReferenceRecord)
-        .where(SiteReferenceRecord.camera_id == camera_id)
-        .order_by(SiteReferenceRecord.id.desc())
-        .limit(1)
-    )

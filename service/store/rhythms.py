@@ -1,12 +1,28 @@
-"""Statements on rhythms of cameras."""
+"""Rhythms of cameras."""
 
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy import JSON, ForeignKey, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.tables.attendance import RhythmRecord
+from service.store.record import Record
+
+
+class RhythmRecord(Record):
+    """The arrival model of a camera: how many people come when, and how late.
+
+    `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
+    """
+
+    __tablename__ = "camera_rhythms"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    profile: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    counts: Mapped[dict[str, Any]]
+    learned_at: Mapped[datetime]
 
 
 def find(session: Session, camera_id: str) -> RhythmRecord | None:

@@ -1,17 +1,32 @@
-"""Statements on still images."""
+"""Still images of cameras."""
 
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import delete, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ForeignKey, LargeBinary, String, delete, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.tables.cameras import SnapshotRecord
+from service.store.record import Record
+
+
+class SnapshotRecord(Record):
+    """A still image of a camera, a JPEG, in a row of its own: no other query reads it."""
+
+    __tablename__ = "snapshots"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    jpeg: Mapped[bytes] = mapped_column(LargeBinary)
+    sha256: Mapped[str] = mapped_column(String(64))
+    width: Mapped[int]
+    height: Mapped[int]
+    stored_at: Mapped[datetime]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SnapshotFacts:
-    """What is known of a still image without reading it."""
+    """Facts of a still image, without reading it."""
 
     sha256: str
     width: int
@@ -25,7 +40,7 @@ def find(session: Session, camera_id: str) -> SnapshotRecord | None:
 
 
 def facts(session: Session, camera_id: str) -> SnapshotFacts | None:
-    """What is known of the still image of a camera, or None."""
+    """The facts of the still image of a camera, or None."""
     row = session.execute(
         select(
             SnapshotRecord.sha256,

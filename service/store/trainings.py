@@ -1,34 +1,95 @@
-"""Statements on trainings and models."""
+"""Trainings, the models that they made, and their weights."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from typing import Any
 
-from sqlalchemy import bindparam, select
-from sqlalchemy.orm import Session
+from sqlalchemy import Index, LargeBinary, String, bindparam, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.enums import TrainingState
-from service.store.database.deleting import delete_some
-from service.store.tables.trainings import ModelRecord, TrainingRecord, WeightsRecord
+from service.enums import (
+    TrainingState,
+)
+from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first, surplus
+
+
+class TrainingRecord(Record):
+    """One training run; `attempt` grows each time a worker takes it up.
+
+    `around` has the height, tilt and roll that it is centred on, where these are not the prior's.
+    """
+
+    __tablename__ = "trainings"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    recipe: Mapped[str]
+    around: Mapped[dict[str, Any] | None]
+    seed: Mapped[int]
+    state: Mapped[TrainingState]
+    attempt: Mapped[int]
+    cancel_requested: Mapped[bool]
+    step: Mapped[int]
+    steps: Mapped[int]
+    loss: Mapped[float | None]
+    eta_s: Mapped[float | None]
+    error: Mapped[str | None]
+    metrics: Mapped[dict[str, Any] | None]
+    queued_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+
+    __table_args__ = (
+        Index(None, "camera_id", "queued_at"),
+        Index(None, "state"),
+    )
+
+
+class ModelRecord(Record):
+    """A published model; its weights are the file `<weights_sha256>.safetensors`.
+
+    On a server, whose workers have no disk in common, a `WeightsRecord` has them, too.
+    """
+
+    __tablename__ = "models"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    training_id: Mapped[str] = foreign_key("trainings.id", unique=True)
+    weights_sha256: Mapped[str] = mapped_column(String(64))
+    config: Mapped[dict[str, Any]]
+    seed: Mapped[int]
+    step_s: Mapped[float]
+    metrics: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "created_at"),)
+
+
+class WeightsRecord(Record):
+    """The weights of models by their hash, where several machines share a database."""
+
+    __tablename__ = "weights"
+
+    sha256: Mapped[str] = mapped_column(String(64), primary_key=True)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+    stored_at: Mapped[datetime]
+
 
 UNFINISHED = (TrainingState.QUEUED, TrainingState.RUNNING)
 
 # Built once, which takes longer than to run them: each request for a pose asks for the one, and
 # each reconcile of a camera for the others.
-_NEWEST_MODEL = (
-    select(ModelRecord)
-    .where(ModelRecord.camera_id == bindparam("camera"))
-    .order_by(ModelRecord.created_at.desc())
-    .limit(1)
-)
-_OF_CAMERA = (
-    select(TrainingRecord)
-    .where(TrainingRecord.camera_id == bindparam("camera"))
-    .order_by(TrainingRecord.queued_at.desc())
-    .limit(bindparam("most"))
+_CAMERA = bindparam("camera", type_=String)
+_NEWEST_MODEL = newest_first(ModelRecord, _CAMERA, ModelRecord.created_at).limit(1)
+_OF_CAMERA = newest_first(TrainingRecord, _CAMERA, TrainingRecord.queued_at).limit(
+    bindparam("most")
 )
 _UNFINISHED_OF_CAMERA = (
     select(TrainingRecord)
-    .where(TrainingRecord.camera_id == bindparam("camera"), TrainingRecord.state.in_(UNFINISHED))
+    .where(TrainingRecord.camera_id == _CAMERA, TrainingRecord.state.in_(UNFINISHED))
     .order_by(TrainingRecord.queued_at)
 )
 
@@ -55,12 +116,8 @@ def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
 
 def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:
     """Models of a camera older than its newest so many."""
-    return session.scalars(
-        select(ModelRecord)
-        .where(ModelRecord.camera_id == camera_id)
-        .order_by(ModelRecord.created_at.desc())
-        .offset(keep)
-    ).all()
+    query = newest_first(ModelRecord, camera_id, ModelRecord.created_at)
+    return session.scalars(query.offset(keep)).all()
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
@@ -68,16 +125,11 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
 
     Those stay that have a model or have not ended.
     """
-    surplus = (
-        select(TrainingRecord.id)
-        .where(TrainingRecord.camera_id == camera_id)
-        .order_by(TrainingRecord.queued_at.desc())
-        .offset(keep)
-    )
+    beyond = surplus(TrainingRecord, camera_id, keep, TrainingRecord.queued_at)
     bite = (
         select(TrainingRecord.id)
         .where(
-            TrainingRecord.id.in_(surplus),
+            TrainingRecord.id.in_(beyond),
             TrainingRecord.state.not_in(UNFINISHED),
             TrainingRecord.id.not_in(select(ModelRecord.training_id)),
         )
@@ -92,7 +144,7 @@ def weights_in_use(session: Session) -> set[str]:
 
 
 def has_weights(session: Session, sha256: str) -> bool:
-    """Whether weights are in the database."""
+    """True if weights are in the database."""
     return session.scalar(select(WeightsRecord.sha256).filter_by(sha256=sha256)) is not None
 
 
@@ -114,7 +166,7 @@ def forget_weights(session: Session, limit: int) -> int:
 
 
 def model_exists(session: Session, model_id: str) -> bool:
-    """Whether a model is still stored."""
+    """True if a model is still stored."""
     return session.get(ModelRecord, model_id) is not None
 
 

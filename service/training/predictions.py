@@ -1,16 +1,46 @@
-"""Which tracks a model has yet to look at, and what it says of them."""
+"""Weights that several machines share, and what the model in use says of tracks."""
 
+import hashlib
+import logging
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from models.regression.weights_files import weights_path
+from service.references import window_of
 from service.settings import Settings
-from service.store import references, trainings
-from service.store.tracks import predictions, tracks
-from service.store.tracks.stored import StoredTrack
-from service.windows.references import window_of
+from service.store import predictions, references, tracks, trainings
+from service.store.engines.store import Store
+from service.store.stored_tracks import StoredTrack
+
+log = logging.getLogger("surefoot.jobs")
+
+
+def share_weights(session: Session, settings: Settings, sha256: str) -> None:
+    """Keep weights beside the model that is published with them, where there is a server."""
+    if settings.database_url is not None and not trainings.has_weights(session, sha256):
+        trainings.keep_weights(
+            session, sha256, weights_path(settings.weights_dir, sha256).read_bytes()
+        )
+
+
+def fetch_weights(store: Store, settings: Settings, sha256: str) -> None:
+    """See that weights are on this machine's disk, if they are anywhere; whole or not at all."""
+    path = weights_path(settings.weights_dir, sha256)
+    if settings.database_url is None or path.exists():
+        return
+    with store.read() as session:
+        data = trainings.weights(session, sha256)
+    if data is None or hashlib.sha256(data).hexdigest() != sha256:
+        return  # who reads the file says that it cannot
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.fetched")
+    partial.write_bytes(data)
+    partial.replace(path)
+    log.info("weights_fetched", extra={"sha256": sha256, "bytes": len(data)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

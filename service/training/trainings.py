@@ -15,24 +15,17 @@ from models.tracks.trajectory import choose_step_s
 from service.access.activity import note
 from service.enums import Activity, EventType, TrainingState
 from service.errors import ConflictError, NotFoundError
+from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import cameras, trainings
-from service.store.operation import events
-from service.store.packing import intrinsics_of, pose_of_prior, trajectory_of
-from service.store.tables.cameras import PriorPoseRecord
-from service.store.tables.trainings import ModelRecord, TrainingRecord
-from service.store.tracks import tracks
-from service.windows.requests import request_estimate
+from service.store import cameras, events, tracks, trainings
+from service.store.cameras import PriorPoseRecord
+from service.store.serialization import intrinsics_of, pose_of_prior, trajectory_of
+from service.store.trainings import ModelRecord, TrainingRecord
 
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
 _STEP_TRACKS = 200
 _STEP_TRACKS_NEEDED = 20
-_KEPT_AS = {
-    TrainingState.SUCCEEDED: Activity.TRAINING_SUCCEEDED,
-    TrainingState.FAILED: Activity.TRAINING_FAILED,
-    TrainingState.CANCELLED: Activity.TRAINING_CANCELLED,
-}
 _CENTRE = ("height_m", "tilt_rad", "roll_rad")  # what a training's centre may move from the prior
 
 
@@ -194,17 +187,17 @@ def camera_step_s(session: Session, camera_id: str) -> float:
 
 
 def is_wanted(session: Session, attempt: TrainingAttempt) -> bool:
-    """Whether a training is to go on: neither cancelled, deleted nor taken over."""
-    record = trainings.find(session, attempt.training_id)
-    return record is not None and record.attempt == attempt.attempt and not record.cancel_requested
+    """True while a training is to go on: neither cancelled, deleted nor taken over."""
+    record = _record_of(session, attempt)
+    return record is not None and not record.cancel_requested
 
 
 def report_progress(
     session: Session, attempt: TrainingAttempt, step: int, steps: int, loss: float, eta_s: float
 ) -> bool:
     """Write how far a training is; False tells the worker to stop."""
-    record = trainings.find(session, attempt.training_id)
-    if record is None or not is_wanted(session, attempt):
+    record = _record_of(session, attempt)
+    if record is None or record.cancel_requested:
         return False
     # Twenty events a training are enough for a progress bar.
     tells = steps > 0 and step * 20 // steps != record.step * 20 // steps
@@ -226,8 +219,8 @@ def publish_model(
 
     Does nothing where the training was cancelled, taken over or deleted meanwhile.
     """
-    record = trainings.find(session, attempt.training_id)
-    if record is None or record.attempt != attempt.attempt or record.state != TrainingState.RUNNING:
+    record = _record_of(session, attempt)
+    if record is None or record.state != TrainingState.RUNNING:
         return
     if record.cancel_requested:
         finish(session, record, TrainingState.CANCELLED)
@@ -256,13 +249,15 @@ def end_training(
     session: Session, attempt: TrainingAttempt, state: TrainingState, error: str | None = None
 ) -> None:
     """Mark this attempt as failed or cancelled; another attempt's record stays as it is."""
-    record = trainings.find(session, attempt.training_id)
-    if (
-        record is not None
-        and record.attempt == attempt.attempt
-        and record.state == TrainingState.RUNNING
-    ):
+    record = _record_of(session, attempt)
+    if record is not None and record.state == TrainingState.RUNNING:
         finish(session, record, state, error)
+
+
+def _record_of(session: Session, attempt: TrainingAttempt) -> TrainingRecord | None:
+    """The record of an attempt; None where it was deleted, or another attempt took it over."""
+    record = trainings.find(session, attempt.training_id)
+    return record if record is not None and record.attempt == attempt.attempt else None
 
 
 def _stop(session: Session, record: TrainingRecord) -> None:
@@ -280,7 +275,7 @@ def finish(
     record.finished_at = datetime.now(UTC)
     note(
         session,
-        _KEPT_AS[state],
+        Activity(f"training.{state}"),
         by=None,
         camera_id=record.camera_id,
         subject_id=record.id,

@@ -42,9 +42,9 @@ def run_deliver(context: JobContext, webhook_id: str) -> None:
     with store.read() as session:
         refresh = load_refresh(session, settings, webhook_id)
     if refresh is not None:
-        outcome = _send(context, webhook_id, refresh.message)
+        outcome = _send(context, webhook_id, refresh)
         with store.write(about) as session:
-            save_refresh(session, settings, refresh, outcome)
+            save_refresh(session, settings, webhook_id, outcome)
     with store.write(about) as session:
         end_run(session, context.queue, webhook_id)
 

@@ -10,17 +10,14 @@ from dbos._recovery import recover_pending_workflows  # private; pinned, see tak
 
 from service.job_queue import (
     DELIVER_JOB,
-    DELIVER_QUEUE,
     ESTIMATE_JOB,
-    ESTIMATE_QUEUE,
     TRAIN_JOB,
-    TRAIN_QUEUE,
     engine_config,
 )
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from service.workers.estimate import run_estimate
-from service.workers.processes.work import WorkKind
+from service.workers.processes.workers import WorkKind
 from service.workers.train import run_training
 
 log = logging.getLogger("surefoot.worker")
@@ -36,7 +33,7 @@ _DELIVERIES_AT_ONCE = 16  # they wait for other machines most of the time
 _ENDED = ["SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"]
 
 
-_QUEUES = {WorkKind.ESTIMATE: [ESTIMATE_QUEUE, DELIVER_QUEUE], WorkKind.TRAIN: [TRAIN_QUEUE]}
+_QUEUES = {WorkKind.ESTIMATE: [ESTIMATE_JOB, DELIVER_JOB], WorkKind.TRAIN: [TRAIN_JOB]}
 
 
 def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None:
@@ -62,11 +59,8 @@ def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None
         _guarded(run_deliver, context, DELIVER_JOB, webhook_id)
 
     DBOS.launch()
-    # Rounds were schedules of the engine once, by the wall clock.
-    for schedule in DBOS.list_schedules():
-        DBOS.delete_schedule(schedule["schedule_name"])
     DBOS.register_queue(
-        TRAIN_QUEUE,
+        TRAIN_JOB,
         partition_concurrency=1,
         global_concurrency=context.settings.trainings_at_once,
         polling_interval_sec=_POLL_TRAININGS_S,
@@ -74,13 +68,13 @@ def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None
     )
     # One job a camera, the longest due first: a flooded camera has its turn like any other.
     DBOS.register_queue(
-        ESTIMATE_QUEUE,
+        ESTIMATE_JOB,
         worker_concurrency=_ESTIMATES_AT_ONCE,
         polling_interval_sec=_POLL_S,
         on_conflict="always_update",
     )
     DBOS.register_queue(
-        DELIVER_QUEUE,
+        DELIVER_JOB,
         partition_concurrency=1,
         worker_concurrency=_DELIVERIES_AT_ONCE,
         polling_interval_sec=_POLL_DELIVERIES_S,
@@ -117,7 +111,7 @@ def forget_finished() -> int:
 
 
 def stop(within_s: float) -> threading.Thread:
-    """Take no new job, and end when those in hand have ended, or after so long."""
+    """Take no new job, and end when running ones have ended, or after so long."""
     thread = threading.Thread(
         target=DBOS.destroy,
         kwargs={"workflow_completion_timeout_sec": round(within_s)},
@@ -131,7 +125,7 @@ def stop(within_s: float) -> threading.Thread:
 def _guarded(job: Any, context: JobContext, kind: str, about: str) -> None:
     """Run a job; what it did not foresee is logged, and the reconcile finds the work again."""
     try:
-        with context.in_hand.task(kind, about):
+        with context.running.job(kind, about):
             job(context, about)
     except Exception:
         log.exception("job_failed", extra={"job": job.__name__, "arguments": [about]})

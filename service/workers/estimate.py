@@ -5,6 +5,13 @@ import time
 from dataclasses import replace
 from functools import partial
 
+from service.estimate_queue import (
+    begin_look,
+    end_look,
+    fail_look,
+    leave_poisoned,
+    note_partial_failures,
+)
 from service.estimation.anchoring import (
     compute_anchor_days,
     load_anchor_days,
@@ -14,10 +21,9 @@ from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
-from service.estimation.lacks import Lacks
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
-from service.windows.looking import begin_look, end_look, fail_look, leave_poisoned, note_lacks
-from service.windows.unpacked import Unpacked
+from service.estimation.partial_failures import PartialFailures
+from service.estimation.people import Unpacked
 from service.workers.context import JobContext
 from service.workers.predictions import predict_pending
 
@@ -47,27 +53,27 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
 def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     """Look at all tracks up to one. No transaction is open while anything is computed."""
     store, settings = context.store, context.settings
-    begun_s, lacks, unpacked = time.monotonic(), Lacks(camera_id), Unpacked()
+    begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked()
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
-        lacks.add("averaged estimate", missing)
+        failures.add("averaged estimate", missing)
     learn_if_due(context, camera_id, unpacked)
-    lacks.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
+    failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
     finding = None if evidence is None else compute_finding(evidence, settings.seed)
     if finding is not None:
-        finding = replace(finding, lacks=(*lacks.said, *finding.lacks))
+        finding = replace(finding, failures=(*failures.reasons, *finding.failures))
     with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
-        said = lacks.said if finding is None else finding.lacks
-        resting = context.growth_rests.lacks_of(camera_id)
+        failed = failures.reasons if finding is None else finding.failures
+        cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(session, camera_id, newest_pk, rest_s=rest_s, lacks=(*said, *resting))
+        end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=(*failed, *cooling))
     _grow_unless_failed(context, camera_id, unpacked)
 
 
@@ -112,27 +118,25 @@ def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None
     learned = compute_growth(period, context.settings.seed)
     with context.store.write(camera_id) as session:
         grown = save_growth(session, camera_id, period, learned)
-    context.growth_turns.spend(time.monotonic() - begun_s)
+    context.growth_budget.spend(time.monotonic() - begun_s)
     if grown:
         fields = {"camera_id": camera_id, "tracks": len(period.trajectories)}
         log.info("flow_map_grown", extra=fields)
 
 
-def _others_wait(context: JobContext, camera_id: str) -> bool:
-    with context.store.read() as session:
-        return context.queue.estimates_wait(session, besides=camera_id)
-
-
 def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Let the flow map grow; where that fails it stays as it was, for an hour at least."""
-    if context.growth_rests.lacks_of(camera_id):
+    if context.growth_cooldown.failures_of(camera_id):
         return
-    if context.growth_turns.spent and _others_wait(context, camera_id):
-        return  # the next job finds it due again
-    lacks = Lacks(camera_id)
-    lacks.unless_failed("growth_of_the_flow_map", lambda: grow_if_due(context, camera_id, unpacked))
-    if lacks.said:
-        said = tuple(lacks.said)
-        context.growth_rests.begin(camera_id, said)
+    if context.growth_budget.spent:
+        with context.store.read() as session:
+            if context.queue.estimates_wait(session, besides=camera_id):
+                return  # the next job finds it due again
+    failures = PartialFailures(camera_id)
+    grow = partial(grow_if_due, context, camera_id, unpacked)
+    failures.unless_failed("growth_of_the_flow_map", grow)
+    if failures.reasons:
+        failed = tuple(failures.reasons)
+        context.growth_cooldown.begin(camera_id, failed)
         with context.store.write(camera_id) as session:
-            note_lacks(session, camera_id, said)
+            note_partial_failures(session, camera_id, failed)

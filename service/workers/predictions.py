@@ -1,11 +1,10 @@
-"""What a camera's model says of its tracks, which is shown beside the estimate."""
+"""Predictions of a camera's model for its tracks, shown beside the estimate."""
 
 import logging
 
 from models.errors import CheckpointError
-from service.training.predictions import drop_model, load_pending, save_predictions
-from service.training.weights import fetch_weights
-from service.windows.unpacked import Unpacked
+from service.estimation.people import Unpacked
+from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
 
 log = logging.getLogger("surefoot.jobs")

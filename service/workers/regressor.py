@@ -12,9 +12,9 @@ from models.regression.checkpoint import load_weights
 from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.tracks.trajectory import cut_windows
-from service.store.tracks.stored import StoredTrack
-from service.training.predictions import PendingTracks
-from service.windows.unpacked import Unpacked
+from service.estimation.people import Unpacked
+from service.store.stored_tracks import StoredTrack
+from service.training import PendingTracks
 
 _NETWORKS = 64  # kept in memory, of the cameras that were looked at last
 

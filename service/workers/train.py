@@ -7,15 +7,15 @@ from functools import partial
 
 from models.errors import CalibrationError
 from service.enums import TrainingState
-from service.training.trainings import (
+from service.training import (
     TrainingAttempt,
     begin_training,
     end_training,
     is_wanted,
     publish_model,
     report_progress,
+    share_weights,
 )
-from service.training.weights import share_weights
 from service.workers.context import JobContext
 from service.workers.training_child import Progress, Trained, TrainingDiedError, train_apart
 
@@ -104,7 +104,7 @@ def _train(context: JobContext, attempt: TrainingAttempt) -> Trained:
 
 
 def may_go_on(context: JobContext) -> bool:
-    """Whether a training is in nobody's way: an estimate that waits for a worker goes first."""
+    """True where a training is in nobody's way: an estimate that waits for a worker goes first."""
     if context.settings.trainings != "idle":
         return True
     with context.store.read() as session:

@@ -30,7 +30,7 @@ class TrainingDiedError(RuntimeError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """How far a training is."""
+    """The progress of a training."""
 
     step: int
     steps: int
@@ -40,7 +40,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trained:
-    """What a training made: a weights file, and its errors on held-out walks."""
+    """The outcome of a training: a weights file, and its errors on held-out walks."""
 
     weights_sha256: str
     metrics: dict[str, Any]

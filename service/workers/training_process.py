@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from service.logs import configure_logs
-from service.workers.processes.memory import settle_allocator
-from service.workers.processes.niceness import yield_to_others
+from service.workers.processes.resources import settle_allocator, yield_to_others
 from service.workers.training_child import REST
 
 log = logging.getLogger("surefoot.jobs")

@@ -23,7 +23,7 @@ from models.simulation.pose_offset import knock_trajectory
 from models.tracks.observations import of_tracks
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Trajectory, by_end
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from studies.alarms.results import DAYS, AlarmResults, knocks_of
 from studies.alarms.watch import first_alarm, watch_over
 from studies.protocol.cases import STILL, draw_case

@@ -98,7 +98,8 @@ def _said_of_the_clock(scene: Scene) -> Figures:
     tracks = by_end(each for each in told if each.long_enough)
     lens, pose = scene.intrinsics, scene.true_pose
     site = learn_site(observe(tracks, lens, pose), lens, pose, chart=False).speed_reference
-    unusual = site.doubt is not None and site.doubt.code == TracksCode.SPEED_UNUSUAL
+    why = site.implausible
+    unusual = why is not None and why.code == TracksCode.SPEED_UNUSUAL
     return {"walking_speed_mps": site.walking_speed_mps, "clock_doubted": float(unusual)}
 
 

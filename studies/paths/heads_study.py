@@ -75,7 +75,7 @@ def head_outcomes(case: ProtocolCase) -> Iterator[HeadOutcome]:
             error=(math.degrees(error[0]), math.degrees(error[1]), float(error[2])),
             angle_deg=angle_deg(told, case.true_pose),
             covered=tuple((np.abs(error) <= Z90 * sd).tolist()),
-            used=found.joint.verticals is not None,
+            used=found.joint.heads is not None,
         )
 
 

@@ -1,6 +1,6 @@
 """The floor and the bar of the protocol: crude joint estimators, and what a served pose must reach.
 
-Medians over 12 knocks of +-8 deg, angle and height; the table of `models/README.md` has them.
+Medians over 12 knocks of +-8 deg, angle and height.
 """
 
 from dataclasses import dataclass

@@ -129,7 +129,7 @@ def draw_case(
 ) -> ProtocolCase:
     """Part a scene's people in two and knock the camera before the second.
 
-    The protocol of "Results" in `models/README.md`. The same scene and seed give the same parts
+    The protocol of `docs/results/protocol.md`. The same scene and seed give the same parts
     and, up to the range, the same direction of the knock, however they are parted.
 
     Args:

@@ -21,7 +21,7 @@ from models.geometry.upright import tops_of_boxes
 from models.pose import count_walks, observe
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from service.commands.replay import camera_body, client_of
 from service.enums import ReferenceState
 from service.formats.degrees import degrees

@@ -14,7 +14,7 @@ from models.pose import (
     observe,
 )
 from models.tracks.observations import of_tracks
-from models.walking.reference.assumed import FEWEST_WALKERS
+from models.walking.config import FEWEST_WALKERS
 from studies.protocol.served import served_pose
 
 _DAY_S = 86_400.0

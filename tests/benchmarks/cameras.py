@@ -26,7 +26,7 @@ import psutil
 
 from models.tracks.trajectory import Trajectory
 from service.settings import Settings
-from service.store.sqlite.files import connected
+from service.store.engines.files import connected
 from tests.benchmarks.load import quantiles
 from tests.benchmarks.parts.cloned import APART_S, QUEUED, as_posted, camera_at, seed
 from tests.benchmarks.parts.http_client import Connection

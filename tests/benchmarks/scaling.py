@@ -22,7 +22,7 @@ import psutil
 
 from models.tracks.trajectory import Trajectory
 from service.settings import Settings
-from service.store.sqlite.files import connected
+from service.store.engines.files import connected
 from tests.benchmarks.parts.cloned import as_posted, camera_at, seed
 from tests.running import RunningService, free_port, wait_for
 

@@ -10,7 +10,7 @@ from PIL import Image
 from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.browser.hostile import hostile_page
 from tests.conftest import CAMERA

@@ -1,4 +1,4 @@
-"""The unit, the compose file and the operation page name what exists."""
+"""The unit, the compose file and the guides name what exists."""
 
 import re
 import shutil
@@ -15,18 +15,18 @@ from tests.conftest import ROOT
 
 UNIT = ROOT / "deploy" / "surefoot.service"
 COMPOSE = ROOT / "deploy" / "compose.yaml"
-PAGE = ROOT / "service" / "README.md"
+GUIDES = sorted((ROOT / "docs" / "guides").glob("*.md"))
+RETENTION = (ROOT / "docs" / "guides" / "backup.md").read_text().split("## Retention")[1]
 SETTINGS = {f"SUREFOOT_{name.upper()}" for name in Settings.model_fields}
 OF_CLIENTS = {"SUREFOOT_TOKEN"}  # of replay, which is no part of the service
 
 
 def test_settings_exist():
-    for path in (UNIT, COMPOSE, PAGE):
+    for path in (UNIT, COMPOSE, *GUIDES):
         assert (
             set(re.findall(r"SUREFOOT_[A-Z_]*[A-Z]", path.read_text())) <= SETTINGS | OF_CLIENTS
         ), path
-    retention = PAGE.read_text().split("## Retention")[1].split("## Running")[0]
-    named = {f"SUREFOOT{name}" for name in re.findall(r"`(?:SUREFOOT)?(_[A-Z_]+)`", retention)}
+    named = {f"SUREFOOT{name}" for name in re.findall(r"`(?:SUREFOOT)?(_[A-Z_]+)`", RETENTION)}
     assert len(named) >= 10
     assert named <= SETTINGS
     assert {name for name in SETTINGS if name.startswith("SUREFOOT_KEEP")} <= named
@@ -34,7 +34,6 @@ def test_settings_exist():
 
 def test_limits_that_are_told_are_the_defaults():
     defaults = Settings()
-    retention = PAGE.read_text().split("## Retention")[1].split("## Running")[0]
     told = (
         f"{defaults.keep_days:g} days, {defaults.keep_tracks:,}, {defaults.keep_mb:g} MiB",
         f"| {defaults.keep_estimates:,} |",
@@ -45,11 +44,11 @@ def test_limits_that_are_told_are_the_defaults():
         f"| {defaults.keep_deliveries_days:g} days |",
     )
     for words in told:
-        assert words in retention
+        assert words in RETENTION
 
 
 def test_commands_exist():
-    text = PAGE.read_text() + UNIT.read_text()
+    text = "".join(path.read_text() for path in (UNIT, *GUIDES))
     commands = set(re.findall(r"(?:`|/bin/|    )surefoot ([a-z-]+)", text))
     assert {"serve", "backup", "restore", "check", "rotate-key"} <= commands
     for command in commands:

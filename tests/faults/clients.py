@@ -11,7 +11,7 @@ import httpx
 from service.alerts import alerts
 from service.enums import AlertKind, Severity
 from service.reasons import as_said
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.faults.ledger import Ledger
 from tests.faults.stand import Stand

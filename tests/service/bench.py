@@ -16,10 +16,9 @@ from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.finding import Finding, asked_enough
 from service.job_queue import JobQueue
 from service.reasons import as_said
-from service.store import references, trainings
-from service.store.database.store import Store
-from service.store.operation import events
-from service.training.trainings import begin_training, publish_model
+from service.store import events, references, trainings
+from service.store.engines.store import Store
+from service.training import begin_training, publish_model
 from tests.conftest import track
 
 PRIOR = CameraPose(
@@ -114,7 +113,7 @@ def made_up(
         covariance=np.diag(sd**2),
         bound=np.diag(sd**2),
         raw=values + 0.01,
-        score=0.0,
+        log_likelihood=0.0,
         walkers=len(evidence.tracks),
         walking_groups=len(evidence.tracks),
         identifiable=tuple(name for name in PLANE_PARAMETERS if name not in unidentifiable),

@@ -22,19 +22,18 @@ from models.walking.reference.learning import learn_speed_reference
 from models.walking.speed_reference import SpeedReference
 from service.alerts.staleness import StaleWatch
 from service.app import create_app
+from service.estimate_queue import begin_look, end_look
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.learning import LearnedReference, load_reference_period, save_reference
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import trainings
-from service.store.database.store import Store
-from service.store.tracks import tracks
-from service.training.trainings import begin_training, end_training, publish_model
-from service.windows.looking import begin_look, end_look
+from service.store import tracks, trainings
+from service.store.engines.store import Store
+from service.training import begin_training, end_training, publish_model
 from service.workers.context import JobContext
 from service.workers.estimate import run_estimate
-from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.reconciliation import run_reconcile
 from service.workers.upkeep.retention import run_retention
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, made_up, moved
@@ -140,7 +139,7 @@ class Life:
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
                     values = {"tilt_rad": 0.1, "roll_rad": 0.0}
                     doubt = Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
-                    doubted = replace(some_site(), doubt=doubt)
+                    doubted = replace(some_site(), implausible=doubt)
                     learned = LearnedReference(site=doubted, paths=None)
                 save_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:

@@ -16,7 +16,7 @@ from models.simulation.simulated_site import Lane, SiteConfig, draw_lanes, walk_
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.trajectory import Trajectory
 from service.job_queue import JobQueue
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.estimate import run_estimate
 

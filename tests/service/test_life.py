@@ -18,8 +18,7 @@ from hypothesis.stateful import (
 )
 from prometheus_client.parser import text_string_to_metric_families as families
 
-from service.store.alerts import POSE_KINDS
-from service.store.tables.alerts import AlertRecord
+from service.store.alerts import POSE_KINDS, AlertRecord
 from tests.service.life_activity import LifeActs
 from tests.service.life_events import (
     NUMBERS,

@@ -13,7 +13,7 @@ import pytest
 from service.commands.migrate import migrate
 from service.data_dir import DATABASE
 from service.settings import Settings
-from service.store.database.store import engine_for
+from service.store.engines.store import engine_for
 from tests.stores import server as servers
 from tests.stores.server import SERVER, Server
 

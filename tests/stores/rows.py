@@ -4,7 +4,7 @@ from typing import Any
 
 from sqlalchemy import JSON, Boolean, Column, Connection, DateTime, LargeBinary, String
 
-from service.store.tables.record import Record
+from service.store.record import Record
 from tests.test_migrations import WORDS
 
 Row = dict[str, Any]

@@ -1,1 +1,1 @@
-"""Verticals: what people's heads above their feet tell of tilt and roll."""
+"""Tilt and roll by people's heads above their feet."""

@@ -1,22 +1,20 @@
-"""What heads above feet say of tilt and roll, as a Gaussian, and how it goes with a pose."""
+"""Tilt and roll by heads above feet, as a Gaussian, and its product with that of a pose."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import Uprights
+from models.tracks.head_foot import HeadFootPairs
+from models.walking import config
 from models.walking.heads.fitting import column_share, fit_angles
-from models.walking.heads.reference import VerticalReference
+from models.walking.heads.reference import HeadReference
 
-FEWEST_TRACKS = 5
-_MOST_COLUMN_SHARE = 0.5  # two standard deviations from it: tracks of a window are fewer
-_LEAST_LOG_DENSITY = -12.0  # of heads at a pose: they alone call none impossible
 _ANGLES = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerticalEstimate:
+class HeadEstimate:
     """Tilt and roll (2,) in radians with their covariance (2, 2), the offset taken off.
 
     `identifiable` says whether heads lean as verticals do there, and not as the picture's columns;
@@ -35,39 +33,41 @@ class VerticalEstimate:
         off = self.values - values
         wide = self.covariance + covariance
         squared = float(off @ np.linalg.solve(wide, off))
-        return max(-0.5 * squared, _LEAST_LOG_DENSITY) - 0.5 * float(np.linalg.slogdet(wide)[1])
+        return max(-0.5 * squared, config.LEAST_HEAD_LOG_DENSITY) - 0.5 * float(
+            np.linalg.slogdet(wide)[1]
+        )
 
 
-def vertical_estimate(
-    uprights: Uprights | None, reference: VerticalReference | None
-) -> VerticalEstimate | None:
+def head_estimate(
+    pairs: HeadFootPairs | None, reference: HeadReference | None
+) -> HeadEstimate | None:
     """Tilt and roll by the heads of tracks; None where heads are missing or were never measured.
 
     Fewer than 5 tracks with heads tell nothing.
     """
-    if uprights is None or reference is None or not reference.leaning:
+    if pairs is None or reference is None or not reference.leaning:
         return None
-    tracks = uprights.tracks.size
-    if tracks < FEWEST_TRACKS:
+    tracks = pairs.tracks.size
+    if tracks < config.HEADS_OF_WINDOW:
         return None
-    found = fit_angles(uprights, reference.at, reference.habit, reference.spread)
-    share, share_sd = column_share(uprights, found.mean, reference.spread)
+    found = fit_angles(pairs, reference.at, reference.habit, reference.components)
+    share, share_sd = column_share(pairs, found.mean, reference.components)
     share_sd = share_sd * float(np.sqrt(reference.variance_inflation))
     values = found.mean - reference.offset
     covariance = found.covariance * reference.variance_inflation + reference.offset_covariance
     # As far as heads follow columns, a move seems smaller than it was.
     shorter = max(abs(reference.column_share) - reference.column_share_sd, 0.0)
     move = shorter * (values - reference.at)
-    return VerticalEstimate(
+    return HeadEstimate(
         values=values,
         covariance=covariance + np.outer(move, move),
         column_share=share,
-        identifiable=abs(share) + 2 * share_sd < _MOST_COLUMN_SHARE,
+        identifiable=abs(share) + 2 * share_sd < config.COLUMN_SHARE_OF_WINDOW,
         tracks=int(tracks),
     )
 
 
-def joined(values: Array, covariance: Array, verticals: VerticalEstimate) -> tuple[Array, Array]:
+def joined(values: Array, covariance: Array, heads: HeadEstimate) -> tuple[Array, Array]:
     """Values (P,) with a covariance (P, P), tilt and roll first, together with what heads say.
 
     The product of both Gaussians. Where they are farther apart than their covariances say, neither
@@ -76,9 +76,9 @@ def joined(values: Array, covariance: Array, verticals: VerticalEstimate) -> tup
     Source: Birge 1932, the ratio of external to internal consistency.
     """
     known = covariance[:, :_ANGLES]
-    apart = covariance[:_ANGLES, :_ANGLES] + verticals.covariance
+    apart = covariance[:_ANGLES, :_ANGLES] + heads.covariance
     gain = known @ np.linalg.inv(apart)
-    off = verticals.values - values[:_ANGLES]
+    off = heads.values - values[:_ANGLES]
     moved = gain @ off
     together = covariance - gain @ known.T
     together = (together + together.T) / 2

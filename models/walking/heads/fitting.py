@@ -1,130 +1,175 @@
 """Tilt and roll by heads above feet, whatever they were before, and what heads are above.
 
-Gauss-Newton on tilt, roll and what is usual of leans, weights anew in every round; begun on a grid,
-since far from the truth everybody seems to be somebody else.
+How people lean is the mixed model without trends, correlation and outliers: row j of track i leans
+by y_ij = x_ij' beta + a_i + e_ij, what is usual (a detector's bias, and how people lean the way
+they walk), the person's own, and a deviation. Gauss-Newton on tilt, roll and what is usual, weights
+anew in every round; begun on a grid, since far from the truth everybody seems to be somebody else.
 """
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import Uprights
-from models.walking.heads.habits import FISHER, Normal, Spread, log_likelihood, relearned, sums_of
-from models.walking.heads.lean_angles import Leans, measure_leans
+from models.tracks.head_foot import HeadFootPairs
+from models.walking import config
+from models.walking.config import FREEDOM
+from models.walking.heads.lean_angles import LeanAngles, measure_lean_angles
+from models.walking.mixed.model import (
+    FISHER,
+    Normal,
+    VarianceComponents,
+    curvature,
+    regress,
+    reweigh,
+)
 
-_ROUNDS = 40
-_CONVERGED = 1e-6
-_LONGEST_MOVE = 0.06
-_HOLD_SD = 1.0  # of tilt and roll, in radians: of what heads leave free all is left free
-_GRID_RAD = np.radians(np.arange(-24.0, 25.0, 8.0))
-_START_TRACKS = 60
 _TILT_LIMIT = np.radians(89.0)
-UNKNOWN_HABIT_SD = np.radians([4.0, 4.0])  # of a detector's bias, and of the lean of who walks
-_SHARE_SD = 1.0  # of the share of columns before any head is seen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeanComponents:
+    """Standard deviations of leans in radians: between people, and within one."""
+
+    between_sd: float
+    within_sd: float
+
+    @property
+    def mixed(self) -> VarianceComponents:
+        """The same for the mixed model, without correlation and outliers."""
+        return VarianceComponents(
+            between_sd=self.between_sd, trend_sd=1.0, within_sd=self.within_sd, correlation=0.0,
+            outlier_share=0.0, outlier_mean=0.0, outlier_sd=1.0,
+        )  # fmt: skip
 
 
 def learn_habit(
-    uprights: Uprights, at: Array, spread: Spread, *, rounds: int
-) -> tuple[Normal, Spread]:
-    """What is usual of leans at a known tilt and roll (2,).
+    pairs: HeadFootPairs, at: Array, components: LeanComponents, *, rounds: int
+) -> tuple[Normal, LeanComponents]:
+    """The usual leans at a known tilt and roll (2,), and how they scatter.
 
-    The spread is learned anew so many times; with 0 it is taken as given.
+    The components are learned in so many rounds of EM; with 0 they are taken as given.
     """
-    leans = measure_leans(uprights, at)
+    leans = measure_lean_angles(pairs, at)
     features = _features(leans)
-    habit = Normal(mean=np.zeros(2), covariance=np.diag(UNKNOWN_HABIT_SD**2))
+    prior = Normal(mean=np.zeros(2), covariance=np.diag(config.HABIT_SD**2))
     for _ in range(rounds):
-        found = _solved(features, leans, uprights, habit, spread)
-        residual = leans.value - features @ found.mean
-        sums = sums_of(features, residual, leans.valid, uprights.owner_idx, spread)
-        spread = relearned(residual, leans.valid, uprights.owner_idx, sums)
-    return _solved(features, leans, uprights, habit, spread), spread
+        found = _regressed(features, leans, prior, components)
+        components = _em_step(leans.value - features @ found.mean, leans, components)
+    return _regressed(features, leans, prior, components), components
 
 
-def column_share(uprights: Uprights, at: Array, spread: Spread) -> tuple[float, float]:
+def column_share(
+    pairs: HeadFootPairs, at: Array, components: LeanComponents
+) -> tuple[float, float]:
     """How far heads follow the picture's columns at a tilt and roll (2,), give or take one sd.
 
     0 is where leans are the same all over the picture, 1 where heads are right above the feet in
     it. Where columns are as upright as verticals are, or as oblique everywhere, nobody can tell,
     and the standard deviation is 1.
     """
-    leans = measure_leans(uprights, at)
+    leans = measure_lean_angles(pairs, at)
     features = np.column_stack([_features(leans), leans.column])
-    prior = Normal(
-        mean=np.zeros(3), covariance=np.diag(np.append(UNKNOWN_HABIT_SD, _SHARE_SD) ** 2)
-    )
-    found = _solved(features, leans, uprights, prior, spread)
+    sd = np.append(config.HABIT_SD, config.COLUMN_SHARE_SD)
+    prior = Normal(mean=np.zeros(3), covariance=np.diag(sd**2))
+    found = _regressed(features, leans, prior, components)
     return float(found.mean[2]), float(np.sqrt(found.covariance[2, 2]))
 
 
-def fit_angles(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -> Normal:
+def fit_angles(
+    pairs: HeadFootPairs, near: Array, habit: Normal, components: LeanComponents
+) -> Normal:
     """Tilt and roll (2,) by heads, with the curvature's covariance (2, 2).
 
     Args:
-        uprights: of the tracks.
+        pairs: of the tracks.
         near: tilt and roll (2,) that the search is around, 24 deg either way.
-        habit: what is usual of leans at the site.
-        spread: of leans.
+        habit: the usual leans at the site.
+        components: of leans.
     """
-    angles = _start(uprights, near, habit, spread)
-    coefficients = habit.mean
+    angles = _start(pairs, near, habit, components)
+    coefficients, mixed = habit.mean, components.mixed
     precision = np.zeros((4, 4))
-    precision[:2, :2] = np.eye(2) / _HOLD_SD**2
+    precision[:2, :2] = np.eye(2) / config.HEAD_ANGLE_SD**2
     precision[2:, 2:] = np.linalg.inv(habit.covariance)
-    for _ in range(_ROUNDS):
-        leans = measure_leans(uprights, angles)
+    for _ in range(config.MOST_ROUNDS):
+        leans = measure_lean_angles(pairs, angles)
         features = _features(leans)
         residual = np.where(leans.valid, leans.value - features @ coefficients, 0.0)
         jacobian = np.column_stack([leans.jacobian, -features])
-        sums = sums_of(jacobian, residual, leans.valid, uprights.owner_idx, spread)
+        weights = reweigh(residual, leans, mixed)
+        sums = curvature(jacobian, residual, weights, leans.rows, mixed)
         matrix = sums.matrix + precision
         off = np.concatenate([angles - near, coefficients - habit.mean])
         move = -np.linalg.solve(matrix, sums.gradient + precision @ off)
-        move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
+        move = move * min(1.0, config.HEAD_LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
         angles = np.clip(angles + move[:2], (-_TILT_LIMIT, -np.inf), (_TILT_LIMIT, np.inf))
         coefficients = coefficients + move[2:]
-        if np.abs(move).max() < _CONVERGED:
+        if np.abs(move).max() < config.HEAD_CONVERGED:
             break
     return Normal(mean=angles, covariance=np.asarray(FISHER * np.linalg.inv(matrix)[:2, :2]))
 
 
-def _start(uprights: Uprights, near: Array, habit: Normal, spread: Spread) -> Array:
+def _start(pairs: HeadFootPairs, near: Array, habit: Normal, components: LeanComponents) -> Array:
     """The tilt and roll (2,) of a grid of which a few tracks are the likeliest."""
-    tracks = uprights.tracks
-    chosen = np.linspace(0, tracks.size - 1, min(_START_TRACKS, tracks.size)).astype(np.int64)
-    few = uprights.of_tracks(tracks[np.unique(chosen)])
+    tracks = pairs.tracks
+    count = min(config.HEAD_START_TRACKS, tracks.size)
+    chosen = np.linspace(0, tracks.size - 1, count).astype(np.int64)
+    few = pairs.of_tracks(tracks[np.unique(chosen)])
     best, found = -np.inf, near
-    for tilt, roll in product(_GRID_RAD, _GRID_RAD):
+    for tilt, roll in product(config.HEAD_GRID_RAD, config.HEAD_GRID_RAD):
         angles = near + (tilt, roll)
         if abs(angles[0]) > _TILT_LIMIT:
             continue
-        leans = measure_leans(few, angles)
+        leans = measure_lean_angles(few, angles)
         # A foot above the horizon is no foot: as unlikely as one that lies.
         residual = np.where(leans.valid, leans.value - _features(leans) @ habit.mean, 1.0)
-        likely = log_likelihood(residual, np.ones(len(few), bool), few.owner_idx, spread)
+        likely = _log_likelihood(residual, few, components)
         if likely > best:
             best, found = likely, angles
     return np.asarray(found)
 
 
-def _features(leans: Leans) -> Array:
-    """What is usual depends on these (M, 2): always, and how far somebody walks to the right."""
+def _features(leans: LeanAngles) -> Array:
+    """The features (M, 2) of usual leans: always, and how far somebody walks to the right."""
     return np.column_stack([np.ones(len(leans.value)), leans.sideways]) * leans.valid[:, None]
 
 
-def _solved(
-    features: Array, leans: Leans, uprights: Uprights, prior: Normal, spread: Spread
+def _regressed(
+    features: Array, leans: LeanAngles, prior: Normal, components: LeanComponents
 ) -> Normal:
     """The coefficients (P,) of features (M, P) that explain leans."""
-    precision = np.linalg.inv(prior.covariance)
-    mean = prior.mean
-    for _ in range(_ROUNDS):
-        residual = leans.value - features @ mean
-        sums = sums_of(-features, residual, leans.valid, uprights.owner_idx, spread)
-        matrix = sums.matrix + precision
-        move = -np.linalg.solve(matrix, sums.gradient + precision @ (mean - prior.mean))
-        mean = mean + move
-        if np.abs(move).max() < _CONVERGED:
-            break
-    return Normal(mean=mean, covariance=FISHER * np.linalg.inv(matrix))
+    found, _ = regress(
+        features, leans, components.mixed, prior, prior.mean,
+        lambda move: bool(np.abs(move).max() < config.HEAD_CONVERGED),
+    )  # fmt: skip
+    return Normal(mean=found.mean, covariance=FISHER * found.covariance)
+
+
+def _em_step(residual: Array, leans: LeanAngles, components: LeanComponents) -> LeanComponents:
+    """The components that explain residuals (M,) best.
+
+    Few rows of a person tell their own lean: its variance counts, which the mixed model's own step
+    leaves out.
+    """
+    rows, mixed = leans.rows, components.mixed
+    weights = reweigh(residual, leans, mixed)
+    after = reweigh(residual, leans, mixed, config.WEIGHT_ROUNDS + 1)  # effects by these weights
+    effect, variance = after.effects[:, 0], after.effect_covariance[:, 0, 0]
+    squared = (residual - effect[rows.owner_idx]) ** 2 + variance[rows.owner_idx]
+    within = float((weights.row * squared).sum()) / max(float(leans.valid.sum()), 1.0)
+    seen = np.unique(rows.owner_idx)
+    between = float((weights.track * (effect**2 + variance))[seen].mean())
+    return LeanComponents(
+        between_sd=max(float(np.sqrt(between)), config.LEAST_LEAN_SD),
+        within_sd=max(float(np.sqrt(within)), config.LEAST_LEAN_SD),
+    )
+
+
+def _log_likelihood(residual: Array, pairs: HeadFootPairs, components: LeanComponents) -> float:
+    """About how likely residuals (M,) are, each track by the mean of its rows; for comparing."""
+    number = np.bincount(pairs.owner_idx, minlength=pairs.owners)
+    mean = np.bincount(pairs.owner_idx, residual, pairs.owners) / np.maximum(number, 1)
+    variance = components.between_sd**2 + components.within_sd**2
+    return float(-(FREEDOM + 1) / 2 * np.log1p(mean**2 / variance / FREEDOM).sum())

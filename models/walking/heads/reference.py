@@ -1,9 +1,7 @@
-"""What is usual of heads at a site, learned while its pose is known, and how they err there.
+"""The reference of heads at a site, learned while its pose is known, and how they err there.
 
 Ours: heads whose leans follow the picture's columns more than the verticals were never seen apart
-from the feet, and are not used. The offset and the variance inflation are those of the joint
-estimator's reference: the pose that the very tracks tell less the prior pose, shrunk by its own
-uncertainty; and e' S^-1 e / 2 from some of the reference's times to the others.
+from the feet, and are not used.
 """
 
 from dataclasses import dataclass, replace
@@ -11,21 +9,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import Uprights
-from models.walking.heads.fitting import column_share, fit_angles, learn_habit
-from models.walking.heads.habits import ASSUMED_SPREAD, Normal, Spread
-
-FEWEST_TRACKS = 12
-_PLAUSIBLE_OFFSET = np.radians([0.5, 0.5])
-_FOLDS = 4
-_ASSUMED_INFLATION, _ASSUMED_INFLATION_WEIGHT = 1.5, 6.0
-_LARGEST_RATIO = 9.0
-_SPREAD_ROUNDS = 12
-_MOST_COLUMN_SHARE = 0.3  # beyond doubt: more would make a knock seem smaller by as much
+from models.serialization import stored_as
+from models.tracks.head_foot import HeadFootPairs
+from models.walking import config
+from models.walking.heads.fitting import LeanComponents, column_share, fit_angles, learn_habit
+from models.walking.mixed.model import Normal
+from models.walking.mixed.variance_inflation import (
+    Tracks,
+    shrink_offset,
+    squared_ratio,
+    variance_inflation,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerticalReference:
+class HeadReference:
     """How people's heads stand over their feet at a site.
 
     `at` (2,) is the tilt and roll that it was learned at. `habit` is what is usual: the bias to the
@@ -40,7 +38,7 @@ class VerticalReference:
 
     at: Array
     habit: Normal
-    spread: Spread
+    components: LeanComponents = stored_as("spread")
     column_share: float
     column_share_sd: float
     offset: Array
@@ -52,24 +50,25 @@ class VerticalReference:
     @property
     def leaning(self) -> bool:
         """Whether heads were seen to lean as verticals do, and not as columns."""
-        return abs(self.column_share) + 2 * self.column_share_sd < _MOST_COLUMN_SHARE
+        return abs(self.column_share) + 2 * self.column_share_sd < config.COLUMN_SHARE_OF_REFERENCE
 
 
-def learn_verticals(uprights: Uprights | None, at: Array) -> VerticalReference | None:
-    """What is usual of the heads of a camera at a known tilt and roll (2,).
+def learn_heads(pairs: HeadFootPairs | None, at: Array) -> HeadReference | None:
+    """The reference of the heads of a camera at a known tilt and roll (2,).
 
     None where fewer than 12 tracks have heads. In the order of time: by parts of it comes how far
     errors are larger than they seem.
     """
-    tracks = np.empty(0) if uprights is None else uprights.tracks
-    if uprights is None or tracks.size < FEWEST_TRACKS:
+    if pairs is None or pairs.tracks.size < config.HEADS_OF_REFERENCE:
         return None
-    habit, spread = learn_habit(uprights, at, ASSUMED_SPREAD, rounds=_SPREAD_ROUNDS)
-    share, share_sd = column_share(uprights, at, spread)
-    found = VerticalReference(
+    tracks = pairs.tracks
+    guess = LeanComponents(between_sd=config.LEAN_BETWEEN_SD, within_sd=config.LEAN_WITHIN_SD)
+    habit, components = learn_habit(pairs, at, guess, rounds=config.LEAN_EM_ROUNDS)
+    share, share_sd = column_share(pairs, at, components)
+    found = HeadReference(
         at=at,
         habit=habit,
-        spread=spread,
+        components=components,
         column_share=share,
         column_share_sd=share_sd,
         offset=np.zeros(2),
@@ -80,38 +79,22 @@ def learn_verticals(uprights: Uprights | None, at: Array) -> VerticalReference |
     )
     if not found.leaning:
         return found
-    whole = fit_angles(uprights, at, habit, spread)
+    whole = fit_angles(pairs, at, habit, components)
     offset = whole.mean - at
-    inflation = _variance_inflation(uprights, at, offset, spread)
+
+    def error_ratio(train: Tracks, test: Tracks) -> float:
+        usual, _ = learn_habit(pairs.of_tracks(train), at, components, rounds=0)
+        fit = fit_angles(pairs.of_tracks(test), at, usual, components)
+        return squared_ratio(fit.mean - at - offset, fit.covariance)
+
+    inflation = variance_inflation(tracks, error_ratio, config.HEADS_INFLATION)
     noise = whole.covariance * inflation
-    plausible = np.diag(np.maximum(_PLAUSIBLE_OFFSET**2, offset**2 - np.diag(noise)))
-    kept = plausible @ np.linalg.inv(plausible + noise)
-    left = kept @ noise
+    kept, left = shrink_offset(offset, noise, config.HEADS_PLAUSIBLE_OFFSET)
     return replace(
         found,
         column_share_sd=share_sd * float(np.sqrt(inflation)),
-        offset=kept @ offset,
+        offset=kept,
         offset_covariance=(left + left.T) / 2,
         variance_inflation=inflation,
         information_of_a_track=np.linalg.inv(noise) / tracks.size,
     )
-
-
-def _variance_inflation(uprights: Uprights, at: Array, offset: Array, spread: Spread) -> float:
-    """How much larger squared errors are than predicted, from some of its times to others.
-
-    The earlier half and the later, the quarters by turns, the eighths and the sixteenths.
-    """
-    tracks = uprights.tracks
-    ratios = []
-    for fold in range(_FOLDS):
-        odd = np.arange(tracks.size) * 2 ** (fold + 1) // tracks.size % 2 == 1
-        for chosen in (odd, ~odd):
-            known, unknown = uprights.of_tracks(tracks[chosen]), uprights.of_tracks(tracks[~chosen])
-            habit, _ = learn_habit(known, at, spread, rounds=0)
-            found = fit_angles(unknown, at, habit, spread)
-            error = found.mean - at - offset
-            squared = float(error @ np.linalg.solve(found.covariance, error)) / 2
-            ratios.append(min(squared, _LARGEST_RATIO))
-    guess = _ASSUMED_INFLATION * _ASSUMED_INFLATION_WEIGHT
-    return max(1.0, (sum(ratios) + guess) / (len(ratios) + _ASSUMED_INFLATION_WEIGHT))

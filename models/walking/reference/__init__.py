@@ -1,1 +1,1 @@
-"""What is usual at a site, learned from its first tracks, and the room that it needs to be told."""
+"""How people walk at a site, learned from its first tracks."""

@@ -23,9 +23,9 @@ from service.cameras.watched import Watched
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.operation.actor import Actor, set_actor
-from service.store.sqlite.turns import Turns
+from service.store.access import Actor, set_actor
+from service.store.engines.store import Store
+from service.store.engines.turns import Turns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,7 +30,7 @@ from service.errors import (
     UnauthorizedError,
 )
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 log = logging.getLogger("surefoot.access")
 

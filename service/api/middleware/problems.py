@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from models.errors import CalibrationError
 from service.api.middleware import pages
 from service.errors import FieldError, ServiceError
-from service.store.database.failures import failure_of
+from service.store.engines.failures import failure_of
 
 log = logging.getLogger("surefoot.http")
 

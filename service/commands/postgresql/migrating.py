@@ -13,10 +13,9 @@ from service.data_dir import StartError
 from service.job_queue import migrate_engine_tables
 from service.notifications.keys import settle_key
 from service.settings import Settings
-from service.store.database.revisions import alembic_config, known_revisions, require_known
-from service.store.postgresql.backend import postgresql_engine
-from service.store.postgresql.faults import telling_of_server
-from service.store.postgresql.keys import LOCKS, lock_key
+from service.store.engines.failures import telling_of_server
+from service.store.engines.postgresql import LOCKS, lock_key, postgresql_engine
+from service.store.engines.revisions import alembic_config, known_revisions, require_known
 
 log = logging.getLogger("surefoot.migrate")
 

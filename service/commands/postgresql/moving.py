@@ -13,17 +13,17 @@ from models.regression.weights_files import weights_path
 from service.commands.postgresql.migrating import migrate_server
 from service.data_dir import DATABASE, StartError, held_alone, require_stopped
 from service.settings import Settings
-from service.store.database.revisions import known_revisions
-from service.store.postgresql import moving
-from service.store.postgresql.faults import telling_of_server
-from service.store.sqlite import files
+from service.store import moving
+from service.store.engines import files
+from service.store.engines.failures import telling_of_server
+from service.store.engines.revisions import known_revisions
 
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
-    """What is in the server's database now, checked: rows by table, and weights."""
+    """The content of the server's database, checked: rows by table, and weights."""
 
     rows: dict[str, int]
     weights: int

@@ -3,6 +3,7 @@
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
+from models.durations import HOUR_S
 from service.access import sessions
 from service.api.middleware.dependencies import CallerDep, StateDep, WriteDep
 from service.api.middleware.guard import COOKIE, is_proxy, refuse
@@ -40,7 +41,7 @@ def log_in(request: Request, form: FormDep, state: StateDep) -> Response:
     answer.set_cookie(
         COOKIE,
         cookie,
-        max_age=int(state.settings.session_hours * 3600),
+        max_age=int(state.settings.session_hours * HOUR_S),
         httponly=True,
         samesite="lax",
         secure=_over_https(request, state.settings),

@@ -6,6 +6,7 @@ import numpy as np
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
+from models.durations import DAY_S
 from service.api.cameras import CameraOut
 from service.api.middleware.dependencies import BodyDep, StateDep, WriteDep
 from service.api.middleware.pages import render
@@ -31,7 +32,7 @@ router = APIRouter(include_in_schema=False)
 _MOST_TRACKS, _MOST_POINTS = 80, 40  # of recorded ones, which every preview takes along
 _USUAL_RATE_HZ = 25.0
 _AN_EPOCH_S = 1e9  # recordings to try have frames and no dates
-_A_RECORDING_S = 366 * 86_400.0
+_A_RECORDING_S = 366 * DAY_S
 
 
 @router.get("/ui/register")

@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
-from service.store.operation import activity
+from service.store import activity
 
 _MOST = 40
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from models.geometry.misplacement import Misplacement, misplacements
 from models.tracks.trajectory import Trajectory
 from service.alerts.alerts import list_alerts
-from service.alerts.presence import Silence, silence_of
+from service.alerts.data_gaps import DataGap, data_gap_of
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
@@ -17,16 +17,13 @@ from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState
 from service.pages.views.camera_activity import ActivityEntry, activity_of
 from service.settings import Settings
-from service.store import alerts, cameras, maintenance, trainings
-from service.store.alerts import AlertFilter
-from service.store.operation import events
-from service.store.packing import trajectory_of
+from service.store import alerts, cameras, events, maintenance, tracks, trainings
+from service.store.alerts import AlertFilter, AlertRecord
+from service.store.cameras import PriorPoseRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.serialization import trajectory_of
 from service.store.snapshots import SnapshotFacts
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.attendance import MaintenanceRecord
-from service.store.tables.cameras import PriorPoseRecord
-from service.store.tables.trainings import TrainingRecord
-from service.store.tracks import tracks
+from service.store.trainings import TrainingRecord
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 5, 20, 5
@@ -55,7 +52,7 @@ class CameraPage:
     now: datetime
     camera: CameraView
     pose: PoseView
-    silence: Silence | None
+    silence: DataGap | None
     newest_track_s: float | None
     tracks: tuple[Trajectory, ...]
     misplaced: tuple[Misplacement, ...]
@@ -119,7 +116,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         now=now,
         camera=camera,
         pose=pose,
-        silence=silence_of(session, settings, camera_id, now),
+        silence=data_gap_of(session, settings, camera_id, now),
         newest_track_s=tracks.newest_end_s(session, camera_id),
         tracks=tuple(trajectory_of(record) for record in shown),
         misplaced=misplaced,

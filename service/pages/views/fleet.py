@@ -12,13 +12,12 @@ from service.enums import AlertKind, PoseState, Severity, TrainingState
 from service.estimation.limits import drift_limits
 from service.notifications.outbox import is_silenced
 from service.reasons import Reasons
+from service.references import Attendance, tracks_so_far, wanted_tracks
 from service.settings import Settings
 from service.store import fleet
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.trainings import TrainingRecord
-from service.windows.attendance import Attendance
-from service.windows.references import tracks_so_far, wanted_tracks
+from service.store.alerts import AlertRecord
+from service.store.estimates import EstimateRecord
+from service.store.trainings import TrainingRecord
 
 _HISTORY = 24  # estimates of a sparkline
 # How soon a camera without an alert needs a person.

@@ -16,7 +16,7 @@ from service.pages.wording.moments import when
 from service.pages.wording.sentences import signed
 from service.pages.wording.words import NAMES, ago
 from service.reasons import ServiceCode
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 
 KINDS = {
     AlertKind.DRIFT: "The camera moved",

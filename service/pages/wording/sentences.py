@@ -11,9 +11,8 @@ from service.pages.views.camera_page import CameraPage
 from service.pages.wording.moments import when
 from service.pages.wording.words import NAMES, duration
 from service.reason_words import in_words
-from service.store.alerts import POSE_KINDS
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.estimates import EstimateRecord
+from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.estimates import EstimateRecord
 
 _SAYS_DEG = 0.1  # less is not worth a word
 

@@ -1,1 +1,1 @@
-"""How our processes behave, start, live and end."""
+"""The start, life and end of our processes."""

@@ -1,4 +1,4 @@
-"""With what status a worker ends when it is not told to: `serve` reads it."""
+"""Exit statuses of a worker that ends by itself; `serve` reads them."""
 
 REFUSED = 75  # another process works under its name: starting it again would not help
 FULL = 76  # it had grown beyond its ceiling, and ended its jobs first
@@ -14,7 +14,7 @@ WORDS = {
 
 
 def words_of(status: int) -> str:
-    """Why a process ended, by its exit status."""
+    """The words for why a process ended, by its exit status."""
     if status < 0:
         return f"ended by signal {-status}"
     return WORDS.get(status, f"ended with status {status}")

@@ -13,9 +13,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.processes import exits
-from service.workers.processes.workforce import WORKERS, note_trouble, worker_name
+from service.workers.processes.workers import WORKERS, note_trouble, worker_name
 
 log = logging.getLogger("surefoot.serve")
 
@@ -42,7 +42,7 @@ def local_workers(settings: Settings, give_up: Callable[[], None]) -> Iterator["
 
 
 def pause_s(deaths: int) -> float:
-    """How long to wait before a worker is started again that died so often in a row."""
+    """The pause before a worker is started again that died so often in a row."""
     return float(min(2.0 ** min(deaths - 1, 20), _LONGEST_PAUSE_S))
 
 
@@ -110,11 +110,11 @@ class LocalWorkers:
             stdout=subprocess.PIPE,
             env=self._settings.as_environment(),
         ) as process:
-            pulse = _Pulse(process.stdout)
+            beats = _Heartbeat(process.stdout)
             begun_s = time.monotonic()
             while process.poll() is None and not self._stopping.wait(_TICK_S):
-                limit_s = self._settings.worker_lost_s if pulse.felt else _START_S
-                if pulse.silent_s > limit_s:
+                limit_s = self._settings.worker_lost_s if beats.heard else _START_S
+                if beats.silent_s > limit_s:
                     fields = {"worker": name, "pid": process.pid, "silent_s": limit_s}
                     log.error("worker_hangs", extra=fields)
                     process.kill()
@@ -139,21 +139,21 @@ class LocalWorkers:
             log.warning("trouble_not_noted", extra={"worker": name, "why": str(error)})
 
 
-class _Pulse:
+class _Heartbeat:
     """The signs of life that a worker writes on its stdout, by the monotonic clock."""
 
     def __init__(self, pipe: IO[bytes] | None) -> None:
         assert pipe is not None
-        self.felt = False
+        self.heard = False
         self._last_s = time.monotonic()
-        threading.Thread(target=self._feel, args=(pipe,), daemon=True).start()
+        threading.Thread(target=self._listen, args=(pipe,), daemon=True).start()
 
     @property
     def silent_s(self) -> float:
-        """How long the last sign was ago."""
+        """The time since the last sign."""
         return time.monotonic() - self._last_s
 
-    def _feel(self, pipe: IO[bytes]) -> None:
+    def _listen(self, pipe: IO[bytes]) -> None:
         with contextlib.suppress(ValueError, OSError):  # closed under its hands, at the end
             for _ in pipe:
-                self.felt, self._last_s = True, time.monotonic()
+                self.heard, self._last_s = True, time.monotonic()

@@ -1,27 +1,61 @@
-"""Level-triggered upkeep: what should be under way."""
+"""Level-triggered upkeep: what the store says should be under way, is queued."""
 
-from collections.abc import Sequence
+import logging
 from datetime import UTC, datetime
+from functools import partial
 
 from sqlalchemy.orm import Session
 
 from service.alerts.alerts import end_empty_groups
-from service.alerts.presence import watch_presence
+from service.alerts.data_gaps import watch_data_gap
 from service.alerts.silence import end_silences
+from service.alerts.staleness import StaleWatch
 from service.cameras.maintenance import note_ends
 from service.cameras.sources import watch_sources
-from service.enums import TrainingState
+from service.estimate_queue import overlooked, queue_overlooked, request_estimate
 from service.job_queue import JobQueue
+from service.notifications import deliveries
+from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, references, trainings
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import predictions, tracks
-from service.training.lost_trainings import requeue_lost
-from service.training.steps import StepWatch
-from service.training.unasked import train_by_itself
-from service.windows.looking import rests
-from service.windows.references import window_of
-from service.windows.requests import request_estimate
+from service.store import cameras, predictions, references, tracks, trainings
+from service.store.cameras import CameraRecord
+from service.training import StepWatch, requeue_lost, train_if_needed
+from service.workers.context import JobContext
+
+log = logging.getLogger("surefoot.jobs")
+_CAMERAS_HZ = 10  # reconciled, of hundreds: all of them at once took a quarter of a core
+
+
+def run_sweep(context: JobContext) -> None:
+    """Queue a look at cameras that were posted to while they were looked at, or cooled down."""
+    with context.store.read() as session:
+        camera_ids = overlooked(session, context.queue)
+    if camera_ids:
+        with context.store.write("sweep/") as session:
+            queue_overlooked(session, context.queue, camera_ids)
+
+
+def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
+    """Enqueue what the store says should be under way; a lost nudge costs seconds.
+
+    Cameras have turns, ten a second: of 500 each has one in 50 s.
+    """
+    with context.store.read() as session:
+        camera_ids = cameras.ids(session)
+        webhook_ids = deliveries.awaited(session, context.settings)
+    for webhook_id in webhook_ids:
+        with context.store.write(f"webhook/{webhook_id}") as session:
+            deliveries.reconcile_webhook(session, context.queue, webhook_id)
+    most = _CAMERAS_HZ * context.settings.reconcile_s
+    for camera_id in context.reconciled.take(camera_ids, most):
+        # A transaction a camera, so that posts never wait long for the write lock; most cameras
+        # are as they should be.
+        found = context.store.write_if_needed(camera_id, partial(_reconcile, context, camera_id))
+        for reason in found:
+            log.info("reconciled", extra={"camera_id": camera_id, "reason": reason})
+    changed = context.store.write_if_needed(None, partial(_reconcile_alerts, context, stale))
+    for camera_id, change in changed.items():
+        log.warning("stale", extra={"camera_id": camera_id, "alert": change})
 
 
 def reconcile_camera(
@@ -38,46 +72,18 @@ def reconcile_camera(
     camera = cameras.find(session, camera_id)
     if camera is None:
         return []
-    found = []
-    by_themselves = settings.trainings != "off"
-    reason = _why_train(session, camera, steps or StepWatch()) if by_themselves else None
-    if reason is not None and train_by_itself(session, queue, settings, camera_id) is not None:
-        found.append(reason)
+    now = datetime.now(UTC)
+    found = [train_if_needed(session, queue, settings, camera, steps or StepWatch())]
     if requeue_lost(session, queue, camera_id):
         found.append("training without a job")
     if camera.estimate_due_at is None and _is_behind(session, settings, camera):
         request_estimate(session, queue, camera_id)
         found.append("tracks that nothing has looked at")
-    source = watch_sources(session, queue, settings, camera_id, datetime.now(UTC))
-    if source is not None:
-        found.append(source)
-    if note_ends(session, camera_id, datetime.now(UTC)):
+    found.append(watch_sources(session, queue, settings, camera_id, now))
+    if note_ends(session, camera_id, now):
         found.append("maintenance that has come to its end")
-    presence = watch_presence(session, settings, camera_id, datetime.now(UTC))
-    if presence is not None:
-        found.append(presence)
-    return found
-
-
-def overlooked(session: Session, queue: JobQueue) -> list[str]:
-    """Cameras that are due and may be looked at, without a job that waits or runs.
-
-    They were posted to while they were looked at or rested, or the engine has lost their job.
-    """
-    now = datetime.now(UTC)
-    return [
-        camera_id
-        for camera_id, rests_until in queue.due_without_job(session)
-        if not rests(rests_until, now)
-    ]
-
-
-def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
-    """Queue a look at each of some cameras; those first that have been due for longest."""
-    for camera_id in camera_ids:
-        camera = cameras.find(session, camera_id)
-        if camera is not None and camera.estimate_due_at is not None:
-            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
+    found.append(watch_data_gap(session, settings, camera_id, now))
+    return [reason for reason in found if reason is not None]
 
 
 def reconcile_alerts(session: Session) -> None:
@@ -86,13 +92,17 @@ def reconcile_alerts(session: Session) -> None:
     end_empty_groups(session)
 
 
-def camera_ids(session: Session) -> Sequence[str]:
-    """The ids of all cameras, in order."""
-    return cameras.ids(session)
+def _reconcile(context: JobContext, camera_id: str, session: Session) -> list[str]:
+    return reconcile_camera(session, context.queue, context.settings, camera_id, context.steps)
+
+
+def _reconcile_alerts(context: JobContext, stale: StaleWatch, session: Session) -> dict[str, str]:
+    reconcile_alerts(session)
+    return stale.watch(session, context.settings)
 
 
 def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bool:
-    """Whether there are tracks that no estimate job, or not the model in use, has looked at."""
+    """True where there are tracks that no estimate job, or not the model in use, has looked at."""
     newest_pk = tracks.newest_pk(session, camera.id)
     if newest_pk is None:
         return False
@@ -103,24 +113,3 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
         return False
     bounds = window_of(session, references.newest(session, camera.id), settings)
     return bool(predictions.without_prediction(session, bounds, model.id, 1))
-
-
-def _why_train(session: Session, camera: CameraRecord, steps: StepWatch) -> str | None:
-    if trainings.unfinished(session, camera.id):
-        return None
-    prior = cameras.prior_pose(session, camera.id)
-    newest = trainings.of_camera(session, camera.id, 1)
-    if (
-        newest
-        and newest[0].prior_pose_id == prior.id
-        and newest[0].state in (TrainingState.FAILED, TrainingState.CANCELLED)
-    ):
-        return None  # trying the same again needs a person, or another prior pose
-    model = trainings.newest_model(session, camera.id)
-    if model is None:
-        return "camera without a model"
-    if model.prior_pose_id != prior.id:
-        return "model older than the prior pose"
-    if not steps.fits(session, camera.id, model.step_s):
-        return "model of another sampling step than the tracks offer"
-    return None

@@ -1,42 +1,107 @@
-"""Retention: delete what is beyond the limits until nothing is, and give the space back."""
+"""Retention: delete what is beyond the limits, a bite at a time, and give the space back."""
 
 import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
-from service.store.sqlite import files
+from sqlalchemy.orm import Session
+
+from models.durations import HOUR_S
+from service.settings import Settings
+from service.store import (
+    activity,
+    alerts,
+    cameras,
+    estimates,
+    events,
+    maintenance,
+    references,
+    tracks,
+    trainings,
+    webhooks,
+)
+from service.store.engines import files
 from service.workers.context import JobContext
-from service.workers.in_hand import UPKEEP
-from service.workers.upkeep import limits, reconciliation
-from service.workers.upkeep.limits import BITE, Limit
+from service.workers.running_jobs import UPKEEP
 
 log = logging.getLogger("surefoot.jobs")
 
+BITE = 500  # rows: posts wait for the write lock no longer than these take
 _PAUSE_S = 0.02  # between bites: who waits for the write lock gets it
+_KEPT_MODELS = 2
 _PAGES_AT_ONCE = 2_000
 _PAGES_LEFT = 256  # a megabyte, which the next hour fills again
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A limit on what is kept. `bite` deletes up to `BITE` rows, oldest first; how many it was."""
+
+    name: str
+    bite: Callable[[Session], int]
 
 
 def run_retention(context: JobContext) -> None:
     """Apply all limits, delete weights that no model names, and let the file shrink."""
     settings = context.settings
     with context.store.read() as session:
-        ids = reconciliation.camera_ids(session)
+        ids = cameras.ids(session)
     for camera_id in ids:
-        for limit in limits.limits_of_camera(settings, camera_id):
+        for limit in limits_of_camera(settings, camera_id):
             _apply(context, limit, camera_id)
-    for limit in limits.limits_of_all(settings):
+    for limit in limits_of_all(settings):
         _apply(context, limit, None)
     # Under the write lock: a model that is published meanwhile waits, and its file is young.
     with context.store.write() as session:
-        for path in limits.unused_weights(session, settings.weights_dir):
+        for path in _unused_weights(session, settings.weights_dir):
             path.unlink(missing_ok=True)
     if settings.database_url is None:  # a server sees to its own disk
         _shrink(context)
 
 
+def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
+    """The limits on what is kept of a camera."""
+    before = datetime.now(UTC) - timedelta(days=settings.keep_days)
+    most_bytes = round(settings.keep_mb * 2**20)
+    rows, poses = settings.keep_tracks, settings.keep_references
+    yield Limit("tracks", lambda s: tracks.forget(s, camera_id, before, rows, BITE))
+    if most_bytes:
+        yield Limit(
+            "tracks_by_size", lambda s: tracks.forget_tracks(s, camera_id, most_bytes, BITE)
+        )
+    yield Limit("maintenance_windows", lambda s: maintenance.forget(s, camera_id, before, BITE))
+    kept = settings.keep_estimates
+    yield Limit("estimates", lambda s: estimates.forget(s, camera_id, kept, BITE))
+    yield Limit("models", lambda s: _forget_models(s, camera_id))
+    ended = settings.keep_trainings
+    yield Limit("trainings", lambda s: trainings.forget(s, camera_id, ended, BITE))
+    yield Limit("references", lambda s: references.forget(s, camera_id, poses, BITE))
+    yield Limit("prior_poses", lambda s: cameras.forget_poses(s, camera_id, poses, BITE))
+
+
+def limits_of_all(settings: Settings) -> Iterator[Limit]:
+    """The limits on what is kept of all cameras together, and of webhooks."""
+    now = datetime.now(UTC)
+    patience = now - timedelta(hours=settings.webhook_patience_h)
+    ended = now - timedelta(days=settings.keep_deliveries_days)
+    resolved = now - timedelta(days=settings.keep_alerts_days)
+    done = now - timedelta(days=settings.keep_activity_days)
+    yield Limit("events", lambda s: events.forget(s, settings.keep_events, BITE))
+    yield Limit("weights", lambda s: trainings.forget_weights(s, BITE))
+    yield Limit("alerts", lambda s: alerts.forget(s, resolved, BITE))
+    yield Limit("activity", lambda s: activity.forget(s, done, BITE))
+    yield Limit("deliveries_given_up", lambda s: webhooks.give_up(s, patience, now, BITE))
+    yield Limit("deliveries", lambda s: webhooks.forget(s, ended, BITE))
+    yield Limit("old_secrets", lambda s: webhooks.forget_old_secrets(s, now, BITE))
+
+
 def _apply(context: JobContext, limit: Limit, camera_id: str | None) -> None:
     deleted, bite = 0, BITE
     while bite >= BITE and not context.stopping.is_set():
-        with context.in_hand.task(UPKEEP, limit.name):
+        with context.running.job(UPKEEP, limit.name):
             # Of hundreds of cameras nearly all are within their limits, each hour.
             bite = context.store.write_if_needed(camera_id or "retention/", limit.bite)
         deleted += bite
@@ -57,8 +122,26 @@ def _shrink(context: JobContext) -> None:
         if free <= _PAGES_LEFT or free == left:
             break
         left = free
-        with context.in_hand.task(UPKEEP, "shrink"):
+        with context.running.job(UPKEEP, "shrink"):
             files.give_back(path, min(_PAGES_AT_ONCE, free - _PAGES_LEFT))
     files.wipe_log(path, patience_ms=200)
     if files.size(path) < before:
         log.info("shrunk", extra={"bytes": files.size(path), "from_bytes": before})
+
+
+def _forget_models(session: Session, camera_id: str) -> int:
+    superseded = trainings.superseded_models(session, camera_id, _KEPT_MODELS)
+    for model in superseded[:BITE]:
+        session.delete(model)
+    return min(len(superseded), BITE)
+
+
+def _unused_weights(session: Session, folder: Path) -> list[Path]:
+    """Weight files that no model names and that are not being written now."""
+    used = trainings.weights_in_use(session)
+    written_before_s = time.time() - HOUR_S
+    return [
+        path
+        for path in folder.glob("*")
+        if path.name.split(".")[0] not in used and path.stat().st_mtime < written_before_s
+    ]

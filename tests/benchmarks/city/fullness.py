@@ -21,9 +21,9 @@ from sqlalchemy import insert
 from service.commands.postgresql.moving import move
 from service.estimation.evidence import load_evidence
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
+from service.store.engines.store import Store
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from service.workers.upkeep import limits
 from tests.benchmarks.city.seeding import camera_id, seed_file
 from tests.conftest import track

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.sqlite.files import connected
+from service.store.engines.files import connected
 from tests.benchmarks.parts.cloned import clone
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port

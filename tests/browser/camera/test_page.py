@@ -9,7 +9,7 @@ from PIL import Image
 
 from service.access.activity import note
 from service.enums import Activity
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.browser.camera.conftest import URL
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.conftest import CAMERA

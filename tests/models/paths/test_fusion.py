@@ -66,7 +66,8 @@ def test_a_pan_alone_moves_neither_tilt_nor_roll(lanes, site, degrees):
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 0.5
     assert abs(off[2]) < 0.03
     # The fast lane's people are where, and go as, they did: seen with the heading that they have.
-    assert joint_at_heading(tracks, PRIOR, site[0], candidate_of(pose)).score > joint.score + 1
+    turned = joint_at_heading(tracks, PRIOR, site[0], candidate_of(pose))
+    assert turned.log_likelihood > joint.log_likelihood + 1
 
 
 def test_speeds_asked_at_the_prior_heading_are_the_joint_estimate(lanes, site):
@@ -74,7 +75,7 @@ def test_speeds_asked_at_the_prior_heading_are_the_joint_estimate(lanes, site):
     joint = joint_estimate(tracks, PRIOR, site[0])
     near = joint_at_heading(tracks, PRIOR, site[0], np.append(joint.values, PRIOR.heading_rad))
     np.testing.assert_allclose(near.values, joint.values, atol=1e-5)
-    assert near.score == pytest.approx(joint.score, abs=1e-3)
+    assert near.log_likelihood == pytest.approx(joint.log_likelihood, abs=1e-3)
 
 
 def test_what_contradicts_is_less_sure_by_as_much():

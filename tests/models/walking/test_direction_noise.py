@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from models.tracks.observations import Rows
 from models.walking.direction_noise import corrected_covariance, noise_information
 from models.walking.measures import Measured
-from models.walking.mixed_model import Spread, Weights
+from models.walking.mixed.model import VarianceComponents, Weights
 
-SPREAD = Spread(
+COMPONENTS = VarianceComponents(
     between_sd=0.2,
     trend_sd=0.1,
     within_sd=0.1,
@@ -48,8 +48,8 @@ def weights_of(measured, row=1.0):
         row=np.full(len(rows), row),
         track=np.ones(rows.owners),
         inlier=np.ones(len(rows)),
-        own=np.zeros((rows.owners, 2)),
-        own_covariance=np.zeros((rows.owners, 2, 2)),
+        effects=np.zeros((rows.owners, 2)),
+        effect_covariance=np.zeros((rows.owners, 2, 2)),
     )
 
 
@@ -57,27 +57,29 @@ def test_a_tracks_own_level_and_trend_take_two_of_its_rows():
     measured = measured_of([4], [[0.1, -0.2, 0.0]] * 4)
     # 4 rows of which 2 are left, of weight 1 / 0.1^2: 4 * (2 / 4) * 100 = 200.
     expected = 200 * np.array([[0.01, -0.02, 0.0], [-0.02, 0.04, 0.0], [0.0, 0.0, 0.0]])
-    assert_allclose(noise_information(measured, weights_of(measured), SPREAD), expected)
-    assert_allclose(noise_information(measured, weights_of(measured, 0.25), SPREAD), expected / 4)
+    assert_allclose(noise_information(measured, weights_of(measured), COMPONENTS), expected)
+    assert_allclose(
+        noise_information(measured, weights_of(measured, 0.25), COMPONENTS), expected / 4
+    )
 
 
 def test_tracks_of_two_steps_fake_nothing_and_others_add_up():
     short = measured_of([2, 1, 2], [[0.3, 0.3, 0.3]] * 5)
-    assert_allclose(noise_information(short, weights_of(short), SPREAD), 0)
+    assert_allclose(noise_information(short, weights_of(short), COMPONENTS), 0)
     both = measured_of([2, 4, 8], [[0.3, 0.3, 0.3]] * 2 + [[0.1, 0.0, 0.0]] * 12)
     # 100 * 0.01 * (4 * 2 / 4 + 8 * 6 / 8)
-    assert_allclose(noise_information(both, weights_of(both), SPREAD), np.diag([8.0, 0, 0]))
+    assert_allclose(noise_information(both, weights_of(both), COMPONENTS), np.diag([8.0, 0, 0]))
 
 
 def test_rows_above_the_horizon_do_not_make_a_track_longer():
     # As measured, such rows have no direction noise; they are no rows of the track either.
     measured = measured_of([4], [[0.1, 0, 0]] * 2 + [[0, 0, 0]] * 2, [True, True, False, False])
-    assert_allclose(noise_information(measured, weights_of(measured), SPREAD), 0)
+    assert_allclose(noise_information(measured, weights_of(measured), COMPONENTS), 0)
 
 
 def test_no_tracks_fake_nothing():
     none = measured_of([], np.empty((0, 3)))
-    assert_allclose(noise_information(none, weights_of(none), SPREAD), np.zeros((3, 3)))
+    assert_allclose(noise_information(none, weights_of(none), COMPONENTS), np.zeros((3, 3)))
 
 
 def test_without_noise_the_covariance_is_the_inverse():

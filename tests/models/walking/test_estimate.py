@@ -13,9 +13,11 @@ from models.geometry.pose import CameraPose
 from models.reasons import TracksCode
 from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
+from models.walking.config import PLAUSIBLE_OFFSET
 from models.walking.estimate import joint_estimate
+from models.walking.mixed.variance_inflation import shrink_offset
 from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference, shrink_offset
+from models.walking.reference.learning import learn_speed_reference
 from models.walking.serialization import reference_from_bytes, reference_to_bytes
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
@@ -62,7 +64,7 @@ def test_the_reference_knows_its_site(site):
     assert reference.walking_speed_mps == pytest.approx(1.3, abs=0.07)
     assert reference.tracks == 150
     assert 1 <= reference.pose_variance_inflation < 4
-    assert reference.doubt is None
+    assert reference.implausible is None
     assert np.abs(reference.offset[:2]).max() < math.radians(0.3)
 
 
@@ -73,11 +75,11 @@ def test_an_offset_beyond_doubt_is_taken_off_almost_whole():
         np.array([math.radians(0.1), math.radians(-6.5), 0.3]),
         np.square([math.radians(1), math.radians(1), 0.1]),
     )
-    kept, covariance = shrink_offset(offset, np.diag(noise))
+    kept, covariance = shrink_offset(offset, np.diag(noise), PLAUSIBLE_OFFSET)
     assert_allclose(np.degrees(kept[:2]), [0.05, -6.5 * 41.25 / 42.25])
     assert kept[2] == pytest.approx(0.3 * 8 / 9)
     assert_allclose(np.diag(covariance) / noise, [1 / 2, 41.25 / 42.25, 8 / 9])
-    assert_array_equal(shrink_offset(np.zeros(3), np.diag(noise))[0], 0)
+    assert_array_equal(shrink_offset(np.zeros(3), np.diag(noise), PLAUSIBLE_OFFSET)[0], 0)
 
 
 def test_times_that_differ_make_an_estimate_less_sure():
@@ -230,9 +232,9 @@ def test_no_tracks_tell_nothing(site):
 )
 def test_a_wrong_prior_pose_is_doubted(site, wrong, code, value):
     reference = learn_speed_reference(site[1], wrong, WalkConfig(), 0)
-    doubt = reference.doubt
+    doubt = reference.implausible
     assert doubt is not None
-    assert reference_from_bytes(reference_to_bytes(reference)).doubt is None  # told once
+    assert reference_from_bytes(reference_to_bytes(reference)).implausible is None  # told once
     name, expected, tolerance = value
     assert doubt.code is code
     assert doubt.values[name] == pytest.approx(expected, abs=tolerance)

@@ -10,14 +10,14 @@ from models.tracks.observations import Rows
 from models.walking.field import Field
 from models.walking.fit import Channel, Learned
 from models.walking.measures import Measured
-from models.walking.mixed_model import Spread
+from models.walking.mixed.model import VarianceComponents
 from models.walking.starts import starts
 
 CENTRE = np.array([math.radians(20), 0.0, math.log(6)])
 STEP = math.radians(4)  # of the grid
 USUAL = math.log(1.4)
 TRACKS, STEPS = 12, 5
-SPREAD = Spread(
+COMPONENTS = VarianceComponents(
     between_sd=0.1,
     trend_sd=0.05,
     within_sd=0.1,
@@ -64,7 +64,11 @@ def site(truth, valid=lambda candidate: True, tracks=TRACKS):
         prior_variance=np.ones(1),
     )
     learned = Learned(
-        field=field, mean=np.array([USUAL]), covariance=np.eye(1), spread=SPREAD, usual=USUAL
+        field=field,
+        mean=np.array([USUAL]),
+        covariance=np.eye(1),
+        components=COMPONENTS,
+        usual=USUAL,
     )
     return [Channel(measure=measure, learned=learned)]
 

@@ -12,7 +12,7 @@ from service.access.tokens import TokenSpec
 from service.api.middleware.reach import auth_on
 from service.api.middleware.scopes import NEEDS, need_of
 from service.app import create_app
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.app import create_app
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.bench import Bench, moved
 

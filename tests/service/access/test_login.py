@@ -9,8 +9,8 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.api.middleware.guard import COOKIE
 from service.app import create_app
-from service.store.database.store import Store
-from service.store.tables.access import SessionRecord
+from service.store.access import SessionRecord
+from service.store.engines.store import Store
 from tests.service.conftest import problem
 
 PAGE = {"Accept": "text/html,*/*"}

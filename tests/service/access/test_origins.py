@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from service.api.middleware.scopes import NEEDS
 from service.app import create_app
-from service.store.tables.record import Record
+from service.store.record import Record
 from tests.service.conftest import problem
 from tests.stores.databases import ask
 

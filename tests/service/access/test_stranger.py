@@ -19,7 +19,7 @@ from service.commands import tokens as token_commands
 from service.commands.replay import client_of
 from service.data_dir import StartError
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 from tests.service.access.test_access import bearer, filled, routes_of

@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 import pytest
 
 from service.store import references
-from service.training.trainings import begin_training, end_training
+from service.training import begin_training, end_training
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 

@@ -9,16 +9,21 @@ import pytest
 from pydantic import ValidationError
 from sqlalchemy import delete
 
-from service.alerts.arrival_rates import compute_rhythm, load_arrivals, rhythm_of, save_rhythm
-from service.alerts.presence import silence_of, watch_presence
+from service.alerts.arrival_models import (
+    arrival_model_of,
+    compute_arrival_model,
+    load_arrivals,
+    save_arrival_model,
+)
+from service.alerts.data_gaps import data_gap_of, watch_data_gap
 from service.reason_words import in_words
 from service.settings import Settings
 from service.store import rhythms
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
-from service.workers.upkeep.arrival_rates import run_rhythms
+from service.workers.upkeep.periodic import run_arrival_models
 from tests.conftest import track
 from tests.service.bench import PRIOR
 
@@ -58,19 +63,19 @@ class Street:
         now = datetime.fromtimestamp(at_s, UTC)
         with self.store.write() as session:
             arrivals = load_arrivals(session, "corner", now)
-            rhythm, counts = compute_rhythm(arrivals, self.settings, now)
-            save_rhythm(session, "corner", rhythm, counts, now)
+            rhythm, counts = compute_arrival_model(arrivals, self.settings, now)
+            save_arrival_model(session, "corner", rhythm, counts, now)
         return rhythm
 
     def silence(self, hours, day_s=MIDNIGHT_S):
         """What is made of the silence at an hour of a day."""
         now = datetime.fromtimestamp(day_s + hours * HOUR_S, UTC)
         with self.store.read() as session:
-            return silence_of(session, self.settings, "corner", now)
+            return data_gap_of(session, self.settings, "corner", now)
 
     def watch(self, at):
         with self.store.write() as session:
-            return watch_presence(session, self.settings, "corner", at)
+            return watch_data_gap(session, self.settings, "corner", at)
 
     def post(self, track_id, ago_s=10.0):
         body = {"tracks": [track(track_id, start_s=time.time() - ago_s)]}
@@ -193,7 +198,7 @@ def test_without_a_rhythm_the_fixed_limit_counts(street):
 def test_what_was_recorded_long_ago_and_posted_just_now_is_old_but_no_alarm(street):
     street.post("old", ago_s=40 * DAY_S)
     with street.store.read() as session:
-        found = silence_of(session, street.settings, "corner", datetime.now(UTC))
+        found = data_gap_of(session, street.settings, "corner", datetime.now(UTC))
     assert (found.no_data, found.severity) == (True, None)
     assert street.watch(datetime.now(UTC)) is None
     assert street.watch(datetime.now(UTC) + timedelta(hours=25)) == "no tracks come"
@@ -238,7 +243,7 @@ def test_counts_outlive_their_tracks(street):
     assert after.rhythm.rates[12] == pytest.approx(12)
     assert after.delay_s == pytest.approx(3.0)
     with street.store.read() as session:
-        assert rhythm_of(session, "corner") == after
+        assert arrival_model_of(session, "corner") == after
         assert len(rhythms.find(session, "corner").counts["tracks"]) == DAYS * 12
 
 
@@ -271,14 +276,14 @@ def test_hours_are_those_of_the_cameras_zone(street):
 def test_it_is_learned_hourly_in_housekeeping_and_goes_with_its_camera(street):
     street.people()
     context = JobContext(settings=street.settings, store=street.store, queue=street.bench.queue)
-    run_rhythms(context)
+    run_arrival_models(context)
     with street.store.read() as session:
         first = rhythms.find(session, "corner")
         assert first.profile is not None
         assert load_arrivals(session, "corner", first.learned_at + timedelta(minutes=49)) is None
         late = first.learned_at + timedelta(minutes=51)
         assert load_arrivals(session, "corner", late) is not None
-    run_rhythms(context)
+    run_arrival_models(context)
     with street.store.read() as session:
         assert rhythms.find(session, "corner").learned_at == first.learned_at
     street.bench.http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()

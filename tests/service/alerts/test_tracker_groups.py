@@ -9,12 +9,11 @@ from sqlalchemy.exc import IntegrityError
 
 from service.alerts.alerts import end_alert, open_alert
 from service.reasons import as_said
-from service.store import alerts, webhooks
-from service.store.database.store import Store
-from service.store.operation import events
-from service.store.tables.alerts import AlertRecord
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.tracks import TrackRecord
+from service.store import alerts, events, webhooks
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord
+from service.store.engines.store import Store
+from service.store.stored_tracks import TrackRecord
 from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem

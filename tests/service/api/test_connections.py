@@ -11,7 +11,7 @@ import uvicorn
 
 from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.app import create_app
-from service.workers.processes.listener import listen
+from service.commands.serve import listen
 from tests.running import served, wait_for
 
 

@@ -13,7 +13,7 @@ from service.api.middleware.rates import Buckets
 from service.app import create_app
 from service.commands.replay import post_tracks
 from service.errors import TooManyRequestsError
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

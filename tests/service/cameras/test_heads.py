@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_array_equal
 from sqlalchemy import select
 
-from service.store.database.store import Store
-from service.store.packing import intrinsics_of, seen_of, trajectory_of, unpack
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.tracks import TrackRecord
-from service.store.tracks import tracks
+from service.store import tracks
+from service.store.cameras import CameraRecord
+from service.store.engines.store import Store
+from service.store.serialization import intrinsics_of, seen_of, trajectory_of, unpack
+from service.store.stored_tracks import TrackRecord
 from tests.conftest import track
 from tests.service.conftest import problem
 

@@ -5,14 +5,13 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.alerts.alerts import open_alert
+from service.estimation.anchoring import LearnedPaths
 from service.estimation.growth import load_growth, save_growth
 from service.estimation.learning import load_reference_period
-from service.estimation.paths import LearnedPaths
 from service.reasons import as_said
-from service.store import maintenance, references
-from service.store.tracks import tracks, windows
-from service.windows.references import window_of
-from service.workers.upkeep.limits import limits_of_camera
+from service.references import window_of
+from service.store import maintenance, references, tracks, windows
+from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import track
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem

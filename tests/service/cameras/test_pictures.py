@@ -6,9 +6,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select
 
 from service.app import create_app
-from service.store.database.store import Store
-from service.store.packing import unpack
-from service.store.tables.tracks import TrackRecord
+from service.store.engines.store import Store
+from service.store.serialization import unpack
+from service.store.stored_tracks import TrackRecord
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

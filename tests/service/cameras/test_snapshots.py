@@ -8,7 +8,7 @@ from PIL import Image
 
 from service.app import create_app
 from service.store import snapshots
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 

@@ -4,10 +4,9 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store import references
-from service.store.tracks import sources, tracks
+from service.store import references, sources, tracks
 from service.workers.upkeep import reconciliation
-from service.workers.upkeep.limits import limits_of_camera
+from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 from tests.service.street import KNOCKED, PRIOR, Street

@@ -11,10 +11,10 @@ from sqlalchemy import select
 
 from service.app import create_app
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.packing import unpack
-from service.store.tables.tracks import TrackRecord
-from service.workers.upkeep.limits import limits_of_camera
+from service.store.engines.store import Store
+from service.store.serialization import unpack
+from service.store.stored_tracks import TrackRecord
+from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from service.store.tables.alerts import AlertRecord
+from service.store.alerts import AlertRecord
 
 
 def put_back(changed_s):

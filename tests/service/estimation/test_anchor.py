@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import select
 
-from models.monitoring.creep_log import DAY_S
+from models.durations import DAY_S
 from models.monitoring.creep_serialization import creep_log_from_bytes
 from service.estimation.anchoring import (
     compute_anchor_days,
@@ -16,7 +16,7 @@ from service.estimation.anchoring import (
 )
 from service.estimation.growth import load_growth
 from service.store import flow_maps, references
-from service.store.tables.references import AnchorRecord
+from service.store.flow_maps import AnchorRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
 

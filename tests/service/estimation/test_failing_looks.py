@@ -9,14 +9,19 @@ from sqlalchemy import text, update
 
 from models.errors import CheckpointError
 from service.alerts.staleness import StaleWatch
+from service.estimate_queue import (
+    cooldown_s,
+    overlooked,
+    queue_overlooked,
+    request_estimate,
+)
 from service.reasons import ServiceCode
 from service.store import flow_maps, references, trainings
-from service.store.tables.cameras import CameraRecord
-from service.store.tables.references import FlowMapRecord, SiteReferenceRecord
-from service.store.tables.tracks import TrackRecord
-from service.training.trainings import begin_training, publish_model
-from service.windows.looking import rest_after_s
-from service.windows.requests import request_estimate
+from service.store.cameras import CameraRecord
+from service.store.flow_maps import FlowMapRecord
+from service.store.references import SiteReferenceRecord
+from service.store.stored_tracks import TrackRecord
+from service.training import begin_training, publish_model
 from service.workers.estimate import run_estimate
 from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA
@@ -214,7 +219,7 @@ def test_tracks_that_wait_for_long_are_told_by_their_true_age_until_they_are_see
 def test_a_camera_that_workers_die_of_is_left_alone_for_a_while(newcomer):
     newcomer.keep_to_lanes(PRIOR, 30)
     spoil(newcomer, CameraRecord, estimate_tries=2, estimate_error=None, estimate_due_at=None,
-          estimate_after=datetime.now(UTC) + timedelta(seconds=rest_after_s(2)))  # fmt: skip
+          estimate_after=datetime.now(UTC) + timedelta(seconds=cooldown_s(2)))  # fmt: skip
     run_estimate(newcomer.context, "corner")  # the engine runs it again at once
     assert camera(newcomer).looked_at_pk != 90
     assert "died" in camera(newcomer).estimate_error
@@ -234,7 +239,7 @@ def test_one_job_a_camera_however_often_it_is_asked_for(newcomer):
             reconciliation.reconcile_camera(session, context.queue, context.settings, "corner")
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert reconciliation.overlooked(session, context.queue) == []
+        assert overlooked(session, context.queue) == []
 
 
 def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newcomer):
@@ -244,12 +249,12 @@ def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newco
     with context.store.write() as session:
         session.execute(text("DELETE FROM workflow_status"))
     with context.store.write() as session:
-        assert reconciliation.overlooked(session, context.queue) == ["corner"]
-        reconciliation.queue_overlooked(session, context.queue, ["corner"])
+        assert overlooked(session, context.queue) == ["corner"]
+        queue_overlooked(session, context.queue, ["corner"])
     assert camera(newcomer).estimate_due_at == due_at
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert reconciliation.overlooked(session, context.queue) == []
+        assert overlooked(session, context.queue) == []
 
 
 def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
@@ -262,10 +267,10 @@ def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
     newcomer.keep_to_lanes(PRIOR, 5)
     with context.store.read() as session:
         assert queued_cameras(session) == []
-        assert reconciliation.overlooked(session, context.queue) == []
+        assert overlooked(session, context.queue) == []
     let_rest_end(newcomer)
     with context.store.read() as session:
-        assert reconciliation.overlooked(session, context.queue) == ["corner"]
+        assert overlooked(session, context.queue) == ["corner"]
 
 
 def test_a_training_that_the_engine_lost_is_queued_again_and_at_last_fails(newcomer):

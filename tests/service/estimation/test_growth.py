@@ -11,15 +11,15 @@ import pytest
 from sqlalchemy import delete, select
 
 from models.paths.serialization import paths_from_bytes
+from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
-from service.estimation.paths import LearnedPaths
 from service.store import alerts, flow_maps, references
-from service.store.tables.estimates import EstimateRecord
-from service.store.tables.references import FlowMapRecord
-from service.store.tables.tracks import TrackRecord
+from service.store.estimates import EstimateRecord
+from service.store.flow_maps import FlowMapRecord
+from service.store.stored_tracks import TrackRecord
 from tests.conftest import CAMERA
 from tests.service.estimation.answered import put_back
 from tests.service.street import KNOCKED, PRIOR, Street
@@ -90,9 +90,7 @@ def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     assert grown.tracks == WANTED + 50  # the newest 60 are what it is to judge
     assert grown.to_s == pytest.approx(ended(known, 0, WANTED + 50)[-1])
     assert grown.data != first.data
-    assert (
-        paths_from_bytes(grown.data).bandwidths.tracks == WANTED
-    )  # kept: few more, the same hours
+    assert paths_from_bytes(grown.data).bandwidths.tracks == WANTED  # kept: the same hours
     known.look()
     assert map_of(known).learned_at == grown.learned_at
     known.keep_to_lanes(PRIOR, 20)

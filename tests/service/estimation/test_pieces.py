@@ -7,10 +7,9 @@ import pytest
 
 from models.pose import count_walks
 from models.tracks.trajectory import Trajectory
-from service.store.packing import pack
-from service.store.tables.tracks import TrackRecord
-from service.windows.people import until_so_many
-from service.windows.unpacked import Unpacked
+from service.estimation.people import Unpacked, until_so_many
+from service.store.serialization import pack
+from service.store.stored_tracks import TrackRecord
 from tests.conftest import CAMERA
 from tests.service.estimation.test_batchings import Recording, at_once, at_random
 from tests.service.street import KNOCKED, LENS, PRIOR

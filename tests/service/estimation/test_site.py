@@ -14,8 +14,8 @@ from models.walking.serialization import reference_from_bytes
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
+from service.estimation.people import Unpacked
 from service.store import references
-from service.windows.unpacked import Unpacked
 from service.workers.estimate import learn_if_due
 from tests.conftest import CAMERA, track
 from tests.service.estimation.conftest import WANTED

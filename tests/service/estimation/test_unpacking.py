@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from service.store import flow_maps, references
-from service.store.packing import unpack
+from service.store.serialization import unpack
 from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street

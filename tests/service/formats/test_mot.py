@@ -5,9 +5,9 @@ import pytest
 from sqlalchemy import select
 
 from service.formats import mot
-from service.store.database.store import Store
-from service.store.packing import unpack
-from service.store.tables.tracks import TrackRecord
+from service.store.engines.store import Store
+from service.store.serialization import unpack
+from service.store.stored_tracks import TrackRecord
 from tests.service.conftest import problem
 
 T0 = 1_700_000_000.0

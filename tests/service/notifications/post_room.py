@@ -11,7 +11,7 @@ from service.job_queue import JobQueue
 from service.notifications import deliveries
 from service.reasons import as_said
 from service.store import webhooks
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from tests.conftest import CAMERA

@@ -12,7 +12,7 @@ from service.enums import MessageType
 from service.notifications.alertmanager import alert_name, postable_alerts
 from service.notifications.outbox import alert_body
 from service.reasons import as_said
-from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.reconciliation import run_reconcile
 from tests.service.conftest import problem
 from tests.service.notifications.receiver import receiver
 

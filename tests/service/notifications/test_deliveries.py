@@ -9,7 +9,7 @@ from service.notifications.deliveries import load_attempt, save_attempt
 from service.notifications.send import post
 from service.workers import deliver
 from service.workers.deliver import run_deliver
-from service.workers.upkeep.housekeeping import run_reconcile
+from service.workers.upkeep.reconciliation import run_reconcile
 from service.workers.upkeep.retention import run_retention
 
 LOOPBACK = (ip_network("127.0.0.0/8"),)

@@ -17,7 +17,7 @@ from service.notifications.webhooks import WebhookSpec, create_webhook, rotate_s
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.stores.databases import only_sqlite
 
 SPEC = WebhookSpec(

@@ -7,7 +7,7 @@ import pytest
 
 from service.alerts import alerts
 from service.reasons import as_said
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.notifications.receiver import receiver

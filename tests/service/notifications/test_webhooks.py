@@ -10,7 +10,7 @@ from service.api.alerts_schemas import AlertOut
 from service.enums import MessageType
 from service.notifications.outbox import alert_body
 from service.reasons import as_said
-from service.store.tables.alerts import AlertRecord
+from service.store.alerts import AlertRecord
 from tests.service.conftest import problem
 from tests.service.notifications.receiver import receiver
 

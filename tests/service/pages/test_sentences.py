@@ -8,7 +8,7 @@ import pytest
 
 from service.pages.wording.moments import next_morning, when
 from service.pages.wording.sentences import angle_half_width_deg, moved_words, signed
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 

@@ -27,8 +27,8 @@ from service.operations.placing import finish_restore
 from service.operations.restoring import restore_backup
 from service.operations.writing import write_backup
 from service.store import webhooks
-from service.store.database.revisions import known_revisions
-from service.store.database.store import Store
+from service.store.engines.revisions import known_revisions
+from service.store.engines.store import Store
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
 from tests.service.notifications.test_sealing import hook

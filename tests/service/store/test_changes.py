@@ -7,8 +7,8 @@ import pytest
 from sqlalchemy import text
 
 from service.api.middleware.direct.kept import Kept
-from service.store.database.store import Store
-from service.store.sqlite.changes import Changes
+from service.store.engines.sqlite import Changes
+from service.store.engines.store import Store
 
 _WRITTEN = "INSERT OR REPLACE INTO store_probes VALUES (1, datetime('now'))"
 

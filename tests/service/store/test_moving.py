@@ -12,10 +12,10 @@ from service.app import create_app
 from service.commands.postgresql.moving import move
 from service.data_dir import StartError
 from service.settings import Settings
-from service.store.database.store import Store
-from service.store.postgresql import moving
-from service.store.tables.trainings import ModelRecord
-from service.training.trainings import begin_training
+from service.store import moving
+from service.store.engines.store import Store
+from service.store.trainings import ModelRecord
+from service.training import begin_training
 from tests.conftest import CAMERA, track
 from tests.service.bench import Bench, moved
 from tests.stores import server

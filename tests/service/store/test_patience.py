@@ -10,10 +10,10 @@ from sqlalchemy.exc import OperationalError
 
 from service.alerts.staleness import StaleWatch
 from service.job_queue import JobQueue
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.context import JobContext
-from service.workers.upkeep.housekeeping import run_reconcile
-from service.workers.upkeep.limits import limits_of_camera
+from service.workers.upkeep.reconciliation import run_reconcile
+from service.workers.upkeep.retention import limits_of_camera
 from tests.stores.databases import only_sqlite
 from tests.stores.rows import put_rows, row_of
 

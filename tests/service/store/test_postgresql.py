@@ -17,13 +17,12 @@ from service.enums import EventType
 from service.errors import OverloadedError, StoreUnavailableError
 from service.job_queue import JobQueue
 from service.setting_values import read_database_url
-from service.store import trainings
-from service.store.database.clock import now_in
-from service.store.database.failures import failure_of
-from service.store.database.store import Store
-from service.store.operation import events, workers
-from service.training.weights import fetch_weights, share_weights
-from service.workers.processes.workforce import (
+from service.store import events, trainings, workers
+from service.store.engines.dialects import now_in
+from service.store.engines.failures import failure_of
+from service.store.engines.store import Store
+from service.training import fetch_weights, share_weights
+from service.workers.processes.workers import (
     heartbeat,
     register_worker,
     take_setback,
@@ -212,7 +211,7 @@ def test_workers_are_heard_of_by_the_servers_clock(store, monkeypatch):
         assert abs((now_in(session) - begun).total_seconds()) < 5
     with monkeypatch.context() as patched, store.write() as session:
         patched.setattr(
-            "service.store.database.clock.datetime", None
+            "service.store.engines.dialects.datetime", None
         )  # this machine's says nothing
         assert heartbeat(session, "a", 1)
         assert take_setback(session) <= timedelta()

@@ -8,10 +8,10 @@ from sqlalchemy import bindparam, select, update
 from sqlalchemy.exc import IntegrityError, OperationalError
 
 from service.errors import OverloadedError
-from service.store.database.failures import failure_of
-from service.store.database.store import Store, joined
-from service.store.sqlite.prepared import Prepared
-from service.store.tables.cameras import CameraRecord
+from service.store.cameras import CameraRecord
+from service.store.engines.failures import failure_of
+from service.store.engines.prepared import Prepared
+from service.store.engines.store import Store, joined
 from tests.conftest import CAMERA
 
 _NAME = Prepared(select(CameraRecord.name).where(CameraRecord.id == bindparam("camera")).limit(1))

@@ -9,10 +9,9 @@ import pytest
 from sqlalchemy import text
 
 from service.job_queue import JobQueue
-from service.store.database.store import Store, engine_for
+from service.store.engines.store import Store, engine_for
 from service.workers.context import JobContext
-from service.workers.upkeep.limits import BITE
-from service.workers.upkeep.retention import run_retention
+from service.workers.upkeep.retention import BITE, run_retention
 from tests.running import wait_for
 from tests.stores.databases import only_sqlite
 from tests.stores.rows import put_rows, row_of

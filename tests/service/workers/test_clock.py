@@ -6,12 +6,11 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from service.store import webhooks
-from service.store.database.store import Store
-from service.store.operation import workers
-from service.windows.waiting import lies_ahead
-from service.workers.processes.workforce import register_worker
-from service.workers.upkeep.housekeeping import ClockWatch, follow_clock_since_last_run
+from service.estimate_queue import is_cooling
+from service.store import webhooks, workers
+from service.store.engines.store import Store
+from service.workers.processes.workers import register_worker
+from service.workers.upkeep.clock import ClockWatch, follow_clock_since_last_run
 from tests.running import free_port
 
 
@@ -21,7 +20,7 @@ from tests.running import free_port
 def test_a_time_further_ahead_than_any_is_of_before_the_clock_was_set(ahead_s, waits):
     now = datetime.now(UTC)
     at = None if ahead_s is None else now + timedelta(seconds=ahead_s)
-    assert lies_ahead(at, now, 600) is waits
+    assert is_cooling(at, now) is waits
 
 
 def test_what_waits_to_be_delivered_follows_the_clock(post_room):

@@ -50,9 +50,9 @@ from datetime import UTC, datetime, timedelta
 
 from dbos import DBOS
 
-from service.job_queue import ESTIMATE_JOB, ESTIMATE_QUEUE, JobQueue, engine_config
+from service.job_queue import ESTIMATE_JOB, JobQueue, engine_config
 from service.settings import Settings
-from service.store.database.store import Store
+from service.store.engines.store import Store
 
 settings = Settings()
 store = Store(settings)
@@ -70,7 +70,7 @@ def estimate(camera_id):
     turns.append(camera_id)
 
 DBOS.launch()
-DBOS.register_queue(ESTIMATE_QUEUE, worker_concurrency=1, polling_interval_sec=0.05)
+DBOS.register_queue(ESTIMATE_JOB, worker_concurrency=1, polling_interval_sec=0.05)
 while len(turns) < len(asked):
     time.sleep(0.05)
 print(", ".join(turns))

@@ -15,8 +15,8 @@ import psutil
 import pytest
 
 from service.settings import Settings
-from service.store.postgresql.keys import LOCKS, lock_key
-from service.workers.processes.workforce import worker_name
+from service.store.engines.postgresql import LOCKS, lock_key
+from service.workers.processes.workers import worker_name
 from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
 from tests.stores import server as servers

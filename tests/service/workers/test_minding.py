@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from service.workers.processes import exits
-from service.workers.processes.workforce import worker_name
+from service.workers.processes.workers import worker_name
 from tests.conftest import CAMERA, path_to_changed, track
 from tests.faults.clock import Clock
 from tests.running import RunningService, free_port, pid_exists, wait_for
@@ -63,9 +63,9 @@ def test_a_worker_that_is_stopped_cold_is_ended_and_replaced(start):
 
 HANGS = """
 import threading
-import service.windows.looking as looking
+import service.estimate_queue as queue
 
-looking.begin_look = lambda *_: threading.Event().wait()
+queue.begin_look = lambda *_: threading.Event().wait()
 """
 
 

@@ -10,7 +10,7 @@ from models.regression import recipe
 from models.regression.recipe import TrainingPlan
 from models.simulation.walkers import WalkConfig
 from service.job_queue import JobQueue
-from service.store.database.store import Store
+from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.train import may_go_on
 from service.workers.training_child import Progress, train_apart

@@ -9,22 +9,20 @@ from sqlalchemy import event
 from models.geometry.pose import CameraPose
 from service.cameras.cameras import add_prior_pose
 from service.cameras.tracks import receive_tracks
+from service.estimate_queue import begin_look, end_look, request_estimate
 from service.formats.track import Batch, Clock, Limits, read_track
-from service.store import cameras, trainings
-from service.store.database.store import Store
-from service.store.tables.cameras import CameraRecord
-from service.store.tracks import tracks, windows
-from service.store.tracks.windows import WindowBounds
-from service.training.steps import StepWatch
-from service.training.trainings import (
+from service.store import cameras, tracks, trainings, windows
+from service.store.cameras import CameraRecord
+from service.store.engines.store import Store
+from service.store.windows import WindowBounds
+from service.training import (
+    StepWatch,
     begin_training,
     cancel_training,
     end_training,
     publish_model,
     report_progress,
 )
-from service.windows.looking import begin_look, end_look
-from service.windows.requests import request_estimate
 from service.workers.upkeep import reconciliation
 from tests.conftest import track
 
@@ -109,7 +107,7 @@ def test_of_a_camera_that_needs_nothing_little_is_asked(session, queue, settings
     """Each of hundreds is asked of once a minute, by night too."""
     session.delete(trainings.unfinished(session, "corner")[0])
     put_tracks(session, 2)  # an hour ago: a silence, but not as long as the limit
-    end_look(session, "corner", tracks.newest_pk(session, "corner"), rest_s=0.0, lacks=())
+    end_look(session, "corner", tracks.newest_pk(session, "corner"), rest_s=0.0, failures=())
     session.flush()
     asked = []
     connection = session.connection()

@@ -13,7 +13,7 @@ from studies.paper.parts import PARTS
 from tests.conftest import SCENES
 
 ROOT = Path(__file__).parents[3]
-KEPT, PAGE = ROOT / "studies" / "kept" / "paper", ROOT / "models" / "PAPER.md"
+KEPT, PAGE = ROOT / "studies" / "kept" / "paper", ROOT / "docs" / "results" / "paper.md"
 SCENE = SCENES / "pets2009_s1l2_1_v001"
 needs_scenes = pytest.mark.skipif(not SCENE.exists(), reason=f"no recorded scenes in {SCENES}")
 
@@ -98,7 +98,7 @@ def test_a_pattern_that_matches_no_case_is_named(tmp_path):
 
 @pytest.mark.parametrize("name", list(PARTS))
 def test_the_page_says_what_is_kept(name):
-    """The tables of models/PAPER.md are those of the results in studies/kept/paper."""
+    """The tables of docs/results/paper.md are those of the results in studies/kept/paper."""
     _, *rows = map(json.loads, (KEPT / f"{name}.jsonl").read_text().splitlines())
     newest = {each.case: each for each in results_of(rows)}
     part = PARTS[name]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Generic, TypeVar
 
-from service.store.database.store import Watcher
+from service.store.engines.store import Watcher
 
 Value = TypeVar("Value")
 

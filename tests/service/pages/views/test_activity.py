@@ -9,9 +9,9 @@ from sqlalchemy.exc import IntegrityError
 
 from service.access.activity import note
 from service.enums import Activity
-from service.store.database.store import Store
-from service.store.tables.activity import ActivityRecord
-from service.workers.upkeep.limits import limits_of_all
+from service.store.activity import ActivityRecord
+from service.store.engines.store import Store
+from service.workers.upkeep.retention import limits_of_all
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem

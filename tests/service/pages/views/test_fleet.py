@@ -13,7 +13,7 @@ from service.pages.rows import rows_of
 from service.pages.views import fleet as use_cases
 from service.pages.wording.words import ago, duration, height_change
 from service.store import fleet as statements
-from service.store.tables.estimates import EstimateRecord
+from service.store.estimates import EstimateRecord
 from tests.service.bench import moved
 from tests.service.fleet_bench import Fleet, afternoon
 from tests.stores.databases import only_sqlite

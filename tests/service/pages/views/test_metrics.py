@@ -12,7 +12,7 @@ from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.alerts import alerts
 from service.app import create_app
-from service.workers.processes.workforce import register_worker
+from service.workers.processes.workers import register_worker
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 

@@ -12,7 +12,7 @@ from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.alerts import alerts
 from service.reasons import as_said
-from service.workers.processes.workforce import register_worker
+from service.workers.processes.workers import register_worker
 from tests.service.bench import moved
 from tests.service.pages.views.test_metrics import PROMTOOL, needs_promtool
 

@@ -2,8 +2,8 @@ import os
 import sqlite3
 
 from service.job_queue import JobQueue
-from service.store.database.store import Store
-from service.workers.processes.workforce import register_worker
+from service.store.engines.store import Store
+from service.workers.processes.workers import register_worker
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 from tests.stores.databases import ask, only_sqlite

@@ -1,0 +1,1 @@
+"""A robust linear mixed model of speeds, statures and heads, and its variance inflation."""

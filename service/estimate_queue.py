@@ -1,0 +1,144 @@
+"""The estimate queue: cameras that are due, were looked at up to a track, or cool down."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from service.job_queue import JobQueue
+from service.reasons import Reasons
+from service.store import cameras, tracks
+from service.store.cameras import CameraRecord
+
+LONGEST_COOLDOWN_S = 600.0
+_FIRST_COOLDOWN_S = 5.0
+_DIED = "the worker died while it looked at this camera"
+_LONGEST_ERROR = 500
+
+
+def request_estimate(
+    session: Session, queue: JobQueue, camera_id: str, *, watched: bool = False
+) -> None:
+    """Have a camera's tracks looked at; requests that wait already cover this one.
+
+    Before others where somebody has `watched` it, or it may have moved. One that cools down, or is
+    being looked at, is queued by the upkeep when its time has come.
+    """
+    camera = cameras.find(session, camera_id)
+    if camera is not None and camera.estimate_due_at is None:
+        now = _now()
+        camera.estimate_due_at = now
+        if not is_cooling(camera.estimate_after, now):
+            queue.enqueue_estimate(session, camera_id, now, urgent=watched or camera.urgent)
+
+
+def overlooked(session: Session, queue: JobQueue) -> list[str]:
+    """Cameras that are due and may be looked at, without a job that waits or runs.
+
+    They were posted to while they were looked at or cooled down, or the engine has lost their job.
+    """
+    now = _now()
+    return [
+        camera_id
+        for camera_id, until in queue.due_without_job(session)
+        if not is_cooling(until, now)
+    ]
+
+
+def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
+    """Queue a look at each of some cameras; those first that have been due for longest."""
+    for camera_id in camera_ids:
+        camera = cameras.find(session, camera_id)
+        if camera is not None and camera.estimate_due_at is not None:
+            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
+
+
+def is_cooling(until: datetime | None, now: datetime) -> bool:
+    """True where a camera that may be looked at from a time on is to wait for it.
+
+    A time beyond the longest cooldown was set before the clock was set back: waiting for it would
+    take as long as the clock jumped, so it counts as come.
+    """
+    longest = timedelta(seconds=LONGEST_COOLDOWN_S)
+    return until is not None and timedelta(0) < until - now <= longest
+
+
+def cooldown_s(tries: int) -> float:
+    """The cooldown of a camera after so many looks in a row that failed: 5 s to 10 min."""
+    return float(min(_FIRST_COOLDOWN_S * 2 ** min(tries - 1, 20), LONGEST_COOLDOWN_S))
+
+
+def leave_poisoned(session: Session, camera_id: str) -> bool:
+    """Leave a camera due that two workers in a row have died of, for it has yet to cool down.
+
+    The engine runs the job of a dead worker again at once, whatever it died of.
+    """
+    camera = cameras.find(session, camera_id)
+    if camera is None or camera.estimate_tries < 2 or not is_cooling(camera.estimate_after, _now()):
+        return False
+    camera.estimate_due_at = camera.estimate_due_at or _now()
+    if camera.estimate_error is None:
+        _note_failure(camera, _DIED, _now())
+    return True
+
+
+def begin_look(session: Session, camera_id: str) -> int | None:
+    """Take the mark "due" off a camera; returns the track that was stored last."""
+    camera = cameras.find(session, camera_id)
+    if camera is not None:
+        now = _now()
+        if camera.estimate_tries and camera.estimate_error is None:
+            _note_failure(camera, _DIED, now)
+        camera.estimate_due_at = None
+        camera.estimate_tries += 1
+        # Should the worker die of it, this is all that is left to know it by.
+        camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
+    return tracks.newest_pk(session, camera_id)
+
+
+def end_look(
+    session: Session,
+    camera_id: str,
+    newest_pk: int | None,
+    *,
+    rest_s: float = 0.0,
+    failures: Reasons = (),
+) -> None:
+    """Note up to which track a job has looked; the reconcile sees what came after.
+
+    The camera cools down for `rest_s`, so that others have their turn. `failures` are of what
+    stands beside the served estimate.
+    """
+    camera = cameras.find(session, camera_id)
+    if camera is not None:
+        camera.looked_at_pk = newest_pk
+        camera.estimate_tries = 0
+        camera.estimate_error = camera.estimate_failing_since = None
+        camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S))
+        camera.lacks = failures
+
+
+def note_partial_failures(session: Session, camera_id: str, failures: Reasons) -> None:
+    """Note what failed beside an estimate after that was stored."""
+    camera = cameras.find(session, camera_id)
+    if camera is not None:
+        camera.lacks = (*camera.lacks, *failures)
+
+
+def fail_look(session: Session, camera_id: str, error: str) -> None:
+    """Note that a look failed: the camera stays due, and cools down longer each time."""
+    camera = cameras.find(session, camera_id)
+    if camera is not None:
+        now = _now()
+        _note_failure(camera, error, now)
+        camera.estimate_due_at = camera.estimate_due_at or now
+        camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
+
+
+def _note_failure(camera: CameraRecord, error: str, now: datetime) -> None:
+    camera.estimate_error = error[:_LONGEST_ERROR]
+    camera.estimate_failing_since = camera.estimate_failing_since or now
+
+
+def _now() -> datetime:
+    return datetime.now(UTC)

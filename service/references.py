@@ -1,0 +1,180 @@
+"""References: when one begins, which tracks are of it or after it, and when somebody was there."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.enums import Answer, Origin
+from service.settings import Settings
+from service.store import cameras, estimates, maintenance, references, tracks
+from service.store.estimates import EstimateRecord
+from service.store.maintenance import MaintenanceRecord
+from service.store.references import SiteReferenceRecord
+from service.store.windows import WindowBounds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attendance:
+    """The times, from and to, in which somebody was or will be at a camera, by its windows.
+
+    `judged_from_s` is when the last of them ended, or will, that has begun; what the camera saw
+    before does not say how it stands after it. `announced` has when each window began, and when it
+    was last told of or changed.
+    """
+
+    spans: tuple[tuple[float, float], ...]
+    judged_from_s: float | None
+    announced: tuple[tuple[float, datetime], ...]
+
+    def announced_late(self, known_at: datetime, known_to_s: float) -> bool:
+        """True where a window was told of after a time that reaches into what was known then."""
+        return any(from_s <= known_to_s and at > known_at for from_s, at in self.announced)
+
+    def free_since_s(self, now: datetime) -> float | None:
+        """The time at which somebody last left the camera; None where nobody was there."""
+        left = [to_s for _, to_s in self.spans if to_s <= now.timestamp()]
+        return left[-1] if left else None
+
+    def under_way(self, now: datetime) -> bool:
+        """True while somebody is at the camera."""
+        return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
+
+
+def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
+    """The times in which somebody was at a camera."""
+    return attendance_by(maintenance.of_camera(session, camera_id), now)
+
+
+def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:
+    """The same by windows in the order of their beginnings; overlapping ones are one time."""
+    spans: list[tuple[float, float]] = []
+    for record in records:
+        from_s, to_s = record.from_at.timestamp(), record.until.timestamp()
+        if spans and from_s <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(spans[-1][1], to_s))
+        else:
+            spans.append((from_s, to_s))
+    begun = [to_s for from_s, to_s in spans if from_s <= now.timestamp()]
+    return Attendance(
+        spans=tuple(spans),
+        judged_from_s=begun[-1] if begun else None,
+        announced=tuple((record.from_at.timestamp(), record.updated_at) for record in records),
+    )
+
+
+def begin_reference(
+    session: Session,
+    camera_id: str,
+    origin: Origin,
+    *,
+    from_s: float | None,
+    by: str | None = None,
+    source: str | None = None,
+) -> SiteReferenceRecord:
+    """Have a camera's next tracks, that start at or after a time, say what is usual at its site.
+
+    Those of a source; of the one that has counted so far, if none is said.
+    """
+    camera = cameras.find(session, camera_id)
+    assert camera is not None
+    last = references.newest_if_any(session, camera_id)
+    if source is None and last is not None:
+        source = last.source
+    record = SiteReferenceRecord(
+        camera_id=camera_id,
+        prior_pose_id=cameras.prior_pose(session, camera_id).id,
+        origin=origin,
+        source=source,
+        requested_by=by,
+        from_s=from_s,
+        wanted=camera.reference_tracks,
+        tracks=0,
+        doubts=(),
+        created_at=datetime.now(UTC),
+    )
+    session.add(record)
+    session.flush()
+    return record
+
+
+def window_of(session: Session, reference: SiteReferenceRecord, settings: Settings) -> WindowBounds:
+    """The tracks that an estimate is made of.
+
+    While a reference is being learned, those of its period; later, those that ended after it, from
+    the newest change of the camera on. Never those of a time in which somebody was at the camera,
+    nor, once there is a reference, those of before: it may stand elsewhere since.
+    """
+    attended = attendance_of(session, reference.camera_id, datetime.now(UTC))
+    return window_beside(attended, reference, settings)
+
+
+def window_beside(
+    attended: Attendance, reference: SiteReferenceRecord, settings: Settings
+) -> WindowBounds:
+    """The same, where it is known when somebody was at the camera."""
+    from_s = reference.from_s
+    if reference.ready_at is not None and attended.judged_from_s is not None:
+        from_s = max(from_s or 0.0, attended.judged_from_s)
+    return WindowBounds(
+        camera_id=reference.camera_id,
+        tracks=settings.window_tracks,
+        days=settings.window_days,
+        started_from_s=from_s,
+        ended_after_s=reference.to_s,
+        ended_from_s=reference.window_from_s,
+        without=attended.spans,
+    )
+
+
+def keep_answer(session: Session, camera_id: str, answer: Answer, by: str | None) -> None:
+    """Judge a camera by tracks that are yet to come: a person says that it is at its prior pose.
+
+    Its reference holds, if there is one. One that is being learned begins anew once the camera was
+    put back: nobody knows how it stood meanwhile. So does one in doubt.
+    """
+    reference = references.newest(session, camera_id)
+    newest_s = tracks.newest_end_s(session, camera_id)
+    if answer == Answer.PUT_BACK and (reference.ready_at is None or reference.doubts):
+        begin_reference(session, camera_id, Origin.PUT_BACK, from_s=newest_s, by=by)
+    elif reference.ready_at is not None:
+        if newest_s is not None:
+            reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None
+        reference.answer, reference.answered_by = answer, by
+        reference.answered_at = datetime.now(UTC)
+    forget_streak(session, camera_id)
+
+
+def forget_streak(session: Session, camera_id: str) -> None:
+    """Have a drift earn its updates anew: those so far were of before somebody was there."""
+    last = estimates.newest(session, camera_id)
+    if last is not None:
+        last.drift_streak, last.drifted, last.drift_since = 0, [], None
+
+
+def is_before(to_s: float, bounds: WindowBounds) -> bool:
+    """True where tracks that ended by a time are of before a window: none could be in it."""
+    return to_s < max(bounds.started_from_s or 0.0, bounds.ended_from_s or 0.0)
+
+
+def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
+    """True where an estimate was made against a reference, not while that was being learned."""
+    if reference.ready_at is None or estimate.reference_id != reference.id:
+        return False
+    if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
+        return False  # a person has answered it
+    return estimate.created_at >= reference.ready_at
+
+
+def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
+    """The number of tracks a reference is learned of: no more than are kept."""
+    return min(reference.wanted, settings.keep_tracks)
+
+
+def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: int) -> int:
+    """The number of wanted tracks that a reference has; as many as were counted while it learns."""
+    if reference.ready_at is not None:
+        return reference.tracks
+    return min(counted, wanted_tracks(reference, settings))

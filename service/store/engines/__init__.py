@@ -1,0 +1,1 @@
+"""The two databases: their sessions, and what each does in its own way."""

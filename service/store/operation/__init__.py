@@ -1,1 +1,0 @@
-"""Statements on the service itself: access, activity, events, workers, the engine's jobs."""

@@ -1,0 +1,104 @@
+"""The sources of a camera's tracks."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import (
+    Connection,
+    ForeignKey,
+    String,
+    bindparam,
+    delete,
+    func,
+    select,
+    update,
+)
+from sqlalchemy.orm import Mapped, Session, mapped_column
+
+from service.store.engines.prepared import Prepared
+from service.store.record import Record, count_where
+from service.store.stored_tracks import Spans, TrackRecord, outside
+
+
+class SourceRecord(Record):
+    """A name that tracks of a camera came under. Which one counts is the reference's to say.
+
+    `tracks` is how many have been stored, `told_at` when an alert told of it as new.
+    """
+
+    __tablename__ = "track_sources"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    name: Mapped[str] = mapped_column(String(200), primary_key=True)
+    tracks: Mapped[int]
+    first_seen_at: Mapped[datetime]
+    last_seen_at: Mapped[datetime]
+    told_at: Mapped[datetime | None]
+
+
+_SEEN = Prepared(
+    update(SourceRecord.__table__)  # type: ignore[arg-type]
+    .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("posted"))
+    .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
+)
+
+# Built once: each reconcile of a camera asks for it.
+_OF_CAMERA = (
+    select(SourceRecord)
+    .where(SourceRecord.camera_id == bindparam("camera"))
+    .order_by(SourceRecord.first_seen_at, SourceRecord.name)
+)
+
+
+def note_seen(
+    connection: Connection, camera_id: str, name: str, stored: int, now: datetime
+) -> bool:
+    """Count what a source has posted; whether it is known."""
+    said = {"camera": camera_id, "posted": name, "stored": stored, "now": now}
+    return bool(_SEEN.change(connection, said))
+
+
+def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:
+    """A source of a camera, or None."""
+    return session.get(SourceRecord, (camera_id, name))
+
+
+def of_camera(session: Session, camera_id: str) -> Sequence[SourceRecord]:
+    """The sources of a camera, the first to post first."""
+    return session.scalars(_OF_CAMERA, {"camera": camera_id}).all()
+
+
+def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:
+    """The end of the newest track of a source."""
+    return session.scalar(
+        select(func.max(TrackRecord.ended_s)).where(
+            TrackRecord.camera_id == camera_id, TrackRecord.source == name
+        )
+    )
+
+
+def count_from(
+    session: Session, camera_id: str, name: str, started_from_s: float | None, without: Spans
+) -> int:
+    """The number of tracks of a source that started from a time on and were not seen at others."""
+    conditions = [TrackRecord.camera_id == camera_id, TrackRecord.source == name, *outside(without)]
+    if started_from_s is not None:
+        conditions.append(TrackRecord.started_s >= started_from_s)
+    return count_where(session, *conditions)
+
+
+def has_tracks(session: Session, camera_id: str, name: str) -> bool:
+    """True if tracks of a source are stored."""
+    return newest_end_s(session, camera_id, name) is not None
+
+
+def forget(session: Session, record: SourceRecord) -> None:
+    """Delete a source with its tracks."""
+    session.execute(
+        delete(TrackRecord).where(
+            TrackRecord.camera_id == record.camera_id, TrackRecord.source == record.name
+        )
+    )
+    session.delete(record)

@@ -1,1 +1,0 @@
-"""The database as an SQLite file: its engine, its errors, whose turn it is, copies."""

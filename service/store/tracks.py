@@ -1,0 +1,225 @@
+"""Statements on tracks.
+
+Of a camera's tracks those count that its reference is of: one source's. Others are stored, and
+counted where a function says that it is of all.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, func, select
+from sqlalchemy.orm import Session
+
+from models.durations import DAY_S
+from service.store.cameras import CameraRecord
+from service.store.engines.dialects import new_rows
+from service.store.engines.prepared import Prepared
+from service.store.record import count_where, delete_some
+from service.store.stored_tracks import (
+    StoredTrack,
+    TrackRecord,
+    bytes_of_track,
+    counting,
+    newest_source_of,
+    of_counting_source,
+    read,
+    select_tracks,
+    started_from,
+)
+
+_ADDED = Prepared(
+    new_rows(TrackRecord.__table__),
+    [column for column in TrackRecord.__table__.columns.keys() if column != "id"],  # noqa: SIM118
+)
+# Built once: each reconcile of a camera asks for them.
+_NEWEST_END = select(func.max(TrackRecord.ended_s)).where(
+    *counting(bindparam("camera", type_=String))
+)
+_NEWEST_PK = select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == bindparam("camera"))
+_RECENT_S, _YEAR_S = 28 * DAY_S, 365.25 * DAY_S
+
+
+def add(connection: Connection, rows: Sequence[dict[str, Any]]) -> int:
+    """Insert tracks; one that is already stored stays as it is. Returns how many are new."""
+    return _ADDED.change(connection, *rows) if rows else 0
+
+
+def count(session: Session, camera_id: str) -> int:
+    """The number of stored tracks."""
+    return count_where(session, TrackRecord.camera_id == camera_id)
+
+
+def stored_bytes(session: Session, camera_id: str) -> int:
+    """The bytes of the points, boxes and heads of a camera's tracks."""
+    size = bytes_of_track()
+    return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
+
+
+def newest_end_s(session: Session, camera_id: str) -> float | None:
+    """The end of the newest track."""
+    return session.scalar(_NEWEST_END, {"camera": camera_id})
+
+
+def newest_received_at(session: Session, camera_id: str) -> datetime | None:
+    """The time at which a track was stored last."""
+    return session.scalar(
+        select(func.max(TrackRecord.received_at)).where(TrackRecord.camera_id == camera_id)
+    )
+
+
+def arrivals(
+    session: Session, camera_id: str, received_after: datetime
+) -> Sequence[tuple[datetime, float]]:
+    """The times at which tracks were stored and ended, of those stored after a time."""
+    rows = session.execute(
+        select(TrackRecord.received_at, TrackRecord.ended_s).where(
+            *counting(camera_id), TrackRecord.received_at > received_after
+        )
+    )
+    return [(received_at, ended_s) for received_at, ended_s in rows]
+
+
+def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
+    """The number of tracks that ended from one time to another."""
+    ended_s = TrackRecord.ended_s
+    return count_where(session, *counting(camera_id), ended_s >= from_s, ended_s <= to_s)
+
+
+def count_since(session: Session, camera_id: str, ended_after_s: float | None) -> int:
+    """The number of tracks that ended after a time; all of them, if none is given."""
+    after = [] if ended_after_s is None else [TrackRecord.ended_s > ended_after_s]
+    return count_where(session, *counting(camera_id), *after)
+
+
+def newest_source(session: Session, camera_id: str) -> str | None:
+    """The source that counts; where none does yet, that of the newest track."""
+    return session.scalar(newest_source_of(camera_id))
+
+
+def cameras_fed_by(session: Session, source: str, received_after: datetime) -> set[str]:
+    """The cameras for which a source counts, of those that got a track after a time."""
+    received = (
+        select(func.max(TrackRecord.received_at))
+        .where(TrackRecord.camera_id == CameraRecord.id)
+        .scalar_subquery()
+    )
+    return set(
+        session.scalars(
+            select(CameraRecord.id).where(
+                newest_source_of(CameraRecord.id).scalar_subquery() == source,
+                received > received_after,
+            )
+        )
+    )
+
+
+def newest_pk(session: Session, camera_id: str) -> int | None:
+    """The track that was stored last."""
+    return session.scalar(_NEWEST_PK, {"camera": camera_id})
+
+
+def count_between(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
+    """The number of tracks that started after one time and before another."""
+    started_s = TrackRecord.started_s
+    return count_where(session, *counting(camera_id), started_s > from_s, started_s < to_s)
+
+
+def a_year(session: Session, camera_id: str) -> float:
+    """The number of tracks a year, by those of the newest four weeks; of a day at the least."""
+    newest = newest_end_s(session, camera_id) or 0.0
+    count, first = session.execute(
+        select(func.count(), func.min(TrackRecord.ended_s)).where(
+            *counting(camera_id), TrackRecord.ended_s >= newest - _RECENT_S
+        )
+    ).one()
+    span_s = max(newest - (first or newest), DAY_S)
+    return max(float(count), 1.0) * _YEAR_S / span_s
+
+
+def newest(
+    session: Session, camera_id: str, limit: int, started_from_s: float | None = None
+) -> Sequence[StoredTrack]:
+    """The newest tracks, newest first; of those that started from a time on, if it is given."""
+    return read(
+        session,
+        select_tracks()
+        .where(*started_from(camera_id, started_from_s))
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(limit),
+    )
+
+
+def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:
+    """Delete what the limits on age and number say. Returns how many.
+
+    At most `limit` at once, those first that came first.
+    """
+    outlived = _outlived(camera_id, before, keep)
+    bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
+    return delete_some(session, TrackRecord.id, bite)
+
+
+def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
+    """Those of the given tracks that are still stored."""
+    return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
+
+
+def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
+    """The condition of being deleted: it came before a time, or so many have come after it.
+
+    By its arrival, not by its own times: what was recorded years ago and is posted today has been
+    acknowledged today, and stays as long as what was walked today. The source that
+    counts has a number of its own: no other can post its tracks away.
+    """
+    number = func.row_number().over(
+        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
+    )
+    numbered = (
+        select(TrackRecord.id, number.label("number"))
+        .where(TrackRecord.camera_id == camera_id)
+        .subquery()
+    )
+    surplus = select(numbered.c.id).where(numbered.c.number > keep)
+    return and_(
+        TrackRecord.camera_id == camera_id,
+        (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus),
+    )
+
+
+def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int) -> int:
+    """Delete up to `limit` tracks of a camera, the first that came, beyond so many bytes; how many.
+
+    Bytes are those of points, boxes and heads, as `stored_bytes` counts them; the source
+    that counts has as many as all others together.
+    """
+    size = bytes_of_track()
+    together = (
+        func.sum(size)
+        .over(partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc())
+        .label("together")
+    )
+    sized = select(TrackRecord.id, together).where(TrackRecord.camera_id == camera_id).subquery()
+    surplus = (
+        select(sized.c.id).where(sized.c.together > most_bytes).order_by(sized.c.id).limit(limit)
+    )
+    return delete_some(session, TrackRecord.id, surplus)
+
+
+def unseen_since(session: Session) -> dict[str, tuple[int, datetime]]:
+    """The oldest track of each camera that no estimate job has looked at, and when it came."""
+    first = (
+        select(func.min(TrackRecord.id))
+        .where(
+            TrackRecord.camera_id == CameraRecord.id,
+            TrackRecord.id > func.coalesce(CameraRecord.looked_at_pk, -1),
+        )
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    rows = session.execute(
+        select(CameraRecord.id, TrackRecord.id, TrackRecord.received_at).join(
+            TrackRecord, TrackRecord.id == first
+        )
+    )
+    return {camera_id: (pk, received_at) for camera_id, pk, received_at in rows}

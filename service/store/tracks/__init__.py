@@ -1,1 +1,0 @@
-"""Statements on tracks: which of them count, windows of them, predictions."""

@@ -1,0 +1,185 @@
+"""Statements on the tracks of a window, and of the times when a camera stood still."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, Select, and_, func, select
+from sqlalchemy.orm import Session
+
+from models.durations import DAY_S
+from service.store.engines.dialects import whole
+from service.store.record import count_where
+from service.store.stored_tracks import (
+    Spans,
+    StoredTrack,
+    TrackRecord,
+    counting,
+    outside,
+    read,
+    select_tracks,
+    started_from,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowBounds:
+    """The newest so many tracks of a camera within so many days of its newest, by their own times.
+
+    Only those count that started at or after `started_from_s`, ended after `ended_after_s` and at
+    or after `ended_from_s`; None is no bound. Those do not that were seen at any time `without`.
+    """
+
+    camera_id: str
+    tracks: int
+    days: float
+    started_from_s: float | None = None
+    ended_after_s: float | None = None
+    ended_from_s: float | None = None
+    without: Spans = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StillBounds:
+    """Tracks of a camera at its prior pose: those of its reference period, and later ones.
+
+    The period is of tracks that started at or after `started_from_s` and ended by
+    `reference_to_s`. Of later ones, those count that ended before `later_before_s`, and not the
+    newest `unsure` of all its tracks, nor those that were seen at any time `without`. Of neither do
+    those that were seen while somebody `attended` to the camera.
+    """
+
+    camera_id: str
+    started_from_s: float | None
+    reference_to_s: float
+    later_before_s: float | None
+    unsure: int
+    without: Spans
+    attended: Spans = ()
+
+
+def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
+    """The tracks of a window in the order of their ends."""
+    return read(
+        session,
+        select_tracks()
+        .where(TrackRecord.id.in_(window_ids(session, bounds)))
+        .order_by(TrackRecord.ended_s, TrackRecord.id),
+    )
+
+
+def count_window(session: Session, bounds: WindowBounds) -> int:
+    """The number of tracks in a window."""
+    query = select(func.count()).select_from(window_ids(session, bounds).subquery())
+    return session.scalar(query) or 0
+
+
+def first(
+    session: Session,
+    camera_id: str,
+    started_from_s: float | None,
+    limit: int,
+    without: Spans = (),
+) -> Sequence[StoredTrack]:
+    """The first tracks by their ends that started from a time on and were not seen at others."""
+    return read(
+        session,
+        select_tracks()
+        .where(*started_from(camera_id, started_from_s), *outside(without))
+        .order_by(TrackRecord.ended_s, TrackRecord.id)
+        .limit(limit),
+    )
+
+
+def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredTrack]:
+    """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
+    return read(
+        session,
+        select_tracks()
+        .where(*_still(bounds))
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(limit),
+    )[::-1]
+
+
+def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
+    """The number of tracks of a camera at its prior pose that ended after a time."""
+    after = [] if ended_after_s is None else [TrackRecord.ended_s > ended_after_s]
+    return count_where(session, *_still(bounds), *after)
+
+
+def _still(bounds: StillBounds) -> list[ColumnElement[bool]]:
+    newest = (
+        select(TrackRecord.id)
+        .where(*counting(bounds.camera_id))
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(bounds.unsure)
+    )
+    later = and_(TrackRecord.id.not_in(newest), *outside(bounds.without))
+    if bounds.later_before_s is not None:
+        later = and_(later, TrackRecord.ended_s < bounds.later_before_s)
+    return [
+        *started_from(bounds.camera_id, bounds.started_from_s),
+        *outside(bounds.attended),
+        (TrackRecord.ended_s <= bounds.reference_to_s) | later,
+    ]
+
+
+def newest_end_s(session: Session, bounds: WindowBounds) -> float | None:
+    """The end of the newest track within bounds, however many they allow; None without any."""
+    return session.scalar(select(func.max(TrackRecord.ended_s)).where(*_inside(bounds)))
+
+
+def oldest_end_s(session: Session, bounds: WindowBounds) -> float | None:
+    """The end of the oldest track of a window; None of an empty one."""
+    ids = window_ids(session, bounds)
+    return session.scalar(select(func.min(TrackRecord.ended_s)).where(TrackRecord.id.in_(ids)))
+
+
+def of_days(
+    session: Session, bounds: WindowBounds, after_s: float, to_s: float, most_a_day: int
+) -> Sequence[StoredTrack]:
+    """The tracks within bounds that ended after a time and before another, by their ends.
+
+    However many tracks and days the bounds allow; of each day no more than so many, evenly.
+    """
+    day = whole(TrackRecord.ended_s / DAY_S)
+    place = func.row_number().over(partition_by=day, order_by=(TrackRecord.ended_s, TrackRecord.id))
+    each = (
+        select(
+            TrackRecord.id.label("id"),
+            place.label("place"),
+            func.count().over(partition_by=day).label("people"),
+        )
+        .where(*_inside(bounds), TrackRecord.ended_s > after_s, TrackRecord.ended_s < to_s)
+        .subquery()
+    )
+    nth = (each.c.place * most_a_day) // each.c.people
+    before = ((each.c.place - 1) * most_a_day) // each.c.people
+    return read(
+        session,
+        select_tracks()
+        .where(TrackRecord.id.in_(select(each.c.id).where(nth > before)))
+        .order_by(TrackRecord.ended_s, TrackRecord.id),
+    )
+
+
+def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
+    """The tracks of a window, newest first."""
+    inside = _inside(bounds)
+    # The camera's own clock, not ours.
+    newest = session.scalar(select(func.max(TrackRecord.ended_s)).where(*inside)) or 0.0
+    return (
+        select(TrackRecord.id)
+        .where(*inside, TrackRecord.ended_s >= newest - bounds.days * DAY_S)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(bounds.tracks)
+    )
+
+
+def _inside(bounds: WindowBounds) -> list[ColumnElement[bool]]:
+    inside = [*started_from(bounds.camera_id, bounds.started_from_s), *outside(bounds.without)]
+    if bounds.ended_after_s is not None:
+        inside.append(TrackRecord.ended_s > bounds.ended_after_s)
+    if bounds.ended_from_s is not None:
+        inside.append(TrackRecord.ended_s >= bounds.ended_from_s)
+    return inside

@@ -1,1 +1,0 @@
-"""Which of a camera's tracks are looked at: references, windows, and requests for an estimate."""

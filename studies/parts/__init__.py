@@ -1,0 +1,1 @@
+"""What each part of the estimator is worth: the protocol with one part off at a time."""

@@ -1,0 +1,164 @@
+"""`parts`: the protocol's figures with each part of the estimator off, and what a part costs."""
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from rich.console import Console
+
+from models.monitoring.verdict import DriftLimits
+from studies.lines_file import LinesFile
+from studies.pages import markers, write_between
+from studies.parts.catalogue import PARTS
+from studies.runs import with_bar
+from studies.served.figures import Figures, figures_of
+from studies.served.outcomes import ServedOutcome
+from studies.served.replays import ReplayPlan
+from studies.served.tasks import Table, tasks_of, work
+from studies.served.windows import Window
+
+BETWEEN = markers("parts", "python -m studies parts --write")
+WHOLE = "nothing"
+_PLAN = ReplayPlan(
+    window=Window(),
+    limits=DriftLimits(
+        sigmas=5.0, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
+    ),
+    alarms_a_year=1.0,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartFigures:
+    """Figures of cases with a part off: degrees, shares; `fault` is empty where nothing is wrong.
+
+    `covered` is the share of identifiable parameters whose 90 % interval holds the truth, `beyond`
+    the cases with one more than 5 standard deviations off, `cpu_s` seconds a case.
+    """
+
+    part: str
+    fault: str
+    cases: int
+    still_deg: float
+    moved_deg: float
+    moved_p90_deg: float
+    height_error: float
+    covered: float
+    beyond: int
+    cut: float
+    cpu_s: float
+
+
+def run_parts(
+    folders: Sequence[Path],
+    *,
+    seeds: int,
+    processes: int,
+    output: Path,
+    page: Path | None,
+) -> None:
+    """Measure what the output does not have yet, print the table, write it into a page.
+
+    Raises:
+        ShapeError: a recording or the output cannot be read, or the page lacks its markers.
+    """
+    console, kept = Console(), LinesFile(output)
+    found = [PartFigures(**row) for row in kept.rows]
+    known = {(each.part, each.fault) for each in found}
+    wanted = [(part, fault) for part, fault in _wanted() if (part, fault) not in known]
+    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), max_tasks_per_child=1)
+    calls = [partial(measure, part, fault, list(folders), seeds) for part, fault in wanted]
+    with pool:
+        for figures in with_bar(pool, calls, console):
+            kept.add([asdict(figures)])
+            found.append(figures)
+    text = table_of(found)
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    if page is not None:
+        write_between(page, BETWEEN, text)
+
+
+def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartFigures:
+    """The figures of all cases with a part off, or with all of them."""
+    table = Table.FAULTS if fault else Table.TIME
+    tasks = tasks_of(
+        folders, tables=[table], seeds=range(seeds), batch=50, faults=[fault] if fault else []
+    )
+    begun_s, rows = time.process_time(), []
+    with nullcontext() if part == WHOLE else PARTS[part].switched_off():
+        for task in tasks:
+            rows += [each for each in work(task, _PLAN) if each.asked.fault == fault]
+    served = [row for row in rows if isinstance(row.outcome, ServedOutcome)]
+    outcomes = [row.outcome for row in served if isinstance(row.outcome, ServedOutcome)]
+    still = figures_of([o for r, o in zip(served, outcomes, strict=True) if _stands(r.asked.knock)])
+    moved = figures_of(
+        [o for r, o in zip(served, outcomes, strict=True) if not _stands(r.asked.knock)]
+    )
+    own = [n for outcome in outcomes for n in outcome.parameters if n.identifiable]
+    return PartFigures(
+        part=part,
+        fault=fault,
+        cases=len(outcomes),
+        still_deg=still.rotation_deg,
+        moved_deg=moved.rotation_deg,
+        moved_p90_deg=moved.rotation_p90_deg,
+        height_error=moved.height_error,
+        covered=sum(n.covered for n in own) / max(len(own), 1),
+        beyond=still.beyond + moved.beyond,
+        cut=_of_all(still, moved),
+        cpu_s=(time.process_time() - begun_s) / max(len(outcomes), 1),
+    )
+
+
+def table_of(found: Iterable[PartFigures]) -> str:
+    """The table in Markdown: all parts on, then each off, what it is there for first."""
+    by_key = {(each.part, each.fault): each for each in found}
+    head = (
+        "off", "with", "n", "still, deg", "moved, deg (worst tenth)", "height", "covered",
+        "beyond 5 sd", "cut", "CPU-s a case", "lines",
+    )  # fmt: skip
+    rows = [head, ("---",) * len(head)]
+    for part, fault in _wanted():
+        each = by_key.get((part, fault))
+        if each is not None:
+            rows.append(_row(each))
+    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in rows) + "\n"
+
+
+def _row(each: PartFigures) -> tuple[str, ...]:
+    part = PARTS.get(each.part)
+    return (
+        each.part if part is None else f"{each.part}: {part.words}",
+        each.fault or "nothing wrong",
+        str(each.cases),
+        f"{each.still_deg:.2f}",
+        f"{each.moved_deg:.2f} ({each.moved_p90_deg:.1f})",
+        f"{each.height_error:.1%}",
+        f"{each.covered:.0%}",
+        str(each.beyond),
+        f"{each.cut:.0%}",
+        f"{each.cpu_s:.2f}",
+        "" if part is None else str(part.lines),
+    )
+
+
+def _wanted() -> list[tuple[str, str]]:
+    """Every part with the faults it is there for, beside all parts with these."""
+    faults = dict.fromkeys(fault for part in PARTS.values() for fault in part.faults)
+    whole = [(WHOLE, fault) for fault in ("", *faults)]
+    return whole + [(name, fault) for name, part in PARTS.items() for fault in ("", *part.faults)]
+
+
+def _stands(knock: str) -> bool:
+    return knock == "still"
+
+
+def _of_all(still: Figures, moved: Figures) -> float:
+    cases = still.cases + moved.cases
+    return (still.cut * still.cases + moved.cut * moved.cases) / cases

@@ -1,0 +1,134 @@
+"""Compiled functions: as Python has them, kept between processes, and outdated by any source."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import models
+from models.compiled import compiled
+
+OUTER = """
+from models.compiled import compiled
+from models.inner import LIMIT, doubled
+
+@compiled
+def total(values: list) -> float:
+    found = 0.0
+    for value in values:
+        found += min(doubled(value), LIMIT)
+    return found
+"""
+INNER = """
+from models.compiled import compiled
+LIMIT = {limit}
+
+@compiled
+def doubled(value: float) -> float:
+    return {factor} * value
+"""
+ASK = """
+import numpy, sys
+import models.outer
+assert "numba" not in sys.modules
+print(models.outer.total(numpy.arange(4.0)))
+stats = models.outer.total.made().stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+print(stats.cache_path)
+"""
+
+
+@pytest.fixture
+def ask(tmp_path):
+    package = tmp_path / "models"
+    package.mkdir()
+    for name in ("__init__.py", "compiled.py"):
+        shutil.copy(Path(models.__path__[0]) / name, package)
+    (package / "outer.py").write_text(OUTER)
+
+    def ask(environment=None, first="", **numbers):
+        (package / "inner.py").write_text(INNER.format(**numbers))
+        command = [sys.executable, "-c", f"{first}\n{ASK}"]
+        told = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env=environment or {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "code")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        total, cached, place = told.stdout.splitlines()
+        ask.place = Path(place)
+        return float(total), cached
+
+    return ask
+
+
+def test_another_process_finds_the_code_unless_any_source_has_changed(ask):
+    assert ask(factor=2, limit=5) == (2 + 4 + 5, "0 1")
+    assert ask(factor=2, limit=5) == (2 + 4 + 5, "1 0")
+    assert ask(factor=3, limit=5) == (3 + 5 + 5, "0 1")
+    assert ask(factor=3, limit=7) == (3 + 6 + 7, "0 1")
+
+
+def test_no_code_is_kept_among_sources(ask, tmp_path):
+    usual = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    ask(usual, factor=2, limit=5)
+    try:
+        assert list(ask.place.glob("*.nbi"))
+        assert not ask.place.is_relative_to(tmp_path)
+        assert not list(tmp_path.rglob("*.nb?"))
+    finally:
+        shutil.rmtree(ask.place.parent)
+
+
+def test_code_of_former_sources_is_removed_beside_new_code(ask, tmp_path):
+    old, new, other = (tmp_path / "code" / name for name in ("surefoot-old", "surefoot-new", "x"))
+    for folder in (old, new, other):
+        folder.mkdir(parents=True)
+    for folder in (old, other):
+        os.utime(folder, (0, 0))
+    ask(factor=2, limit=5)
+    assert not old.exists()
+    assert new.exists()
+    assert other.exists()
+
+
+def test_where_nothing_can_be_written_each_process_compiles_for_itself(ask, tmp_path):
+    (tmp_path / "file").touch()
+    nowhere = {"HOME": "/dev/null", "NUMBA_CACHE_DIR": str(tmp_path / "file")}
+    assert (
+        ask(
+            {**os.environ, **nowhere}, "import sys; sys.prefix = sys.base_prefix", factor=2, limit=5
+        )[0]
+        == 11
+    )
+    assert not list(tmp_path.rglob("*.nb?"))
+
+
+def test_what_divides_by_nothing_goes_on_as_numpy_does():
+    @compiled
+    def ratio(first, second):
+        return first / second
+
+    assert ratio(1.0, 0.0) == np.inf
+    assert ratio.__name__ == "ratio"
+
+
+def test_what_is_not_of_this_project_is_compiled_too(tmp_path):
+    text = "from models.compiled import compiled\n\n\n@compiled\ndef twice(x):\n    return 2 * x\n"
+    (tmp_path / "elsewhere.py").write_text(f"{text}\n\nprint(twice(3.0))\n")
+    path = str(Path(models.__path__[0]).parent)
+    usual = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    told = subprocess.run(
+        [sys.executable, str(tmp_path / "elsewhere.py")],
+        env={**usual, "PYTHONPATH": path, "XDG_CACHE_HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert float(told.stdout) == 6.0

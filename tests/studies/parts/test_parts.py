@@ -1,0 +1,40 @@
+"""A part that is off is off, and comes back; what a part replaces is there."""
+
+import pytest
+
+from models.tracks import walks
+from studies.faults.catalogue import FAULTS
+from studies.parts.catalogue import PARTS
+from studies.parts.run import WHOLE, PartFigures, table_of
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_every_part_can_be_switched_off(name):
+    part = PARTS[name]
+    assert part.lines > 1
+    assert set(part.faults) <= set(FAULTS)
+    with part.switched_off():
+        pass
+
+
+def test_a_part_is_off_within_and_on_again_after():
+    before = walks.link_pieces
+    with PARTS["pieces"].switched_off():
+        assert walks.link_pieces([1, 2, 3], None, None).tolist() == [-1, -1, -1]
+    assert walks.link_pieces is before
+
+
+def test_the_table_has_a_row_for_what_was_measured():
+    figures = {
+        "cases": 10, "still_deg": 0.5, "moved_deg": 1.0, "moved_p90_deg": 3.0,
+        "height_error": 0.02, "covered": 0.9, "beyond": 1, "cut": 0.0, "cpu_s": 0.4,
+    }  # fmt: skip
+    rows = [
+        PartFigures(part=WHOLE, fault="", **figures),
+        PartFigures(part="pieces", fault="fragments", **figures),
+    ]
+    lines = table_of(rows).splitlines()
+    assert len(lines) == 4
+    assert lines[2].startswith("| nothing | nothing wrong | 10 | 0.50 | 1.00 (3.0) | 2.0% | 90%")
+    assert lines[3].startswith("| pieces: pieces of one walk are put together | fragments |")
+    assert lines[3].endswith(f"| {PARTS['pieces'].lines} |")

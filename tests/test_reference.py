@@ -1,0 +1,30 @@
+"""The pages of `docs/reference/` that a command makes are what it makes, and guides name all."""
+
+import re
+
+import pytest
+
+from service.enums import AlertKind, PoseState
+from service.settings import Settings
+from tests.conftest import ROOT
+from tests.reference import PAGES, REFERENCE
+
+
+@pytest.mark.parametrize("name", list(PAGES))
+def test_a_page_is_what_its_command_makes(name):
+    assert (REFERENCE / name).read_text() == PAGES[name](), "python -m tests.reference --write"
+
+
+def test_the_guide_says_what_each_state_and_kind_means():
+    states, kinds = (ROOT / "docs" / "guides" / "alerts.md").read_text().split("## Kinds")
+    assert set(re.findall(r"\| `(\w+)` \|", states)) == set(PoseState)
+    assert set(re.findall(r"^\| `(\w+)` \|", kinds, re.MULTILINE)) == set(AlertKind)
+
+
+def test_settings_that_pages_name_are_settings():
+    """Those in capitals, with and without the prefix."""
+    names = {name.upper() for name in Settings.model_fields}
+    others = {"REACH", "NUMBA_CACHE_DIR", "TOKEN"}
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        named = re.findall(r"`(?:SUREFOOT)?_?([A-Z][A-Z_]{2,}[A-Z])`", page.read_text())
+        assert {name for name in named if not name.startswith("TEST_")} <= names | others, page
