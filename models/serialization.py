@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar, cast, get_args, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from safetensors import SafetensorError
@@ -75,12 +75,14 @@ def stored_as(name: str) -> Any:
 
 
 def flattened(value: Any, prefix: str = "") -> dict[str, Any]:
-    """The fields of a dataclass, and of those in it by dotted names; None is left out."""
+    """The fields of a dataclass; those of dataclasses and arrays in it by dotted names, no None."""
     found: dict[str, Any] = {}
     for each in fields(value):
         part, name = getattr(value, each.name), prefix + each.metadata.get(_STORED, each.name)
         if is_dataclass(part):
             found |= flattened(part, f"{name}.")
+        elif isinstance(part, tuple) and any(isinstance(own, np.ndarray) for own in part):
+            found |= {f"{name}.{number}": own for number, own in enumerate(part)}
         elif part is not None:
             found[name] = part
     return found
@@ -109,10 +111,13 @@ def restored(kind: type[Made], values: Mapping[str, Any], **given: Any) -> Made:
         known |= {name, *(f"{name}.{key}" for key in parts)}
         if inner and (parts or inner[0] is hint):
             made[each.name] = restored(cast(type[Any], inner[0]), parts)
-        elif inner:
-            made[each.name] = None
+        elif get_origin(hint) is tuple and (parts or name in values):
+            own = values[name] if name in values else [parts[str(n)] for n in range(len(parts))]
+            made[each.name] = tuple(own)
         elif name in values:
             made[each.name] = values[name]
+        elif type(None) in get_args(hint):
+            made[each.name] = None
         else:
             raise CheckpointError(f"{kind.__name__}: {name} is missing")
     if strange := sorted(values.keys() - known):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from models.errors import CheckpointError
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import CameraSite, learn_site, observe
 from models.walking.serialization import reference_from_bytes, reference_to_bytes
 from surefoot.camera import Camera, camera_of
@@ -29,8 +29,8 @@ class Site:
         with zipfile.ZipFile(path, "w") as file:
             file.writestr(_CAMERA, self.camera.as_json())
             file.writestr(_WALKING, reference_to_bytes(self.model.speed_reference))
-            if self.model.flow is not None:
-                file.writestr(_PATHS, flow_to_bytes(self.model.flow))
+            if self.model.paths is not None:
+                file.writestr(_PATHS, paths_to_bytes(self.model.paths))
             if self.model.chart is not None:
                 file.writestr(_CHART, chart_to_bytes(self.model.chart))
 
@@ -71,7 +71,7 @@ def read_site(path: str | Path) -> Site:
         intrinsics=camera.intrinsics,
         prior=camera.prior_pose.in_radians,
         speed_reference=reference_from_bytes(parts[_WALKING]),
-        flow=None if paths is None else flow_from_bytes(paths),
+        paths=None if paths is None else paths_from_bytes(paths),
         chart=None if chart is None else chart_from_bytes(chart),
     )
     return Site(camera=camera, model=model)

@@ -91,7 +91,7 @@ def test_arrows_go_down_only(top, rooms):
 
 def test_the_pipeline_is_composed_in_one_place():
     """The service and the studies call it; a study may ask for the joint estimate alone."""
-    parts = {"fused_estimate", "learn_flow", "learn_chart", "fold_maps", "find_change"}
+    parts = {"fused_estimate", "learn_paths", "learn_chart", "fold_maps", "find_change"}
     parts |= {"moved_within", "moved_beyond_doubt", "chart_result", "by_speeds_alone"}
     alone = {"joint_estimate", "learn_speed_reference", "assumed_speed_reference", "score_groups"}
     for path in sources("service") + sources("studies"):

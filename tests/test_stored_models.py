@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import (
     WalkConfig,
     estimate_pose,
-    last_pose_from_bytes,
-    last_pose_to_bytes,
     learn_site,
     observe,
+    warm_start_from_bytes,
+    warm_start_to_bytes,
 )
 from models.tracks.trajectory import by_end
 from models.walking.reference.learning import learn_speed_reference
@@ -27,9 +27,9 @@ GOLDEN = Path(__file__).parent / "golden" / "stored_models"
 FORMATS = {
     "speed_reference": (reference_from_bytes, reference_to_bytes),
     "speed_reference_without_boxes": (reference_from_bytes, reference_to_bytes),
-    "paths": (flow_from_bytes, flow_to_bytes),
+    "paths": (paths_from_bytes, paths_to_bytes),
     "chart": (chart_from_bytes, chart_to_bytes),
-    "last_pose": (last_pose_from_bytes, last_pose_to_bytes),
+    "warm_start": (warm_start_from_bytes, warm_start_to_bytes),
 }
 
 
@@ -37,17 +37,17 @@ def made():
     """The bytes of all formats, by name, of what 60 people of a simulated site are learned as."""
     boxed, bare = (_observed(boxes=boxes) for boxes in (True, False))
     site = learn_site(boxed, LENS, PRIOR)
-    last = estimate_pose(boxed, site).last
-    assert site.flow is not None
+    last = estimate_pose(boxed, site).warm_start
+    assert site.paths is not None
     assert site.chart is not None
     assert last is not None
     without_boxes = learn_speed_reference(bare, PRIOR, WalkConfig(), 0)
     return {
         "speed_reference": reference_to_bytes(site.speed_reference),
         "speed_reference_without_boxes": reference_to_bytes(without_boxes),
-        "paths": flow_to_bytes(site.flow),
+        "paths": paths_to_bytes(site.paths),
         "chart": chart_to_bytes(site.chart),
-        "last_pose": last_pose_to_bytes(last),
+        "warm_start": warm_start_to_bytes(last),
     }
 
 
@@ -70,7 +70,7 @@ def test_what_was_stored_says_what_it_said():
     assert read["speed_reference_without_boxes"].statures is None
     assert read["paths"].people == pytest.approx(60, abs=10)
     assert read["chart"].speed_reference.tracks == read["speed_reference"].tracks
-    assert read["last_pose"].prior == PRIOR
+    assert read["warm_start"].prior == PRIOR
 
 
 if __name__ == "__main__":

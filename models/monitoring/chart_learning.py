@@ -115,9 +115,9 @@ def _fold_scores(
     observations: Observations, prior: CameraPose, site: SpeedReference, fold: Fold, wanted: int
 ) -> _FoldScores:
     """The scores of a fold's groups; of so many as are wanted, after offsets too."""
-    seen = of_tracks(observations, fold.asked)
-    speed_reference = relearned(of_tracks(observations, fold.known), prior, site)
-    usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.site)
+    seen = of_tracks(observations, fold.test_idx)
+    speed_reference = relearned(of_tracks(observations, fold.train_idx), prior, site)
+    usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.paths)
     _, _, last = groups_in_time(fold.walkers)
     still = scores_at(seen, fold.walkers, usual, np.zeros(4))
     # Evenly over the time: mornings and evenings answer differently.
@@ -132,7 +132,9 @@ def _fold_scores(
         # A camera that has moved on sees people as one that stays would from a little back.
         moves = [(np.zeros(4), 1.0), *((-offset.step, offset.stretch) for offset in OFFSET_GRID)]
         answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])
-    return _FoldScores(still=still, times=fold.asked[last], before=answers[0], offset=answers[1:])
+    return _FoldScores(
+        still=still, times=fold.test_idx[last], before=answers[0], offset=answers[1:]
+    )
 
 
 def _covariance(scores: Array) -> Array:

@@ -18,10 +18,10 @@ from models.geometry.plane_parameters import plane_parameters_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.config import LARGEST_RESIDUAL, PACE_SD, STATURE_SD, STEP_SHARES
-from models.paths.likelihood import Walkers, walkers_of
+from models.paths.config import REACH
+from models.paths.likelihood import PathModel, Walkers, walkers_of
 from models.paths.reference import candidate_of
-from models.paths.registration import Site
-from models.paths.turn_detection import REACH, along_paths, groups_in_time
+from models.paths.turn_detection import along_paths, groups_in_time, sums_of_groups
 from models.tracks.observations import Observations, Steps, check_in_time
 from models.walking.fit import Learned, per_track
 from models.walking.measures import Measured, measure_speeds, measure_statures
@@ -37,7 +37,7 @@ class Usual:
 
     prior: CameraPose
     speed_reference: SpeedReference
-    paths: Site
+    paths: PathModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +75,7 @@ def scores_at(
     By a clock whose times are longer by a factor, everybody is as much slower.
     """
     at = candidate_of(usual.prior) + beside
-    people, group_of, last = groups_in_time(walkers)
-    if not last.size:
+    if not walkers.people:
         return np.zeros((0, SCORES))
     parameters = plane_parameters_of(usual.prior) + beside[:3]
     observations = replace(observations, steps=_slowed(observations.steps, stretch))
@@ -92,9 +91,8 @@ def scores_at(
         ],
         axis=1,
     )
-    sums = np.zeros((last.size, SCORES))
-    np.add.at(sums, group_of, scores[people])
-    return np.asarray(sums / np.bincount(group_of)[:, None])
+    sums, people, _ = sums_of_groups(walkers, scores)
+    return np.asarray(sums / people[:, None])
 
 
 def _slowed(steps: Steps, stretch: float) -> Steps:

@@ -1,1 +1,1 @@
-"""Where people walk at a site, and which way: a map that tells where a camera looks, in pan too."""
+"""The paths of a site: a density of places and directions that registers a pose, in pan too."""

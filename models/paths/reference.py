@@ -1,4 +1,4 @@
-"""Learn a site's flow from tracks at a known pose, and how registration errs there.
+"""The paths of a site, learned of tracks at a known pose, and how registration errs there.
 
 Source: Godambe 1960, the information of an estimating function, H J^-1 H, whose J has the scatter
 of walking groups here, the noise of the map and what is not known of the bias.
@@ -12,29 +12,21 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import array_of
 from models.geometry.rotation import Array
-from models.paths.cross_fit import CrossFit, cross_fit
-from models.paths.folds import ChosenBandwidths, Folds, fold_maps
-from models.paths.likelihood import walkers_of
-from models.paths.map.density_map import FlowMap
-from models.paths.map.view import Coverage
+from models.paths import config
+from models.paths.coverage import Coverage
+from models.paths.density_map import PathDensityMap
+from models.paths.folds import ChosenBandwidths, CrossFit, Folds, cross_fit, fold_maps
+from models.paths.likelihood import PathModel, walkers_of
+from models.paths.map_learning import path_model_of
 from models.paths.path_test import UsualFit, usual_fit
-from models.paths.registration import Shape, Site
-from models.paths.site_map import mapped
+from models.paths.registration import Shape
 from models.paths.turn_detection import StillScores, learn_scores
-from models.serialization import stored_as
 from models.tracks.observations import Observations
-
-_RUN = 6  # walking groups after one another
-# The inflation before any is seen, and how many runs that guess is worth.
-_ASSUMED_INFLATION, _ASSUMED_INFLATION_WEIGHT = 1.3, 5.0
-_LEFT_NOISE = 0.5  # of the bias's, after what cancels
-_ELSEWHERE = np.array([0.05, 0.05, 0.05, 0.15])  # of a person's scatter: how far off the bias is
-_FAR = np.array([np.radians(8), np.radians(8), 0.15, np.radians(8)])  # how far that pose is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlowReference:
-    """The flow at a site, and how registration errs there.
+class PathReference:
+    """The paths of a site, and how registration errs there.
 
     `bias` (4,) is a person's mean score at the truth, by tilt, roll, log height and heading,
     `bias_covariance` (4, 4) how unsure that is, `spread` (4,) how much people's scores scatter.
@@ -44,24 +36,24 @@ class FlowReference:
     its two tests go by. `bandwidths` are what the map was learned by, for the next one.
     """
 
-    flow: FlowMap
+    density: PathDensityMap
     coverage: Coverage
     bias: Array
     bias_covariance: Array
     spread: Array
-    curvature_variance_inflation: float = stored_as("temper")
-    score_variance_inflation: float = stored_as("surprise")
+    curvature_variance_inflation: float
+    score_variance_inflation: float
     people: float
     still: StillScores
     fit: UsualFit
     bandwidths: ChosenBandwidths
 
-    def site(self, intrinsics: Intrinsics) -> Site:
-        """What walkers are registered to."""
-        return Site(flow=self.flow, coverage=self.coverage, intrinsics=intrinsics)
+    def model(self, intrinsics: Intrinsics) -> PathModel:
+        """The paths before a camera: what walkers are registered to."""
+        return PathModel(density=self.density, coverage=self.coverage, intrinsics=intrinsics)
 
     def variance_inflation_for(self, people: float) -> float:
-        """How much larger squared errors are for so many people than the curvature says."""
+        """The inflation of squared errors over what the curvature says, for so many people."""
         return self.curvature_variance_inflation * self.map_noise(people)
 
     def map_noise(self, people: float) -> float:
@@ -72,14 +64,14 @@ class FlowReference:
         return 1 + people / self.people
 
     def precision(self, shape: Shape, people: float, move: Array) -> Array:
-        """How much (4, 4) the map's part knows, by its shape some way (4,) from the prior pose.
+        """The precision (4, 4) of the map's part, by its shape some way (4,) from the prior pose.
 
         Source: the inverse of the sandwich covariance (Godambe's information). On top of the
         walkers' noise comes the map's, and what the bias is not known to be: at another pose, other
         people walk at the edge of what is seen.
         """
-        far = min(float(np.linalg.norm(move / _FAR)), 1.0)
-        elsewhere = np.diag((_ELSEWHERE * far * self.spread) ** 2)
+        far = min(float(np.linalg.norm(move / config.FAR)), 1.0)
+        elsewhere = np.diag((config.BIAS_ELSEWHERE * far * self.spread) ** 2)
         scatter = self.score_variance_inflation * self.map_noise(people) * shape.noise
         scatter = scatter + people**2 * (self.bias_covariance + elsewhere)
         scatter = scatter + 1e-9 * np.trace(scatter) * np.eye(4)
@@ -91,15 +83,15 @@ def candidate_of(pose: CameraPose) -> Array:
     return array_of(pose)
 
 
-def learn_flow(
+def learn_paths(
     observations: Observations,
     intrinsics: Intrinsics,
     prior: CameraPose,
     seed: int,
     weights: Array | None = None,
     folds: Folds | None = None,
-) -> FlowReference | None:
-    """The flow of tracks at the prior pose; None where fewer than 12 walking groups walk.
+) -> PathReference | None:
+    """The paths of tracks at the prior pose; None where fewer than 12 walking groups walk.
 
     A map knows the tracks that it is made of too well. So each quarter of the walking groups is
     held against a map of the others: what their scores are on average is the bias, how much more
@@ -125,13 +117,13 @@ def learn_flow(
     count = float(crossed.people.sum())
     # Each in the others' map and they in its: to first order, what noise does to the mean cancels.
     bias = crossed.slopes.sum(axis=0) / count
-    unsure = _LEFT_NOISE * inflation * scatter / count**2
+    unsure = config.BIAS_NOISE * inflation * scatter / count**2
     walkers = walkers_of(observations, at)
     weights = np.ones(observations.tracks) if weights is None else weights
-    whole = mapped(walkers, weights, intrinsics, at, folds.chosen.bandwidths)
+    whole = path_model_of(walkers, weights, intrinsics, at, folds.chosen.bandwidths)
     counted = weights[np.unique(walkers.steps.rows.owner_idx)]
-    return FlowReference(
-        flow=whole.flow,
+    return PathReference(
+        density=whole.density,
         coverage=whole.coverage,
         bias=bias,
         bias_covariance=unsure,
@@ -153,8 +145,8 @@ def _scatter(crossed: CrossFit) -> tuple[float, Array]:
     centred = crossed.slopes - crossed.slopes.mean(axis=0)
     scatter = centred.T @ centred + 1e-9 * np.trace(centred.T @ centred) * np.eye(4)
     whitened = np.linalg.solve(np.linalg.cholesky(scatter / len(centred)), centred.T).T
-    runs = len(centred) // _RUN
-    sums = whitened[: runs * _RUN].reshape(runs, _RUN, 4).sum(axis=1)
-    found = float((sums**2).mean() / _RUN)
-    weight = runs / (runs + _ASSUMED_INFLATION_WEIGHT)
-    return max(1.0, weight * found + (1 - weight) * _ASSUMED_INFLATION), scatter
+    runs = len(centred) // config.RUN
+    sums = whitened[: runs * config.RUN].reshape(runs, config.RUN, 4).sum(axis=1)
+    found = float((sums**2).mean() / config.RUN)
+    weight = runs / (runs + config.ASSUMED_INFLATION_WEIGHT)
+    return max(1.0, weight * found + (1 - weight) * config.ASSUMED_INFLATION), scatter

@@ -9,54 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
-from models.paths.likelihood import (
-    Likelihood,
-    Walkers,
-    anchored_scores,
-    likelihood,
-    track_values,
-)
-from models.paths.map.density_map import FlowMap
-from models.paths.map.view import Coverage
+from models.paths import config
+from models.paths.likelihood import Likelihood, PathModel, Walkers
 
-_STARTS = 3
-_APART_RAD = np.radians(5)
-_HOPELESS = 40.0  # of the log posterior: a start so far below another ends below it, too
-_LONGEST_MOVE = 0.05
-_MOST_ROUNDS = 25
-_SETTLING_ROUNDS = 4
-_ROUGHLY = 0.03  # standard deviations
-CONVERGED = 1e-3  # of the log likelihood
 _SHORTEST_SHARE = 1e-3
-_SAME_END = np.radians(0.3)
-_DIFFERENCE = np.radians(0.6)
-_LEAST_CURVATURE = 0.02  # of what the scores say
-_EVEN = 0.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Site:
-    """What walkers are registered to: a flow map, its coverage and the camera's intrinsics."""
-
-    flow: FlowMap
-    coverage: Coverage
-    intrinsics: Intrinsics
-
-    def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
-        """How likely the walkers are, seen from a candidate (4,)."""
-        return likelihood(walkers, self.flow, self.coverage, self.intrinsics, candidate)
-
-    def track_log_likelihoods(self, walkers: Walkers, candidates: Array) -> Array:
-        """The log likelihood (K, N) of each track alone, seen from candidates (K, 4)."""
-        return track_values(walkers, self.flow, self.coverage, self.intrinsics, candidates)
-
-    def scores(self, walkers: Walkers, candidates: Array, anchor: Array) -> Array:
-        """Scores (..., N, 4) at candidates (..., 4) of who is on ground that an anchor knows."""
-        return anchored_scores(
-            walkers, self.flow, self.coverage, self.intrinsics, candidates, anchor
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +24,14 @@ class Belief:
     precision: Array
 
     def log_density(self, candidate: Array) -> float:
-        """Up to a constant."""
+        """The log density up to a constant."""
         apart = candidate - self.mean
         return -0.5 * float(apart @ self.precision @ apart)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peak:
-    """Where a climb ended: candidate (4,), and its log posterior."""
+    """The end of a climb: candidate (4,), and its log posterior."""
 
     candidate: Array
     value: float
@@ -82,7 +39,7 @@ class Peak:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """What the map says around a candidate.
+    """The shape of the log likelihood around a candidate.
 
     `curvature` (4, 4) is how the log likelihood bends, `noise` (4, 4) how its slope scatters, by
     walking group. Were the map the truth and walking groups single walkers, they would be the same.
@@ -94,35 +51,35 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """What walkers say by a map, tempered, and what is believed beside.
+    """The log likelihood of walkers by a site's paths, tempered, and a belief beside.
 
-    `variance_inflation` divides what the map says: how much larger its squared errors are than its
+    `variance_inflation` divides the likelihood: how much larger its squared errors are than its
     scores would have it.
     """
 
     walkers: Walkers
-    site: Site
+    paths: PathModel
     belief: Belief
     variance_inflation: float
 
     def values(self, candidates: Array) -> Array:
         """The log posteriors (K,) of candidates (K, 4), up to a constant."""
-        chances = self.site.track_log_likelihoods(self.walkers, candidates).sum(axis=1)
+        likely = self.paths.track_log_likelihoods(self.walkers, candidates).sum(axis=1)
         believed = [self.belief.log_density(candidate) for candidate in candidates]
-        return np.asarray(chances / self.variance_inflation + believed)
+        return np.asarray(likely / self.variance_inflation + believed)
 
-    def climbed(self, candidate: Array, least_gain: float = CONVERGED) -> Peak:
+    def climbed(self, candidate: Array, least_gain: float = config.CONVERGED) -> Peak:
         """The peak above a candidate (4,), up to a gain that is not worth a step."""
-        value, found = self._asked(candidate)
-        for _ in range(_MOST_ROUNDS):
+        value, found = self._at(candidate)
+        for _ in range(config.MOST_ROUNDS):
             believed = self.belief.precision @ (candidate - self.belief.mean)
             slope = found.scores.sum(axis=0) / self.variance_inflation - believed
             matrix = _scatter(found.scores) / self.variance_inflation + self.belief.precision
             move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
-            move = move * min(1.0, _LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
+            move = move * min(1.0, config.LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
             share, gain = 1.0, -1.0
             while share > _SHORTEST_SHARE and gain <= 0:
-                new_value, new_found = self._asked(candidate + share * move)
+                new_value, new_found = self._at(candidate + share * move)
                 gain = new_value - value
                 share /= 2
             if gain <= 0:
@@ -132,8 +89,8 @@ class Posterior:
                 break
         return Peak(candidate=candidate, value=value)
 
-    def _asked(self, candidate: Array) -> tuple[float, Likelihood]:
-        found = self.site.likelihood(self.walkers, candidate)
+    def _at(self, candidate: Array) -> tuple[float, Likelihood]:
+        found = self.paths.likelihood(self.walkers, candidate)
         return found.value / self.variance_inflation + self.belief.log_density(candidate), found
 
 
@@ -148,9 +105,10 @@ def register(posterior: Posterior, headings: Sequence[float]) -> list[Peak]:
     log_posteriors = posterior.values(tried)
     begin: list[Array] = []
     for number in np.argsort(log_posteriors)[::-1]:
-        apart = [abs(tried[number][3] - other[3]) for other in begin]
-        hopeless = log_posteriors[number] < log_posteriors.max() - _HOPELESS
-        if len(begin) < _STARTS and not hopeless and min(apart, default=np.inf) > _APART_RAD:
+        turns = [abs(tried[number][3] - other[3]) for other in begin]
+        hopeless = log_posteriors[number] < log_posteriors.max() - config.HOPELESS
+        apart = min(turns, default=np.inf) > config.STARTS_APART_RAD
+        if len(begin) < config.STARTS and not hopeless and apart:
             begin.append(tried[number])
     return distinct([posterior.climbed(candidate) for candidate in begin])
 
@@ -159,21 +117,20 @@ def distinct(peaks: Sequence[Peak]) -> list[Peak]:
     """Peaks that are not about the same, the highest first."""
     kept: list[Peak] = []
     for peak in sorted(peaks, key=lambda peak: -peak.value):
-        if all(np.abs(peak.candidate - other.candidate).max() > _SAME_END for other in kept):
+        apart = [np.abs(peak.candidate - other.candidate).max() for other in kept]
+        if min(apart, default=np.inf) > config.SAME_PEAK_RAD:
             kept.append(peak)
     return kept
 
 
-def settled(
-    walkers: Walkers,
-    site: Site,
-    belief: Belief,
-    peak: Peak,
+def refined(
+    posterior: Posterior,
+    candidate: Array,
     shape: Shape,
     precision: Array,
     bias: Array,
     *,
-    roughly: bool = False,
+    warm: bool = False,
 ) -> tuple[Array, Array]:
     """The candidate (4,) and its covariance (4, 4) if the map's part is weighed by direction.
 
@@ -181,64 +138,57 @@ def settled(
     sure of them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
 
     Args:
-        walkers: who is registered.
-        site: to what.
-        belief: what else is known.
-        peak: where to begin.
-        shape: what the map says there.
-        precision: what the map's part knows (4, 4).
+        posterior: of walkers.
+        candidate: its peak (4,).
+        shape: of the map's log likelihood there.
+        precision: of the map's part (4, 4).
         bias: a person's mean score at the truth (4,).
-        roughly: whether it ends once hardly anything moves.
+        warm: from almost the same tracks' pose, where it ends once hardly anything moves.
     """
-    known = precision + belief.precision
-    covariance = np.linalg.inv(known)
+    belief = posterior.belief
+    information = precision + belief.precision
+    covariance = np.linalg.inv(information)
     gain = precision @ np.linalg.inv(shape.curvature)
-    candidate = peak.candidate
-    for _ in range(_SETTLING_ROUNDS):
-        scores = site.scores(walkers, candidate, candidate)
+    for _ in range(config.REFINING_ROUNDS):
+        scores = posterior.paths.scores(posterior.walkers, candidate, candidate)
         slope = scores.sum(axis=0) - bias * scores.any(axis=1).sum()
         move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
-        candidate = candidate + move * min(1.0, _LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
-        if roughly and float(move @ known @ move) < _ROUGHLY**2:
+        share = min(1.0, config.LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
+        candidate = candidate + move * share
+        if warm and float(move @ information @ move) < config.ROUGHLY**2:
             break
     return candidate, np.asarray(covariance)
 
 
-def shape_at(walkers: Walkers, site: Site, candidate: Array) -> Shape:
-    """What a map says around a candidate (4,)."""
-    scores = site.scores(walkers, candidate, candidate)
-    return Shape(
-        curvature=_curvature(walkers, site, candidate, scores), noise=noise_of(walkers, scores)
-    )
+def shape_at(walkers: Walkers, paths: PathModel, candidate: Array) -> Shape:
+    """The shape of the log likelihood around a candidate (4,)."""
+    scores = paths.scores(walkers, candidate, candidate)
+    curvature = _curvature(walkers, paths, candidate, scores)
+    return Shape(curvature=curvature, noise=_noise(walkers, scores))
 
 
-def curvature_of(walkers: Walkers, site: Site, candidate: Array) -> Array:
-    """How the log likelihood bends (4, 4) around a candidate (4,)."""
-    return _curvature(walkers, site, candidate, site.scores(walkers, candidate, candidate))
-
-
-def _curvature(walkers: Walkers, site: Site, candidate: Array, scores: Array) -> Array:
+def _curvature(walkers: Walkers, paths: PathModel, candidate: Array, scores: Array) -> Array:
     """Minus the second derivative (4, 4) of the log likelihood, by differences of its slope.
 
     Where it bends less than the scores scatter, halfway between what is found in each direction
     and what is found on average: a map of some hundred people is rough, and so is how it bends.
     """
-    steps = _DIFFERENCE * np.eye(4)
+    steps = config.CURVATURE_STEP_RAD * np.eye(4)
     around = np.concatenate([candidate - steps, candidate + steps])
-    back, on = np.split(site.scores(walkers, around, candidate).sum(axis=1), 2)
-    bent = (back - on) / (2 * _DIFFERENCE)
+    back, on = np.split(paths.scores(walkers, around, candidate).sum(axis=1), 2)
+    bent = (back - on) / (2 * config.CURVATURE_STEP_RAD)
     scatter = _scatter(scores)
     lower = np.linalg.cholesky(scatter + (1e-6 + 1e-6 * np.trace(scatter)) * np.eye(4))
     back = np.linalg.inv(lower)
     ratio, axes = np.linalg.eigh(back @ (bent + bent.T) / 2 @ back.T)
     ratio = np.maximum(ratio, 0.0)
-    usual = min(max(float(ratio.mean()), _LEAST_CURVATURE), 1.0)
-    kept = (axes * np.maximum(ratio, (1 - _EVEN) * ratio + _EVEN * usual)) @ axes.T
+    usual = min(max(float(ratio.mean()), config.LEAST_CURVATURE), 1.0)
+    kept = (axes * np.maximum(ratio, (1 - config.EVEN) * ratio + config.EVEN * usual)) @ axes.T
     return np.asarray(lower @ kept @ lower.T)
 
 
-def noise_of(walkers: Walkers, scores: Array) -> Array:
-    """How the sum of scores (N, 4) scatters (4, 4): groups are independent, their people not."""
+def _noise(walkers: Walkers, scores: Array) -> Array:
+    """The scatter (4, 4) of the sum of scores (N, 4): groups are independent, their people not."""
     walking_groups = np.zeros((walkers.tracks, 4))
     np.add.at(walking_groups, walkers.group_idx, scores)
     used = int(walking_groups.any(axis=1).sum())

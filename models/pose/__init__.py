@@ -13,10 +13,9 @@ from models.pose.alarms import AlarmRate, alarm_chart_result
 from models.pose.anchoring import begin_creep_log, log_creep, without_creep
 from models.pose.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
 from models.pose.learning import assume_site, learn_site
-from models.pose.partial_failures import Lack
-from models.pose.serialization import last_pose_from_bytes, last_pose_to_bytes
+from models.pose.partial_failures import PartialFailure
 from models.pose.site import CameraSite
-from models.pose.warm_start import LastPose
+from models.pose.warm_start import WarmStart, warm_start_from_bytes, warm_start_to_bytes
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -32,22 +31,20 @@ __all__ = [
     "Drift",
     "DriftLimits",
     "Intrinsics",
-    "Lack",
-    "LastPose",
     "Observations",
+    "PartialFailure",
     "PoseFinding",
     "ChartResult",
     "SecondLook",
     "Trajectory",
     "WalkConfig",
     "Walks",
+    "WarmStart",
     "assume_site",
     "begin_creep_log",
     "count_walks",
     "drift_of",
     "estimate_pose",
-    "last_pose_from_bytes",
-    "last_pose_to_bytes",
     "learn_site",
     "link_pieces",
     "log_creep",
@@ -55,5 +52,7 @@ __all__ = [
     "observe_walks",
     "alarm_chart_result",
     "creep_result",
+    "warm_start_from_bytes",
+    "warm_start_to_bytes",
     "without_creep",
 ]

@@ -1,4 +1,4 @@
-"""What the drift chart says of tracks: that a camera has moved, long before a pose says how far."""
+"""The alarm chart of tracks: a camera has moved, long before a pose says how far."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ from models.tracks.observations import Observations, of_tracks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmRate:
-    """How many false alarms a year are allowed, and how many tracks come in one.
+    """The false alarms that are allowed in a year, and the tracks that come in one.
 
     After an alarm the chart has calmed down once `calm_groups` in a row were below `calm_ratio`
     of its level.
@@ -34,9 +34,9 @@ def alarm_chart_result(
     counted: Mask | None = None,
     first: int = 0,
 ) -> ChartResult | None:
-    """What the chart says of tracks from the first one on, or else of all; None of too few.
+    """Chart result of tracks from the first one on, or else of all; None of too few.
 
-    None, too, of a site without a flow map or a chart.
+    None, too, of a site without paths or a chart.
 
     Args:
         tracks: of the window, in the order of their ends.
@@ -49,16 +49,16 @@ def alarm_chart_result(
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    if site.flow is None or site.chart is None:
+    if site.paths is None or site.chart is None:
         return None
-    usual = site.usual(site.flow, site.chart)
+    usual = site.usual(site.paths, site.chart)
     every = np.arange(tracks.tracks) if counted is None else np.flatnonzero(counted)
-    for asked in (every[every >= first], every):
-        if not asked.size:
+    for chosen in (every[every >= first], every):
+        if not chosen.size:
             continue
-        seen = tracks if asked.size == tracks.tracks else of_tracks(tracks, asked)
+        seen = tracks if chosen.size == tracks.tracks else of_tracks(tracks, chosen)
         scores = score_groups(seen, usual)
-        groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / asked.size
+        groups_a_year = rate.tracks_a_year * max(scores.last.size, 1) / chosen.size
         reading = chart_result(
             site.chart,
             scores,
@@ -67,5 +67,5 @@ def alarm_chart_result(
             calm_groups=rate.calm_groups,
         )
         if reading is not None:
-            return replace(reading, track_idx=int(asked[reading.track_idx]))
+            return replace(reading, track_idx=int(chosen[reading.track_idx]))
     return None

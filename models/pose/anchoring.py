@@ -3,7 +3,7 @@
 A site's `first` is what it was learned as with its reference: it stays until a person has a new
 one made. The map that estimates use grows, by habits alone: what its camera is believed to have
 crept by is taken out of the tracks that it grows by. What is left in it by mistake moves nothing
-of the first, and so the creep is told (`models.monitoring.creep`).
+of the first, and so the creep is found (`models.monitoring.creep`).
 """
 
 from collections.abc import Sequence
@@ -17,17 +17,16 @@ from models.geometry.rotation import Array
 from models.monitoring.creep import posterior_mean_turns
 from models.monitoring.creep_log import CreepLog, add_day, begin_log
 from models.monitoring.group_scores import score_groups
+from models.pose.config import NO_TURN_RAD
 from models.pose.site import CameraSite
 from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 
-_NOTHING_RAD = np.radians(0.02)
-
 
 def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:
     """The log of a site as it was first learned, of tracks up to a time; None without a chart."""
-    if first.flow is None or first.chart is None:
+    if first.paths is None or first.chart is None:
         return None
     return begin_log(first.chart, to_s)
 
@@ -43,9 +42,9 @@ def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLo
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    if first.flow is None or first.chart is None or not tracks.tracks:
+    if first.paths is None or first.chart is None or not tracks.tracks:
         return log
-    usual = first.usual(first.flow, first.chart)
+    usual = first.usual(first.paths, first.chart)
     day_idx = np.floor(tracks.ended_s / DAY_S).astype(np.int64)
     # Each day by itself, so that it matters not which days were at hand together.
     for day in np.setdiff1d(day_idx, log.day_idx):
@@ -74,7 +73,7 @@ def without_creep(
     turns = posterior_mean_turns(log, ended_s / DAY_S, from_s)
 
     def seen(track: Trajectory, turn: Array) -> Trajectory | None:
-        if np.abs(turn).max() < _NOTHING_RAD:
+        if np.abs(turn).max() < NO_TURN_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
         stood = PoseOffset(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)

@@ -1,4 +1,4 @@
-"""Whether a camera has moved among the tracks of a window, by how people walk and where."""
+"""The search for a change: whether a camera moved within a window, by how people walk and where."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -7,184 +7,157 @@ import numpy as np
 
 from models.paths.likelihood import walkers_of
 from models.paths.turn_detection import moved_within
-from models.pose.after_change import widened
+from models.pose.change_confirmation import moved_beyond_doubt, widened
 from models.pose.change_point import find_change, suspicion
-from models.pose.confirmation import moved_beyond_doubt
-from models.pose.fusion import FusedEstimate, by_speeds_alone, fused_estimate
+from models.pose.config import SUSPECT_RATE, SUSPECTED
+from models.pose.fusion import fused_estimate
+from models.pose.pose_fit import FusedEstimate, PoseFit
 from models.pose.site import CameraSite
-from models.pose.warm_start import (
-    FullSearch,
-    LastPose,
-    Posed,
-    begins_at,
-    fit_of,
-    is_as_before,
-    is_calm,
-    last_pose,
-)
+from models.pose.warm_start import FullSearch, WarmStart, warm_start_of
 from models.tracks.observations import Observations, of_tracks
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import joint_estimate
-from models.walking.fit import Near
-
-_SUSPECTED = 1.0  # of the limit, by scores: it is twice that wherever a cut is confirmed
-_SUSPECT_RATE = 0.01  # of windows of a camera that stands are looked at twice
+from models.walking.fit import FitStart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Searched:
-    """What a window comes to: the tracks from the newest change on, and their pose.
+class ChangeSearch:
+    """The tracks of a window from its newest change on, and their pose.
 
     `change_idx` is the first track after the change; None where there was none. `first` is the
-    first that ended with it or later: `tracks` are from there on. `last` is what a next search may
-    begin at; None where this one suspects something.
+    first that ended with it or later: `tracks` are from there on. `warm_start` is where a next
+    search may begin; None where this one suspects something.
     """
 
     change_idx: int | None
     first: int
     tracks: Observations
-    posed: Posed
-    last: LastPose | None = None
+    fit: PoseFit
+    warm_start: WarmStart | None = None
 
 
-def posed(tracks: Observations, site: CameraSite, near: LastPose | None = None) -> Posed:
-    """The pose of tracks that are of one: by speeds, and by places where these are known.
-
-    Where it is known to be `near` that of almost the same tracks, others are not looked at.
-    """
-    ends, means = ((), ()) if near is None else (tuple(near.joint.ends), near.means)
-    joint = joint_estimate(tracks, site.prior, site.speed_reference, ends, means)
-    if site.flow is None:
-        fused = by_speeds_alone(joint, site.prior)
-    else:
-        fused = fused_estimate(
-            tracks,
-            site.intrinsics,
-            site.prior,
-            joint,
-            site.speed_reference,
-            site.flow,
-            () if near is None else tuple(near.fused.ends),
-            None if near is None else near.around,
-        )
-    return Posed(joint=joint, fused=fused)
+def pose_fit_of(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart | None = None
+) -> PoseFit:
+    """The pose of tracks that are of one: by speeds, and by places where these are known."""
+    starts = () if warm_start is None else warm_start.speed_starts
+    joint = joint_estimate(tracks, site.prior, site.speed_reference, starts)
+    return PoseFit(joint=joint, fused=fused_estimate(tracks, site, joint, warm_start))
 
 
-def search_change(tracks: Observations, site: CameraSite, last: LastPose | None = None) -> Searched:
+def search_change(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart | None = None
+) -> ChangeSearch:
     """The newest change of the camera that is beyond doubt, and the pose from there on.
 
     Where people walk another way than before, or elsewhere, a window is suspected; it is cut
-    where the parts before and after, each asked alone, are of two poses beyond doubt.
+    where the parts before and after, each estimated alone, are of two poses beyond doubt.
 
     Args:
         tracks: of the window, in the order of their ends.
         site: how people walk, and where, if that is known.
-        last: the pose of almost the same tracks: where nothing speaks against it, no others are
-            looked at, and no change is looked for.
+        warm_start: the pose of almost the same tracks: where nothing speaks against it, no others
+            are searched, and no change is.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
-    if last is not None and begins_at(last, tracks):
-        found = _still_there(tracks, site, last)
+    if warm_start is not None and warm_start.suits(tracks):
+        found = _still_there(tracks, site, warm_start)
         if found is not None:
             return found
-    whole = posed(tracks, site)
+    whole = pose_fit_of(tracks, site)
     suspected = False
-    for change_idx in _suspected(tracks, site, whole.fused):
+    for change_idx in _suspects(tracks, site, whole.fused):
         suspected = True
-        first, parts = _parted(tracks, change_idx)
-        if parts is None:
-            continue
-        before, after = (posed(part, site) for part in parts)
-        if moved_beyond_doubt(
-            before.fused, before.joint.walking_groups, after.fused, after.joint.walking_groups
-        ):
-            fused = widened(
-                before.fused,
-                after.fused,
-                after.joint.walking_groups,
-                site.speed_reference,
-                site.flow,
-            )
-            return Searched(
-                change_idx=change_idx,
-                first=first,
-                tracks=parts[1],
-                posed=replace(after, fused=fused),
-            )
+        found = _confirmed(tracks, site, change_idx)
+        if found is not None:
+            return found
     begin = None
     if not suspected and tracks.tracks:
         search = FullSearch(
             ended_s=tracks.ended_s,
             suspicion=_suspicion(tracks, site, whole),
-            fit=fit_of(whole),
+            path_fit=whole.mean_path_fit,
         )
-        begin = last_pose(whole, site.prior, search)
-    return Searched(change_idx=None, first=0, tracks=tracks, posed=whole, last=begin)
+        begin = warm_start_of(whole, site.prior, search)
+    return ChangeSearch(change_idx=None, first=0, tracks=tracks, fit=whole, warm_start=begin)
 
 
-def _still_there(tracks: Observations, site: CameraSite, last: LastPose) -> Searched | None:
-    """What tracks come to at the last pose; None where anything speaks against it."""
-    found = posed(tracks, site, last)
-    if not is_as_before(found, last) or _turned(tracks, site, found.fused) is not None:
+def _confirmed(tracks: Observations, site: CameraSite, change_idx: int) -> ChangeSearch | None:
+    """The pose after a change; None where it is not beyond doubt, or too few walk on either side.
+
+    Tracks that ended at the same time are on the same side.
+    """
+    first = int(np.searchsorted(tracks.ended_s, tracks.ended_s[change_idx], side="left"))
+    earlier = of_tracks(tracks, np.arange(first))
+    later = of_tracks(tracks, np.arange(first, tracks.tracks))
+    if min(earlier.walkers, later.walkers) < FEWEST_WALKERS:
         return None
-    search, suspected = last.search, _suspicion(tracks, site, found)
-    if not is_calm(suspected, last):
-        around = found.fused.around
-        near = None if around is None or suspected > _SUSPECTED else around.told
-        if _hurried(tracks, site, found.fused, near) is not None:
+    before, after = pose_fit_of(earlier, site), pose_fit_of(later, site)
+    groups = after.joint.walking_groups
+    if not moved_beyond_doubt(before.fused, before.joint.walking_groups, after.fused, groups):
+        return None
+    fused = widened(before.fused, after.fused, groups, site.speed_reference, site.paths)
+    return ChangeSearch(
+        change_idx=change_idx, first=first, tracks=later, fit=replace(after, fused=fused)
+    )
+
+
+def _still_there(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart
+) -> ChangeSearch | None:
+    """The pose that is refined from a warm start; None where anything speaks against it."""
+    found = pose_fit_of(tracks, site, warm_start)
+    if not warm_start.is_refined_by(found):
+        return None
+    if _moved_by_places(tracks, site, found.fused) is not None:
+        return None
+    search, suspected = warm_start.search, _suspicion(tracks, site, found)
+    if not warm_start.is_calm(suspected):
+        around = found.fused.neighbourhood
+        speeds = None if around is None or suspected > SUSPECTED else around.speeds
+        if _moved_by_speeds(tracks, site, found.fused, speeds) is not None:
             return None
         search = replace(search, suspicion=suspected)
-    begin = last_pose(found, site.prior, search)
-    return Searched(change_idx=None, first=0, tracks=tracks, posed=found, last=begin)
+    begin = warm_start_of(found, site.prior, search)
+    return ChangeSearch(change_idx=None, first=0, tracks=tracks, fit=found, warm_start=begin)
 
 
-def _suspicion(tracks: Observations, site: CameraSite, whole: Posed) -> float:
-    """How much better two poses explain the speeds than one, where the camera looks by now."""
+def _suspicion(tracks: Observations, site: CameraSite, whole: PoseFit) -> float:
+    """The gain of two poses over one in explaining the speeds, where the camera looks by now."""
     turned = replace(site.prior, heading_rad=whole.fused.parameters.heading_rad)
     return suspicion(tracks, turned, site.speed_reference, whole.joint.raw)
 
 
-def _suspected(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
-    """Where the camera may have moved, by speeds and by places: the first tracks after it.
+def _suspects(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
+    """The first tracks after a possible move of the camera, by speeds and by places.
 
-    Both are asked where the camera stands by all tracks together. Asked at the prior pose, a
+    Both look from where the camera stands by all tracks together. From the prior pose, a
     camera that moved long ago seems to move with every change of the crowd.
     """
-    for look in (_hurried, _turned):
+    for look in (_moved_by_speeds, _moved_by_places):
         moved = look(tracks, site, whole)
         if moved is not None:
             yield moved
 
 
-def _hurried(
-    tracks: Observations, site: CameraSite, whole: FusedEstimate, near: Near | None = None
+def _moved_by_speeds(
+    tracks: Observations,
+    site: CameraSite,
+    whole: FusedEstimate,
+    warm_start: FitStart | None = None,
 ) -> int | None:
-    """Where the camera may have moved by speeds; None where it did not."""
+    """The first track after a possible move by speeds; None where there is none."""
     turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
-    found = find_change(tracks, turned, site.speed_reference, near)
+    found = find_change(tracks, turned, site.speed_reference, warm_start)
     return None if found is None else found.track_idx
 
 
-def _turned(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
-    """Where the camera may have moved by places; None where it did not, or they are unknown."""
-    if site.flow is None:
+def _moved_by_places(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+    """The first track after a possible move by places; None where there is none, or no paths."""
+    if site.paths is None:
         return None
     at = whole.values
-    paths = site.flow.site(site.intrinsics)
-    return moved_within(walkers_of(tracks, at), paths, at, site.flow.still, _SUSPECT_RATE)
-
-
-def _parted(
-    tracks: Observations, change_idx: int
-) -> tuple[int, tuple[Observations, Observations] | None]:
-    """Where the part after a change begins, and what is seen before and after it.
-
-    None where too few walk in either. Tracks that ended at the same time are in the same part.
-    """
-    first = int(np.searchsorted(tracks.ended_s, tracks.ended_s[change_idx], side="left"))
-    before = of_tracks(tracks, np.arange(first))
-    after = of_tracks(tracks, np.arange(first, tracks.tracks))
-    enough = min(before.walkers, after.walkers) >= FEWEST_WALKERS
-    return first, (before, after) if enough else None
+    paths = site.paths.model(site.intrinsics)
+    return moved_within(walkers_of(tracks, at), paths, at, site.paths.still, SUSPECT_RATE)

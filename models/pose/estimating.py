@@ -1,4 +1,4 @@
-"""The pose that tracks tell of a camera whose site is known: by speeds, places and since when."""
+"""The pose of a camera whose site is known, by its tracks: by speeds, places and since when."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -7,21 +7,19 @@ import numpy as np
 
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import Drift, DriftLimits, asks_again, drift_between, pose_after
-from models.pose.change_search import posed, search_change
-from models.pose.fusion import FusedEstimate, by_speeds_alone
-from models.pose.partial_failures import Lack, unless_failed
+from models.pose.change_search import pose_fit_of, search_change
+from models.pose.partial_failures import PartialFailure, unless_failed
+from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.pose.site import CameraSite
-from models.pose.warm_start import LastPose
+from models.pose.warm_start import WarmStart
 from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate, joint_estimate
 
-FLOW_MAP = "flow_map"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondLook:
-    """What a verdict goes by: its limits, and whether the camera is taken for moved by now."""
+    """The limits of a verdict, and whether the camera is taken for moved by now."""
 
     limits: DriftLimits
     drifting: bool
@@ -34,8 +32,8 @@ class PoseFinding:
     `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
     same without the newest people; None unless a verdict asks for it. `change_idx` is the first
     track after the change, None where there was none, and `first` the first that counts.
-    `lacks` says what failed beside. `last` is where the next estimate may begin; None where it has
-    to look at all poses.
+    `failures` are of what is beside. `warm_start` is where the next estimate may begin; None where
+    it has to search all poses.
     """
 
     prior: CameraPose
@@ -44,12 +42,12 @@ class PoseFinding:
     earlier: FusedEstimate | None = None
     change_idx: int | None = None
     first: int = 0
-    lacks: tuple[Lack, ...] = ()
-    last: LastPose | None = None
+    failures: tuple[PartialFailure, ...] = ()
+    warm_start: WarmStart | None = None
 
     @property
     def drift(self) -> Drift:
-        """How far the camera is from its prior pose, with standard deviations."""
+        """The drift from the prior pose, with standard deviations."""
         return drift_of(self.fused, self.prior)
 
     @property
@@ -62,21 +60,21 @@ def estimate_pose(
     tracks: Observations,
     site: CameraSite,
     second_look: SecondLook | None = None,
-    last: LastPose | None = None,
+    warm_start: WarmStart | None = None,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
-    What the flow map says may fail: the pose is by speeds alone then, and the failure is said. Of
+    The search by paths may fail: the pose is by speeds alone then, and the failure is named. Of
     a site that was not learned, all tracks count and the walking speed is assumed.
 
     Args:
         tracks: of the window, in the order of their ends.
         site: of the camera.
         second_look: what a verdict goes by, if there is to be one: where it is about to change, the
-            pose is asked for without the newest people, too. That takes as long again.
-        last: of the finding of almost the same tracks at the same site, the newest of them left out
-            and some older ones: where nothing speaks against it, its pose is refined, which takes a
-            quarter to a half of the time and comes to the same.
+            pose is estimated without the newest people, too. That takes as long again.
+        warm_start: of the finding of almost the same tracks at the same site, the newest of them
+            left out and some older ones: where nothing speaks against it, its pose is refined,
+            which takes a quarter to a half of the time and comes to the same.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -86,46 +84,46 @@ def estimate_pose(
     if not site.learned:
         joint = joint_estimate(tracks, prior, site.speed_reference)
         return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
-    lacks: list[Lack] = []
-    searched = None
-    if site.flow is not None:
-        begin = _at_site(last, site)
-        searched = unless_failed(lacks, FLOW_MAP, partial(search_change, tracks, site, begin))
-    if searched is None:
-        site = replace(site, flow=None)
-        searched = search_change(tracks, site, None if lacks else _at_site(last, site))
-    fused = searched.posed.fused
+    failures: list[PartialFailure] = []
+    found = None
+    if site.paths is not None:
+        search = partial(search_change, tracks, site, _at_site(warm_start, site))
+        found = unless_failed(failures, "flow_map", search)
+    if found is None:
+        site = replace(site, paths=None)
+        found = search_change(tracks, site, None if failures else _at_site(warm_start, site))
+    fused = found.fit.fused
     earlier = None
     if second_look is not None:
-        earlier = _look_again(searched.tracks, drift_of(fused, prior), second_look, site)
+        earlier = _look_again(found.tracks, drift_of(fused, prior), second_look, site)
     return PoseFinding(
         prior=prior,
-        joint=searched.posed.joint,
+        joint=found.fit.joint,
         fused=fused,
         earlier=earlier,
-        change_idx=searched.change_idx,
-        first=searched.first,
-        lacks=tuple(lacks),
-        last=None if lacks else searched.last,
+        change_idx=found.change_idx,
+        first=found.first,
+        failures=tuple(failures),
+        warm_start=None if failures else found.warm_start,
     )
 
 
-def _at_site(last: LastPose | None, site: CameraSite) -> LastPose | None:
-    """The last pose, where it is of the same site; else None."""
-    if last is None or last.prior != site.prior:
+def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None:
+    """The warm start, where it is of the same site; else None."""
+    if warm_start is None or warm_start.prior != site.prior:
         return None
-    return last if last.registered == (site.flow is not None) else None
+    return warm_start if warm_start.registered == (site.paths is not None) else None
 
 
 def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
-    """How far an estimate is from the prior pose."""
+    """The drift of an estimate from the prior pose."""
     return drift_between(fused.parameters, fused.sd, fused.identifiable, prior)
 
 
 def _look_again(
     tracks: Observations, drift: Drift, second_look: SecondLook, site: CameraSite
 ) -> FusedEstimate | None:
-    """The pose without the newest people who walk; None where it is not asked for, or too few are.
+    """The pose without the newest people who walk; None where it is not needed, or too few do.
 
     A pose takes a second: only a verdict that is about to change needs it.
     """
@@ -136,4 +134,4 @@ def _look_again(
     if walkers.size < limits.people + FEWEST_WALKERS:
         return None
     older = of_tracks(tracks, np.arange(walkers[-limits.people]))
-    return posed(older, site).fused
+    return pose_fit_of(older, site).fused

@@ -1,271 +1,192 @@
-"""The fused pose: the joint estimate's speeds and the flow map's places, in one posterior.
+"""The fused pose: the joint estimate's speeds and the places of the paths, in one posterior.
 
-Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the map / variance inflation.
+Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / variance inflation.
 """
-
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics
 from models.geometry.plane_parameters import IDENTIFIABLE_SD, identifiable_of
 from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS, PoseParameters
+from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
-from models.paths.heading import on_known_ground, variance_of_halves
+from models.paths.heading import on_seen_ground, variance_of_halves
 from models.paths.likelihood import walkers_of
 from models.paths.path_test import group_fits
-from models.paths.reference import FlowReference, candidate_of
-from models.paths.registration import Posterior, settled, shape_at
+from models.paths.reference import PathReference, candidate_of
+from models.paths.registration import Posterior, refined, shape_at
+from models.pose import config
 from models.pose.modes import (
-    HEADING_SD,
-    REACH_RAD,
-    apart,
-    elsewhere,
-    ends_of,
-    flatter,
+    Mode,
+    belief_of,
+    birge_ratio,
+    covariance_between,
+    covariance_beyond_gaussian,
+    find_modes,
     odds_of,
 )
+from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, by_speeds_alone
+from models.pose.site import CameraSite
+from models.pose.warm_start import WarmStart
 from models.quantiles import chi_squared_above
 from models.reasons import Reason, TracksCode
 from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate
-from models.walking.fit import Near
-from models.walking.speed_reference import SpeedReference
-
-_FEWEST_GROUPS = 5
-_EDGE_RAD = math.radians(2.0)
-_FAR_APART = 6.6  # of a variance: chance makes two halves differ by more in one case of 100
-_LITTLE = 0.1  # of a variance
-_NOT_FAR = 0.5  # of that: what is less is far from it, looked at roughly
-_BY_CHANCE = 0.01  # tilt and roll of a camera that stands are so far off in so many cases
-_RIVAL = 0.05  # how likely, against the best, another pose must be to be named
-_NO_RIVAL = 1e-6  # and as unlikely as this, it has nothing to do with the covariance
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Around:
-    """What was found around an end, and is about the same of almost the same tracks.
-
-    `told` is what the speeds say with its heading. `wider` (4, 4) was added to the covariance for
-    other ends, for a posterior that is no Gaussian, and for halves that tell other headings.
-    """
-
-    told: Near
-    wider: Array
-
-    def narrow(self, covariance: Array) -> bool:
-        """Whether so little of a covariance (4, 4) was added that it need not be asked anew."""
-        return float(self.wider[3, 3]) < _LITTLE * float(covariance[3, 3])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FusedEstimate:
-    """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
-
-    `identifiable` names those of tilt, roll, height, heading that the tracks determine; `reason`
-    is what is to be said of the flow map, if anything. `raw` (4,) is before the map's bias is taken
-    off; None where the map had no part: then all is the joint estimate's and the heading the prior
-    pose's.
-    `rivals` are headings (radians) of other poses that explain the tracks about as well. `ends`
-    (4,) are where the search ended, the best first: `raw`, and what may have to do with the
-    covariance. `fit` is the sum over walking groups of how well they fit the map at `raw`, in logs.
-    `around` is what else was found there; None where the map had no part.
-    """
-
-    values: Array
-    covariance: Array
-    identifiable: tuple[str, ...]
-    reason: Reason | None
-    raw: Array | None = None
-    rivals: tuple[float, ...] = ()
-    ends: tuple[Array, ...] = ()
-    fit: float = 0.0
-    around: Around | None = None
-
-    @property
-    def registered(self) -> bool:
-        """Whether the flow map had a part."""
-        return self.raw is not None
-
-    @property
-    def parameters(self) -> PoseParameters:
-        """What is estimated, named."""
-        return PoseParameters.of_array(self.values)
-
-    @property
-    def sd(self) -> PoseParameters:
-        """The standard deviations, named."""
-        return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
-
-    @property
-    def raw_parameters(self) -> PoseParameters | None:
-        """What `raw` is, named."""
-        return None if self.raw is None else PoseParameters.of_array(self.raw)
 
 
 def fused_estimate(
-    observations: Observations,
-    intrinsics: Intrinsics,
-    prior: CameraPose,
+    tracks: Observations,
+    site: CameraSite,
     joint: JointEstimate,
-    speed_reference: SpeedReference,
-    reference: FlowReference,
-    near: Sequence[Array] = (),
-    around: Around | None = None,
+    warm_start: WarmStart | None = None,
 ) -> FusedEstimate:
-    """The pose by speeds and places together.
+    """The pose by speeds and places together; by speeds alone where places do not determine it.
 
     A track's speeds, given where and which way it goes, and where it goes are two factors of one
-    likelihood. Of the speeds all is taken that their fit says around its end; what people's places
-    are is asked anew there, and with the heading that comes of it the speeds are.
+    likelihood. That of the speeds is a Gaussian around its mode; that of the places is evaluated
+    there, and the speeds are fitted again with the heading that comes of it.
 
     Args:
-        observations: of the tracks.
-        intrinsics: of the camera.
-        prior: where it was.
-        joint: what the speeds say, the heading taken for the prior pose's.
-        speed_reference: how people walk at the site.
-        reference: where they do.
-        near: the `ends` (4,) of almost the same tracks, where it is known to be near them; else
-            poses all around are tried.
-        around: what was found there of them, where there was a single end; else it is asked anew.
+        tracks: of one pose.
+        site: with the paths of its people, if they are known.
+        joint: by speeds, the heading taken for the prior pose's.
+        warm_start: the pose of almost the same tracks; without one, poses all around are tried.
     """
-    walkers = walkers_of(observations, np.append(joint.values, prior.heading_rad))
-    if walkers.walking_groups < _FEWEST_GROUPS:
+    paths, prior = site.paths, site.prior
+    if paths is None:
         return by_speeds_alone(joint, prior)
-    site = reference.site(intrinsics)
-    variance_inflation = reference.variance_inflation_for(walkers.people)
-    told_near = None if around is None else around.told
-    ends = ends_of(
-        walkers,
-        site,
-        variance_inflation,
-        joint,
-        observations,
-        prior,
-        speed_reference,
-        near,
-        told_near,
+    walkers = walkers_of(tracks, np.append(joint.values, prior.heading_rad))
+    if walkers.walking_groups < config.FEWEST_GROUPS:
+        return by_speeds_alone(joint, prior)
+    posterior = Posterior(
+        walkers=walkers,
+        paths=paths.model(site.intrinsics),
+        belief=belief_of(joint, prior),
+        variance_inflation=paths.variance_inflation_for(walkers.people),
     )
-    best = ends[0]
-    shape = shape_at(walkers, site, best.candidate)
-    move = best.candidate - candidate_of(prior)
-    fits = group_fits(walkers, site, best.candidate)
-    if reference.fit.has_changed(fits):
-        stood = group_fits(walkers, site, candidate_of(prior))
-        if not reference.fit.has_changed(stood) and _same_angles(joint, prior):
-            return by_speeds_alone(joint, prior)  # only times have changed: a clock
-        return by_speeds_alone(joint, prior, Reason(code=TracksCode.PATHS_CHANGED))
-    known = reference.precision(shape, walkers.people, move)
-    known = known / reference.fit.variance_inflation(fits)
-    values, covariance = settled(
-        walkers,
-        site,
-        best.belief,
-        best.peak,
-        shape,
-        known,
-        reference.bias,
-        roughly=around is not None,
+    modes = find_modes(posterior, tracks, site, joint, warm_start)
+    fits = group_fits(walkers, posterior.paths, modes[0].candidate)
+    if paths.fit.has_changed(fits):
+        return by_speeds_alone(joint, prior, _changed_paths(posterior, paths, joint, prior))
+    values, covariance = _refined(modes[0], paths, prior, fits, warm_start)
+    if _out_of_reach(values, prior) or not on_seen_ground(walkers, posterior.paths, values):
+        return by_speeds_alone(joint, prior, _unidentifiable(config.HEADING_SD))
+    odds = odds_of(modes)
+    extra = _extra_covariance(modes, odds, values, covariance, warm_start)
+    return _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
+
+
+def _changed_paths(
+    posterior: Posterior, paths: PathReference, joint: JointEstimate, prior: CameraPose
+) -> Reason | None:
+    """The reason of people who fit no pose; None if only times changed, by a clock."""
+    at_prior = group_fits(posterior.walkers, posterior.paths, candidate_of(prior))
+    if not paths.fit.has_changed(at_prior) and _same_angles(joint, prior):
+        return None
+    return Reason(code=TracksCode.PATHS_CHANGED)
+
+
+def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
+    """True if speeds show no turn in tilt or roll, whatever they show of the scale."""
+    turn = joint.values[:2] - candidate_of(prior)[:2]
+    squared = float(turn @ np.linalg.solve(joint.covariance[:2, :2], turn))
+    return squared < chi_squared_above(config.BY_CHANCE, 2)
+
+
+def _refined(
+    mode: Mode,
+    paths: PathReference,
+    prior: CameraPose,
+    fits: Array,
+    warm_start: WarmStart | None,
+) -> tuple[Array, Array]:
+    """The pose (4,) around a mode with each direction of the paths weighed, and its covariance."""
+    walkers = mode.posterior.walkers
+    shape = shape_at(walkers, mode.posterior.paths, mode.candidate)
+    precision = paths.precision(shape, walkers.people, mode.candidate - candidate_of(prior))
+    precision = precision / paths.fit.variance_inflation(fits)
+    warm = warm_start is not None and warm_start.neighbourhood is not None
+    values, covariance = refined(
+        mode.posterior, mode.candidate, shape, precision, paths.bias, warm=warm
     )
-    if _out_of_reach(values, prior) or not on_known_ground(walkers, site, values):
-        untold = {"heading_sd_rad": HEADING_SD}
-        return by_speeds_alone(
-            joint, prior, Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values=untold)
-        )
-    covariance = covariance * apart(best.belief, known, values)
-    odds = odds_of(walkers, site, ends)
-    if around is not None and around.narrow(covariance):
-        wider = around.wider
-    else:
-        wider = elsewhere([end.peak for end in ends], odds)
-        wider = wider + flatter(best, covariance + wider)
-        wider = wider + _unrepeated(best.posterior, values, covariance + wider, afar=not near)
-    covariance = covariance + wider
-    rivals = tuple(
-        float(end.candidate[3])
-        for end, against_best in zip(ends, odds, strict=True)
-        if end is not best and against_best > _RIVAL
-    )
-    sd = np.sqrt(np.diag(covariance))
+    return values, covariance * birge_ratio(mode.posterior.belief, precision, values)
+
+
+def _out_of_reach(values: Array, prior: CameraPose) -> bool:
+    """True if a heading is at the edge of those that were tried: beyond may be a better one."""
+    return abs(float(values[3]) - prior.heading_rad) > config.REACH_RAD - config.EDGE_RAD
+
+
+def _extra_covariance(
+    modes: list[Mode],
+    odds: Array,
+    values: Array,
+    covariance: Array,
+    warm_start: WarmStart | None,
+) -> Array:
+    """The covariance (4, 4) by other modes, by flat tails, and by halves that do not agree."""
+    around = None if warm_start is None else warm_start.neighbourhood
+    if around is not None and around.is_narrow(covariance):
+        return around.extra_covariance
+    extra = covariance_between([mode.peak for mode in modes], odds)
+    extra = extra + covariance_beyond_gaussian(modes[0], covariance + extra)
+    afar = warm_start is None
+    return extra + _covariance_of_halves(modes[0].posterior, values, covariance + extra, afar=afar)
+
+
+def _covariance_of_halves(
+    posterior: Posterior, values: Array, covariance: Array, *, afar: bool
+) -> Array:
+    """The covariance (4, 4) by how far apart halves of the people find the heading, if far."""
+    variance = float(covariance[3, 3])
+    line = covariance[:, 3] / variance
+    by_halves = variance_of_halves(posterior, values, line, afar=afar)
+    if not afar and by_halves > config.CLOSE * config.FAR_APART * variance:
+        by_halves = variance_of_halves(posterior, values, line)
+    if by_halves < config.FAR_APART * variance:
+        return np.zeros((4, 4))
+    return (by_halves - variance) * np.outer(line, line)
+
+
+def _estimate_of(
+    modes: list[Mode],
+    odds: Array,
+    values: Array,
+    covariance: Array,
+    extra: Array,
+    fits: Array,
+    joint: JointEstimate,
+    prior: CameraPose,
+) -> FusedEstimate:
+    """The estimate of a pose and its covariance, with what else explains the tracks."""
+    best, sd = modes[0], np.sqrt(np.diag(covariance))
+    others = list(zip(modes[1:], odds[1:], strict=True))
+    rivals = tuple(float(mode.candidate[3]) for mode, own in others if own > config.RIVAL)
+    near = [mode.candidate for mode, own in others if own > config.NO_RIVAL]
+    # What speeds leave open, places alone do not determine: crowds that all cross the picture fit
+    # a map at a tilt that is ten degrees off, and it seems sharp there.
+    determined = ("heading", *joint.identifiable)
     return FusedEstimate(
         values=values,
         covariance=covariance,
-        # What speeds leave open, places alone do not tell: crowds that all cross the picture fit a
-        # map at a tilt that is ten degrees off, and it seems sharp there.
-        identifiable=tuple(
-            name
-            for name in identifiable_of(PARAMETERS, sd)
-            if name == "heading" or name in joint.identifiable
-        ),
+        identifiable=tuple(name for name in identifiable_of(PARAMETERS, sd) if name in determined),
         reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
         raw=best.candidate,
         rivals=rivals,
-        ends=tuple(
-            end.candidate
-            for end, against_best in zip(ends, odds, strict=True)
-            if end is best or against_best > _NO_RIVAL
-        ),
-        fit=float(fits.sum()),
-        around=Around(told=best.told.near, wider=wider),
-    )
-
-
-def by_speeds_alone(
-    joint: JointEstimate, prior: CameraPose, reason: Reason | None = None
-) -> FusedEstimate:
-    """The joint estimate with the prior's heading, which speeds leave open.
-
-    Where people were held against a map and do not fit it, as the `reason` says, they are not the
-    reference's people: how fast these walk where is known no better than at any other site.
-    """
-    covariance = np.zeros((4, 4))
-    values, covariance[:3, :3] = joint.values, joint.covariance
-    if reason is not None:
-        values, covariance[:3, :3] = joint.beside_strangers()
-    covariance[3, 3] = HEADING_SD**2
-    known = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
-    return FusedEstimate(
-        values=np.append(values, prior.heading_rad),
-        covariance=covariance,
-        identifiable=tuple(name for name in joint.identifiable if name in known),
-        reason=reason,
+        modes=(best.candidate, *near),
+        path_fit=float(fits.sum()),
+        neighbourhood=PathNeighbourhood(speeds=best.speeds.warm_start, extra_covariance=extra),
     )
 
 
 def _reason(
     heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPose
 ) -> Reason | None:
+    """The reason of a heading that is ambiguous or unsure; None of others."""
     if rivals:
         turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
         return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
-    if sd > IDENTIFIABLE_SD[3]:
-        return Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": sd})
-    return None
+    return _unidentifiable(sd) if sd > IDENTIFIABLE_SD[3] else None
 
 
-def _out_of_reach(values: Array, prior: CameraPose) -> bool:
-    """Whether a heading is at the edge of those that were tried: beyond may be a better one."""
-    return abs(float(values[3]) - prior.heading_rad) > REACH_RAD - _EDGE_RAD
-
-
-def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
-    """Whether speeds tell no turn in tilt or roll, whatever they say of the scale."""
-    turn = joint.values[:2] - candidate_of(prior)[:2]
-    squared = float(turn @ np.linalg.solve(joint.covariance[:2, :2], turn))
-    return squared < chi_squared_above(_BY_CHANCE, 2)
-
-
-def _unrepeated(posterior: Posterior, values: Array, covariance: Array, *, afar: bool) -> Array:
-    """What is added to the covariance (4, 4) where halves of the people tell other headings."""
-    variance = float(covariance[3, 3])
-    line = covariance[:, 3] / variance
-    by_halves = variance_of_halves(posterior, values, line, afar=afar)
-    if not afar and by_halves > _NOT_FAR * _FAR_APART * variance:
-        by_halves = variance_of_halves(posterior, values, line)
-    if by_halves < _FAR_APART * variance:
-        return np.zeros((4, 4))
-    return (by_halves - variance) * np.outer(line, line)
+def _unidentifiable(heading_sd_rad: float) -> Reason:
+    return Reason(code=TracksCode.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": heading_sd_rad})

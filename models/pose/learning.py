@@ -9,7 +9,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.chart_learning import learn_chart
 from models.paths.folds import ChosenBandwidths, fold_maps
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, check_in_time, of_tracks
@@ -57,7 +57,8 @@ def learn_site(
     """
     check_in_time(tracks)
     if speed_reference is None:
-        first = tracks if speed_tracks is None else _first(tracks, speed_tracks)
+        count = tracks.tracks if speed_tracks is None else min(speed_tracks, tracks.tracks)
+        first = of_tracks(tracks, np.arange(count))
         speed_reference = learn_speed_reference(first, prior, walk, seed)
     site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
     folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, chosen)
@@ -65,7 +66,7 @@ def learn_site(
         return site
     return replace(
         site,
-        flow=learn_flow(tracks, intrinsics, prior, seed, weights, folds),
+        paths=learn_paths(tracks, intrinsics, prior, seed, weights, folds),
         chart=learn_chart(tracks, prior, speed_reference, folds, seed) if chart else None,
     )
 
@@ -83,7 +84,3 @@ def assume_site(
     """
     speed_reference = assumed_speed_reference(tracks, prior, walk)
     return CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
-
-
-def _first(tracks: Observations, count: int) -> Observations:
-    return of_tracks(tracks, np.arange(min(count, tracks.tracks)))

@@ -1,4 +1,4 @@
-"""A camera's site as far as it is known: how people walk before it, where, and what is usual."""
+"""The site of a camera: how people walk before it, where, and what is usual."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.chart import DriftChart
 from models.monitoring.group_scores import Usual
-from models.paths.reference import FlowReference
+from models.paths.reference import PathReference
 from models.walking.speed_reference import SpeedReference
 
 
@@ -14,25 +14,25 @@ from models.walking.speed_reference import SpeedReference
 class CameraSite:
     """A camera at its prior pose, and what is known of the people before it.
 
-    `speed_reference` is how they walk, learned or assumed. `flow` is where they do and `chart` how
-    their scores scatter; None where too few people walked to learn it.
+    `speed_reference` is how they walk, learned or assumed. `paths` are where they do and `chart`
+    how their scores scatter; None where too few people walked to learn it.
     """
 
     intrinsics: Intrinsics
     prior: CameraPose
     speed_reference: SpeedReference
-    flow: FlowReference | None = None
+    paths: PathReference | None = None
     chart: DriftChart | None = None
 
     @property
     def learned(self) -> bool:
-        """Whether anything of it was learned; else a walking speed is assumed, and no more."""
+        """True if anything of it was learned; else a walking speed is assumed, and no more."""
         return self.speed_reference.tracks > 0
 
-    def usual(self, flow: FlowReference, chart: DriftChart) -> Usual:
-        """What its flow map and its chart take for usual, seen from the prior pose."""
+    def usual(self, paths: PathReference, chart: DriftChart) -> Usual:
+        """The scores that its paths and its chart take for usual, seen from the prior pose."""
         return Usual(
             prior=self.prior,
             speed_reference=chart.speed_reference,
-            paths=flow.site(self.intrinsics),
+            paths=paths.model(self.intrinsics),
         )

@@ -1,9 +1,9 @@
-"""Whether an estimate may begin where the last one ended, or has to look at all poses again.
+"""The warm start: a window is fitted where the last one ended, or all poses are searched again.
 
-Of almost the same tracks the likelihood has almost the same peaks, and Gauss-Newton ends at them
-wherever near them it begins. What may have changed with a few new tracks is which peak is the
+Of almost the same tracks the likelihood has almost the same modes, and Gauss-Newton ends at them
+wherever near them it begins. What may have changed with a few new tracks is which mode is the
 highest, and whether one pose explains all tracks: any sign of that, and a share of the window that
-is new since all poses were looked at, sends an estimate to the full search.
+is new since all poses were searched, leads to the full search.
 """
 
 from dataclasses import dataclass
@@ -14,149 +14,154 @@ from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
 from models.geometry.pose_parameters import PARAMETERS
 from models.geometry.rotation import Array
-from models.pose.fusion import Around, FusedEstimate
+from models.pose import config
+from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, PoseFit
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes
 from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate
+from models.walking.fit import FitStart
 
-_FEWEST = 150  # tracks: of fewer a full search is soon made, and each of them counts for much
-_NEW = 0.5  # of the window: with a quarter, estimates are as near to those of all poses
-_FARTHEST = 1.0  # standard deviations that a few new tracks move a pose by
-_WIDER = 1.25  # times the standard deviation
-_WORSE = 10.0  # of the log likelihood: other ends are of some 40 less, or known
-_SUSPICION, _MORE_SUSPICION = 0.4, 1.25  # of the limit; times what it was where nothing was found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Posed:
-    """The pose of some tracks: `joint` by speeds alone, `fused` by places too."""
-
-    joint: JointEstimate
-    fused: FusedEstimate
+_FORMAT = Format(name="warm_start", version=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FullSearch:
-    """When all poses and all moments of a change were last looked at, and no change was found.
+    """The last search of all poses and of all places to cut, which found no change.
 
     `ended_s` (tracks,) is when each of its tracks ended, in order. `suspicion` is how much two
     poses explained speeds better than one when a change was last looked for, in units of the
-    limit; `fit` how well a walking group fitted the map. None is made of a window that was
+    limit; `path_fit` how well a walking group fitted the paths. None is made of a window that was
     suspected.
     """
 
     ended_s: Array
     suspicion: float
-    fit: float
+    path_fit: float
 
     @property
     def to_s(self) -> float:
-        """When the newest of its tracks ended."""
+        """The end of the newest of its tracks."""
         return float(self.ended_s[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settled:
-    """What of an estimate the next one goes by: few enough numbers to be stored with each.
+class RefinedPose:
+    """An estimate that the next one is held against.
 
-    `values` and `covariance` are the estimate's; `ends` (ends, parameters) is where its search
-    ended, the best first.
+    `modes` (modes, parameters) is where its search ended, the best first.
     """
 
     values: Array
     covariance: Array
-    ends: Array
+    modes: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LastPose:
-    """Where the next estimate may begin: the pose of almost the same tracks at the same site.
+class WarmStart:
+    """The start of a next estimate: the pose of almost the same tracks at the same site.
 
     `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
-    their fields. `fused` is by places too, where they are `registered`: what they determine
-    together is `identifiable`, and `said` is the code of what was to be said of the map. `around`
-    is what else was found at its end, where there was a single one. `search` is when all other
-    poses were looked at.
+    the mixed model's fields there. `fused` is by places too, where they are `registered`: what they
+    determine together is `identifiable`, and `reason_code` says what was wrong with the paths.
+    `neighbourhood` is of its mode, where there was a single one. `search` is when all other poses
+    were searched.
     """
 
     prior: CameraPose
-    joint: Settled
+    joint: RefinedPose
     means: tuple[Array, ...]
-    fused: Settled
+    fused: RefinedPose
     registered: bool
     identifiable: tuple[str, ...]
-    said: str | None
+    reason_code: str | None
     search: FullSearch
-    around: Around | None = None
+    neighbourhood: PathNeighbourhood | None = None
+
+    @property
+    def speed_starts(self) -> tuple[FitStart, ...]:
+        """The modes of the speeds, to be fitted to almost the same tracks."""
+        return tuple(
+            FitStart(candidate=mode, means=self.means, warm=True) for mode in self.joint.modes
+        )
+
+    def suits(self, tracks: Observations) -> bool:
+        """True if tracks are so much the same that only its own modes are refined."""
+        # Late tracks are as new: a tracker may post yesterday's today.
+        new = int((~np.isin(tracks.ended_s, self.search.ended_s)).sum())
+        return (
+            tracks.tracks >= max(config.WARM_TRACKS, (1 - config.NEW) * self.search.ended_s.size)
+            and new <= config.NEW * tracks.tracks
+        )
+
+    def is_refined_by(self, found: PoseFit) -> bool:
+        """True if a pose that was fitted from here is another version of the same."""
+        joint, fused = found.joint, found.fused
+        worse = config.WORSE / max(joint.walking_groups, 1)
+        return (
+            joint.identifiable == PLANE_PARAMETERS
+            and fused.identifiable == self.identifiable
+            and fused.registered == self.registered
+            and _code(fused) == self.reason_code
+            and len(fused.modes) == len(self.fused.modes)
+            and found.mean_path_fit > self.search.path_fit - worse
+            and _is_near(joint, self.joint, PLANE_PARAMETERS)
+            and _is_near(fused, self.fused, self.identifiable)
+        )
+
+    def is_calm(self, suspicion: float) -> bool:
+        """True if tracks are no more suspected of a change than those were that had none."""
+        return suspicion <= max(config.SUSPICION, config.MORE_SUSPICION * self.search.suspicion)
 
 
-def last_pose(found: Posed, prior: CameraPose, search: FullSearch) -> LastPose | None:
-    """What a next estimate may begin at; None where that would have to look at all poses anyway."""
+def warm_start_of(found: PoseFit, prior: CameraPose, search: FullSearch) -> WarmStart | None:
+    """The warm start of a pose; None where the next search has to be a full one anyway."""
     joint, fused = found.joint, found.fused
     if joint.reason is not None or joint.identifiable != PLANE_PARAMETERS:
         return None
     if fused.identifiable[: len(PLANE_PARAMETERS)] != PLANE_PARAMETERS:
         return None
-    return LastPose(
+    return WarmStart(
         prior=prior,
-        joint=_settled(joint),
+        joint=_refined(joint),
         means=joint.means,
-        fused=_settled(fused),
+        fused=_refined(fused),
         registered=fused.registered,
         identifiable=fused.identifiable,
-        said=_code(fused),
+        reason_code=_code(fused),
         search=search,
-        around=fused.around if len(fused.ends) == 1 else None,
+        neighbourhood=fused.neighbourhood if len(fused.modes) == 1 else None,
     )
 
 
-def begins_at(last: LastPose, tracks: Observations) -> bool:
-    """Whether tracks are so much the same that their pose is looked for at the last one alone."""
-    # Late tracks are as new: a tracker may post yesterday's today.
-    new = int((~np.isin(tracks.ended_s, last.search.ended_s)).sum())
-    return (
-        tracks.tracks >= max(_FEWEST, (1 - _NEW) * last.search.ended_s.size)
-        and new <= _NEW * tracks.tracks
-    )
+def warm_start_to_bytes(warm_start: WarmStart) -> bytes:
+    """A warm start as it is stored with each estimate: some kilobytes."""
+    return to_bytes(_FORMAT, flattened(warm_start))
 
 
-def is_as_before(found: Posed, last: LastPose) -> bool:
-    """Whether a pose that was looked for at the last one alone is another version of it."""
-    joint, fused = found.joint, found.fused
-    return (
-        joint.identifiable == PLANE_PARAMETERS
-        and fused.identifiable == last.identifiable
-        and fused.registered == last.registered
-        and _code(fused) == last.said
-        and len(fused.ends) == len(last.fused.ends)
-        and fit_of(found) > last.search.fit - _WORSE / max(joint.walking_groups, 1)
-        and _is_near(joint, last.joint, PLANE_PARAMETERS)
-        and _is_near(fused, last.fused, last.identifiable)
-    )
+def warm_start_from_bytes(data: bytes) -> WarmStart:
+    """The warm start of `warm_start_to_bytes`.
 
-
-def is_calm(suspicion: float, last: LastPose) -> bool:
-    """Whether tracks are no more suspected of a change than those were that had none."""
-    return suspicion <= max(_SUSPICION, _MORE_SUSPICION * last.search.suspicion)
-
-
-def fit_of(posed: Posed) -> float:
-    """How well a walking group fits the map, in the mean."""
-    return posed.fused.fit / max(posed.joint.walking_groups, 1)
+    Raises:
+        CheckpointError: the bytes are no warm start of this format.
+    """
+    return restored(WarmStart, from_bytes(_FORMAT, data))
 
 
 def _code(fused: FusedEstimate) -> str | None:
     return None if fused.reason is None else str(fused.reason.code)
 
 
-def _settled(found: JointEstimate | FusedEstimate) -> Settled:
-    ends = np.array(found.ends, dtype=np.float64).reshape(-1, found.values.size)
-    return Settled(values=found.values, covariance=found.covariance, ends=ends)
+def _refined(found: JointEstimate | FusedEstimate) -> RefinedPose:
+    modes = np.array(found.modes, dtype=np.float64).reshape(-1, found.values.size)
+    return RefinedPose(values=found.values, covariance=found.covariance, modes=modes)
 
 
-def _is_near(found: JointEstimate | FusedEstimate, last: Settled, asked: tuple[str, ...]) -> bool:
-    """Whether the parameters asked for are as before, and as sure."""
-    places = [PARAMETERS.index(name) for name in asked]
+def _is_near(
+    found: JointEstimate | FusedEstimate, last: RefinedPose, names: tuple[str, ...]
+) -> bool:
+    """True if the named parameters are as before, and as sure."""
+    places = [PARAMETERS.index(name) for name in names]
     sd, last_sd = (np.sqrt(np.diag(each.covariance)[places]) for each in (found, last))
-    near = np.abs(found.values - last.values)[places] <= _FARTHEST * np.minimum(sd, last_sd)
+    near = np.abs(found.values - last.values)[places] <= config.FARTHEST * np.minimum(sd, last_sd)
     ratio = sd / last_sd
-    return bool(near.all() and (ratio < _WIDER).all() and (ratio > 1 / _WIDER).all())
+    return bool(near.all() and (ratio < config.WIDER).all() and (ratio > 1 / config.WIDER).all())

@@ -23,7 +23,7 @@ from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode, Value
 from models.tracks.observations import Observations, of_tracks
 from models.walking import config
-from models.walking.fit import Channel, Fit, Near, fit_pose
+from models.walking.fit import Channel, Fit, FitStart, fit_pose
 from models.walking.groups import count_walking_groups
 from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
 from models.walking.speed_reference import SpeedReference, channels_of, pose_prior
@@ -59,9 +59,9 @@ class JointEstimate:
     means: tuple[Array, ...] = ()
 
     @property
-    def near(self) -> Near:
-        """Where a fit of almost the same tracks may begin."""
-        return Near(raw=self.raw, means=self.means)
+    def warm_start(self) -> FitStart:
+        """The start of a fit of almost the same tracks."""
+        return FitStart(candidate=self.raw, means=self.means, warm=True)
 
     @property
     def raw_parameters(self) -> PoseParameters:
@@ -69,8 +69,8 @@ class JointEstimate:
         return PoseParameters.of_array(self.raw)
 
     @property
-    def ends(self) -> tuple[Array, ...]:
-        """Where the search ended (3,) that explains the tracks, the best first; as `raw`."""
+    def modes(self) -> tuple[Array, ...]:
+        """The ends (3,) of the search, the best first; as `raw`."""
         offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
         return self.raw, *(other + offset for other in self.others)
 
@@ -89,48 +89,44 @@ def joint_estimate(
     observations: Observations,
     prior: CameraPose,
     reference: SpeedReference,
-    near: Sequence[Array] = (),
-    means: Sequence[Array] = (),
+    warm_starts: Sequence[FitStart] = (),
 ) -> JointEstimate:
     """The pose that explains all tracks best, whatever it was before.
 
-    Where it is known to be `near` one of the `ends` (3,) of an estimate of almost the same tracks,
-    with about its `means`, no other poses are looked at, and this one roughly.
+    From the modes of an estimate of almost the same tracks, `warm_starts`, no others are searched.
     """
     channels = channels_of(observations, reference, prior)
     hold = pose_prior(prior)
-    if not near:
+    begin = warm_starts
+    if not begin:
         few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
-        begin = starts(few, plane_parameters_of(prior), config.STARTS)
-        first = _distinct([fit_pose(few, start, hold) for start in begin])
-        ends = _distinct([fit_pose(channels, fit.candidate, hold) for fit in first])
-    else:
-        ends = _distinct([fit_pose(channels, start, hold, means, roughly=True) for start in near])
+        found = starts(few, plane_parameters_of(prior), config.STARTS)
+        first = _distinct([fit_pose(few, FitStart(candidate=start), hold) for start in found])
+        begin = [FitStart(candidate=fit.candidate) for fit in first]
+    ends = _distinct([fit_pose(channels, start, hold) for start in begin])
     heads = head_estimate(observations.heads, reference.heads)
     return _estimate_of(observations, channels, ends, reference, heads)
 
 
-def joint_near(
+def joint_at_heading(
     observations: Observations,
     prior: CameraPose,
     reference: SpeedReference,
     candidate: Array,
     joint: JointEstimate | None = None,
-    near: Near | None = None,
+    warm_start: FitStart | None = None,
 ) -> JointEstimate:
-    """The same with a heading that is known by now, from tilt, roll, log height, heading (4,) on.
+    """The joint estimate with the heading of a candidate (4,), tilt, roll, log height, heading.
 
     How fast people are where, and which way, is another question once a camera has been panned.
-    What their heads say, the joint estimate's `heads`, is not. Where it is known what almost
-    the same tracks said, it is looked for `near` that, roughly.
+    What their heads say, the `joint` estimate's `heads`, is not. It begins at the warm start, or
+    else at the candidate.
     """
     heads, means = (None, ()) if joint is None else (joint.heads, joint.means)
-    start = candidate[:3] + reference.offset
-    if near is not None:
-        start, means = near.raw, near.means
+    start = warm_start or FitStart(candidate=candidate[:3] + reference.offset, means=means)
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
-    fit = fit_pose(channels, start, pose_prior(prior), means, roughly=near is not None)
+    fit = fit_pose(channels, start, pose_prior(prior))
     return _estimate_of(observations, channels, [fit], reference, heads)
 
 

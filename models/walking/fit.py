@@ -71,11 +71,16 @@ class PosePrior:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Near:
-    """Where a fit ended: `raw` (3,), and the coefficients of its fields there."""
+class FitStart:
+    """Where Gauss-Newton begins: `candidate` (3,), and the coefficients of the fields there.
 
-    raw: Array
-    means: tuple[Array, ...]
+    Without `means` they begin at what was learned. `warm` is where a fit of almost the same tracks
+    ended: from there it ends once hardly anything moves.
+    """
+
+    candidate: Array
+    means: tuple[Array, ...] = ()
+    warm: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,9 +99,9 @@ class Fit:
     means: tuple[Array, ...]
 
     @property
-    def near(self) -> Near:
-        """Where a fit of almost the same tracks may begin."""
-        return Near(raw=self.candidate, means=self.means)
+    def warm_start(self) -> FitStart:
+        """The start of a fit of almost the same tracks."""
+        return FitStart(candidate=self.candidate, means=self.means, warm=True)
 
 
 def assumed(field: Field, components: VarianceComponents) -> Learned:
@@ -144,20 +149,10 @@ def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
     return h_log_likelihood(residual, weights, measured.rows, learned.components)
 
 
-def fit_pose(
-    channels: Sequence[Channel],
-    start: Array,
-    prior: PosePrior,
-    means: Sequence[Array] = (),
-    *,
-    roughly: bool = False,
-) -> Fit:
-    """Tilt, roll and log height from a start (3,), together with the fields' coefficients.
-
-    These begin at the `means` of a fit near by; at what was learned, unless they are given. It goes
-    on until nothing moves, or `roughly`, until hardly anything does.
-    """
-    candidate = start.astype(np.float64)
+def fit_pose(channels: Sequence[Channel], start: FitStart, prior: PosePrior) -> Fit:
+    """Tilt, roll and log height, together with the fields' coefficients."""
+    candidate = start.candidate.astype(np.float64)
+    means: Sequence[Array] = start.means
     if len(means) != len(channels):
         means = [channel.learned.mean for channel in channels]
     precisions = [np.linalg.inv(channel.learned.covariance) for channel in channels]
@@ -192,7 +187,7 @@ def fit_pose(
         ]
         if np.abs(share * move).max() < config.CONVERGED:
             break
-        if roughly and share * share * float(move @ matrix @ move) < config.ROUGHLY**2:
+        if start.warm and share * share * float(move @ matrix @ move) < config.ROUGHLY**2:
             break
     log_likelihood = -0.5 * float((((candidate - prior.mean) / prior.sd) ** 2).sum())
     for channel, mean in zip(channels, means, strict=True):

@@ -16,7 +16,7 @@ from models.monitoring.serialization import (
     creep_log_from_bytes,
     creep_log_to_bytes,
 )
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import (
     CameraSite,
     Creep,
@@ -49,10 +49,10 @@ class LearnedPaths:
 
 def paths_of(site: CameraSite) -> LearnedPaths | None:
     """The map and the chart of a site; None where too few walking groups walk."""
-    if site.flow is None:
+    if site.paths is None:
         return None
     return LearnedPaths(
-        flow=flow_to_bytes(site.flow),
+        flow=paths_to_bytes(site.paths),
         chart=None if site.chart is None else chart_to_bytes(site.chart),
     )
 
@@ -193,7 +193,7 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     Raises:
         CheckpointError: what is stored cannot be read.
     """
-    return replace(site, flow=flow_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
+    return replace(site, paths=paths_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
 
 
 def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:

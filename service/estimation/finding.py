@@ -9,7 +9,7 @@ import numpy as np
 from models.monitoring.chart import ChartResult
 from models.monitoring.config import CREEP_SHARE
 from models.monitoring.serialization import chart_from_bytes
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import paths_from_bytes
 from models.pose import (
     AlarmRate,
     CameraSite,
@@ -22,7 +22,7 @@ from models.pose import (
     estimate_pose,
     observe_walks,
 )
-from models.pose.fusion import FusedEstimate
+from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 from models.regression.averaging import (
     FEWEST_TRACKS,
@@ -105,7 +105,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         look_twice if asked_enough(evidence) else None,
         begin_of(evidence.last, basis),
     )
-    failures.take(found.lacks)
+    failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
     seen = evidence.tracks[found.first :]
@@ -121,7 +121,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         pieces=walks.reason,
         failures=tuple(failures.reasons),
-        last=kept_of(found.last, basis),
+        last=kept_of(found.warm_start, basis),
     )
 
 
@@ -146,14 +146,14 @@ def _site_of(evidence: Evidence, observed: Observations, failures: PartialFailur
     speed_reference = reference_from_bytes(evidence.site)
     flow, chart = None, None
     if evidence.flow is not None:
-        flow = failures.unless_failed("flow_map", partial(flow_from_bytes, evidence.flow))
+        flow = failures.unless_failed("flow_map", partial(paths_from_bytes, evidence.flow))
     if flow is not None and evidence.chart is not None:
         chart = failures.unless_failed("chart", partial(chart_from_bytes, evidence.chart))
     return CameraSite(
         intrinsics=evidence.intrinsics,
         prior=evidence.prior,
         speed_reference=speed_reference,
-        flow=flow,
+        paths=flow,
         chart=chart,
     )
 

@@ -16,9 +16,9 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.monitoring.serialization import creep_log_from_bytes
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import paths_from_bytes
 from models.pose import learn_site, observe, without_creep
-from models.pose.change_point import FEWEST_BESIDE
+from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.alerts.suspected_moves import SuspectedMove, suspected_moves
@@ -165,7 +165,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
         weights=weights,
-        chosen=None if period.kept is None else flow_from_bytes(period.kept).bandwidths,
+        chosen=None if period.kept is None else paths_from_bytes(period.kept).bandwidths,
     )
     return paths_of(grown)
 

@@ -8,7 +8,7 @@ import hashlib
 from sqlalchemy.orm import Session
 
 from models.errors import CheckpointError
-from models.pose import LastPose, last_pose_from_bytes, last_pose_to_bytes
+from models.pose import WarmStart, warm_start_from_bytes, warm_start_to_bytes
 from service.estimation.evidence import Evidence, KeptPose
 from service.store import flow_maps
 from service.store.flow_maps import LastPoseRecord
@@ -28,7 +28,7 @@ def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
     return digest.digest()
 
 
-def begin_of(kept: KeptPose | None, basis: bytes) -> LastPose | None:
+def begin_of(kept: KeptPose | None, basis: bytes) -> WarmStart | None:
     """The pose that an estimate may begin at; None where there is none on the same basis.
 
     One of another release cannot be read: that is as none.
@@ -36,14 +36,14 @@ def begin_of(kept: KeptPose | None, basis: bytes) -> LastPose | None:
     if kept is None or kept.basis != basis:
         return None
     try:
-        return last_pose_from_bytes(kept.data)
+        return warm_start_from_bytes(kept.data)
     except CheckpointError:
         return None
 
 
-def kept_of(last: LastPose | None, basis: bytes) -> KeptPose | None:
+def kept_of(last: WarmStart | None, basis: bytes) -> KeptPose | None:
     """The pose to be kept for the next estimate, if any."""
-    return None if last is None else KeptPose(basis=basis, data=last_pose_to_bytes(last))
+    return None if last is None else KeptPose(basis=basis, data=warm_start_to_bytes(last))
 
 
 def save_last_pose(session: Session, reference_id: int, kept: KeptPose | None) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from models.errors import CheckpointError
-from models.pose.partial_failures import Lack, unless_failed
+from models.pose.partial_failures import PartialFailure, unless_failed
 from models.reasons import Reason
 from service.reasons import ServiceCode
 
@@ -23,12 +23,12 @@ class PartialFailures:
 
     def unless_failed(self, part: str, make: Callable[[], _Made]) -> _Made | None:
         """Something made; None if it failed. `part` names it in the log, `flow_map` say."""
-        found: list[Lack] = []
+        found: list[PartialFailure] = []
         made = unless_failed(found, part, make)
         self.take(found)
         return made
 
-    def take(self, found: Sequence[Lack]) -> None:
+    def take(self, found: Sequence[PartialFailure]) -> None:
         """Log and say what failed."""
         for failure in found:
             fields = {"camera_id": self._camera_id}

@@ -106,7 +106,7 @@ def _tracks_until_drifting(learned: Learned, seen: Observations, limits: DriftLi
 
 def _pose_excess(learned: Learned, seen: Observations, limits: DriftLimits) -> float:
     """The largest identifiable drift of the pose by what is seen, in units of its limit."""
-    if learned.site.flow is None or seen.walkers < FEWEST_WALKERS:
+    if learned.site.paths is None or seen.walkers < FEWEST_WALKERS:
         return 0.0
     return judge(served_pose(seen, learned.site).drift, limits, ()).excess
 

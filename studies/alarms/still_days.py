@@ -82,9 +82,9 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
         if len(rest) < _FEWEST:
             return
         site = learn_site(observe(known, lens, prior), lens, prior)
-        if site.chart is None or site.flow is None:
+        if site.chart is None or site.paths is None:
             continue
-        chart, usual = site.chart, site.usual(site.flow, site.chart)
+        chart, usual = site.chart, site.usual(site.paths, site.chart)
         seen = observe(by_end(rest), lens, prior)
         scores = score_groups(seen, usual)
         groups_a_year = len(scores.last) * _YEAR_S / (float(rest[-1].time_s[0]) - learned_s)

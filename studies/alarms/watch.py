@@ -42,11 +42,11 @@ class Watch:
 
 def watch_over(site: CameraSite, *, alarms_a_year: float, groups_a_day: float) -> Watch | None:
     """The chart of a learned site at a level; None where too few people walked to learn one."""
-    if site.flow is None or site.chart is None:
+    if site.paths is None or site.chart is None:
         return None
     return Watch(
         chart=site.chart,
-        usual=site.usual(site.flow, site.chart),
+        usual=site.usual(site.paths, site.chart),
         ratios=ratios_of(site.chart),
         level=site.chart.level(RUN * alarms_a_year / (groups_a_day * DAYS)),
     )

@@ -63,7 +63,7 @@ def _draw_flow(scene: Path, path: Path) -> None:
     """The flow map under new tracks by the prior and by the fused pose, where there is a map."""
     learned = learn_case(draw_case(load_scene(scene), 0, PANNED))
     answer = fused(learned)
-    if learned.site.flow is None or answer.heading_rad is None:
+    if learned.site.paths is None or answer.heading_rad is None:
         return
     prior = learned.case.prior_pose
     pose = replace(pose_of_plane_parameters(answer.values, prior), heading_rad=answer.heading_rad)

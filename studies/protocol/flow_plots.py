@@ -9,7 +9,8 @@ import numpy as np
 from models.geometry.ground import ground_from_pixel
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
-from models.paths.map.density_map import DIRECTIONS, FlowMap
+from models.paths.config import DIRECTIONS
+from models.paths.density_map import PathDensityMap
 from studies.protocol.flow_curves import CurvePoint
 from studies.protocol.learned import Learned
 from studies.protocol.plots import COLORS, pyplot_of_files
@@ -33,8 +34,8 @@ def plot_flow(learned: Learned, poses: Mapping[str, CameraPose], path: Path) -> 
     arrow, or, where about as many come as go, a line.
     The camera is a triangle, its view's edge on the ground is dashed. Axes are the world's.
     """
-    assert learned.site.flow is not None
-    flow = learned.site.flow.flow
+    assert learned.site.paths is not None
+    flow = learned.site.paths.density
     pyplot = pyplot_of_files()
     count = len(poses)
     low, high = _window(flow)
@@ -120,7 +121,7 @@ def curve_of(points: Sequence[CurvePoint]) -> Array:
     return np.array(sorted(rows)).reshape(-1, 2)
 
 
-def _draw_map(panel: Any, flow: FlowMap) -> Any:
+def _draw_map(panel: Any, flow: PathDensityMap) -> Any:
     """Densities over places in colours, and lines along the way where it is clear."""
     density = _all_day(flow)
     places = density.sum(axis=2)
@@ -148,7 +149,7 @@ def _draw_map(panel: Any, flow: FlowMap) -> Any:
     return image
 
 
-def _draw_ways(panel: Any, flow: FlowMap, shown: Mask, way: Array, *, headed: bool) -> None:
+def _draw_ways(panel: Any, flow: PathDensityMap, shown: Mask, way: Array, *, headed: bool) -> None:
     at = np.argwhere(shown)
     heads = {} if headed else {"headwidth": 0, "headlength": 0, "headaxislength": 0}
     panel.quiver(
@@ -182,7 +183,7 @@ def _on_ground(learned: Learned, pose: CameraPose, uv: Array) -> Array:
     return np.where(near[:, None], ground, np.nan)
 
 
-def _window(flow: FlowMap) -> tuple[Array, Array]:
+def _window(flow: PathDensityMap) -> tuple[Array, Array]:
     """Corners (2,) of a rectangle that holds the camera and nearly all people, with a border."""
     places = _all_day(flow).sum(axis=2)
     walked = np.argwhere(places > places.max() * 10.0 ** (-_DECADES / 2))
@@ -191,6 +192,6 @@ def _window(flow: FlowMap) -> tuple[Array, Array]:
     return ends.min(axis=0) - _AROUND_M, ends.max(axis=0) + _AROUND_M
 
 
-def _all_day(flow: FlowMap) -> Array:
+def _all_day(flow: PathDensityMap) -> Array:
     """Densities (X, Y, 16) of all parts of the day together."""
     return np.asarray(np.exp(flow.log_density).mean(axis=0))

@@ -6,20 +6,18 @@ import numpy as np
 
 from models.geometry.plane_parameters import PLANE_PARAMETERS, identifiable_of
 from models.geometry.rotation import Array
-from models.paths.likelihood import Walkers, walkers_of
+from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
 from models.paths.registration import (
     Belief,
     Peak,
     Posterior,
-    Site,
-    curvature_of,
+    refined,
     register,
-    settled,
     shape_at,
 )
 from models.pose import CameraSite, Observations
-from models.pose.modes import elsewhere
+from models.pose.modes import covariance_between
 from studies.protocol.cases import Answer, nothing_identifiable
 from studies.protocol.learned import Learned
 from studies.protocol.served import served_pose
@@ -57,25 +55,30 @@ def served_answer(seen: Observations, site: CameraSite) -> Answer:
 
 def registration(learned: Learned) -> Answer:
     """The flow map alone, around the prior pose: nothing is known of speeds."""
-    case, reference = learned.case, learned.site.flow
+    case, reference = learned.case, learned.site.paths
     if reference is None:
         return nothing_identifiable(case)
     mean = candidate_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
     if walkers.walking_groups < _FEWEST:
         return nothing_identifiable(case)
-    site, variance_inflation = (
-        reference.site(case.intrinsics),
+    paths, variance_inflation = (
+        reference.model(case.intrinsics),
         reference.variance_inflation_for(walkers.people),
     )
-    belief = Belief(mean=mean, precision=_BROAD)
-    peaks = _peaks(walkers, site, belief, variance_inflation)
+    posterior = Posterior(
+        walkers=walkers,
+        paths=paths,
+        belief=Belief(mean=mean, precision=_BROAD),
+        variance_inflation=variance_inflation,
+    )
+    peaks = _peaks(posterior)
     best = peaks[0]
-    shape = shape_at(walkers, site, best.candidate)
+    shape = shape_at(walkers, paths, best.candidate)
     known = reference.precision(shape, walkers.people, best.candidate - mean)
-    values, covariance = settled(walkers, site, belief, best, shape, known, reference.bias)
+    values, covariance = refined(posterior, best.candidate, shape, known, reference.bias)
     chances = np.exp([peak.value - best.value for peak in peaks])
-    covariance = covariance + elsewhere(peaks, chances)
+    covariance = covariance + covariance_between(peaks, chances)
     sd = np.sqrt(np.diag(covariance))[:3]
     answer = replace(
         nothing_identifiable(case),
@@ -85,11 +88,9 @@ def registration(learned: Learned) -> Answer:
     return _with_heading(answer, values, covariance)
 
 
-def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: float) -> list[Peak]:
+def _peaks(posterior: Posterior) -> list[Peak]:
     """Peaks under a broad belief, the highest first, climbed to from the likeliest nodes."""
-    posterior = Posterior(
-        walkers=walkers, site=site, belief=belief, variance_inflation=variance_inflation
-    )
+    belief = posterior.belief
     turns = np.outer(_HEADINGS, [0.0, 0.0, 0.0, 1.0])
     starts = {
         number: float(posterior.values(belief.mean + node + turns).max())
@@ -101,8 +102,8 @@ def _peaks(walkers: Walkers, site: Site, belief: Belief, variance_inflation: flo
         around = replace(belief, mean=belief.mean + node)
         for peak in register(replace(posterior, belief=around), _HEADINGS):
             # The belief stood at the node; one step takes the peak to where it is around the mean.
-            bent = curvature_of(walkers, site, peak.candidate)
-            precision = bent / variance_inflation + belief.precision
+            bent = shape_at(posterior.walkers, posterior.paths, peak.candidate).curvature
+            precision = bent / posterior.variance_inflation + belief.precision
             candidate = peak.candidate - np.linalg.solve(precision, belief.precision @ node)
             if all(np.abs(candidate - other.candidate).max() > _SAME_END for other in peaks):
                 value = float(posterior.values(candidate[None])[0])

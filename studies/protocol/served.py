@@ -19,6 +19,6 @@ def served_pose(
             is a fault.
     """
     found = estimate_pose(tracks, site, second_look)
-    if found.lacks:
-        raise found.lacks[0].error
+    if found.failures:
+        raise found.failures[0].error
     return found

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from models.paths.map.density_map import Bandwidths
+from models.paths.density_map import Bandwidths
 
 _ROOT = Path(__file__).parents[2]
+_COARSE = Bandwidths(place_m=1.0, direction_kappa=6.0)
 
 
 def _none_of_points(uv_or_time: Any, *_: Any) -> Any:
@@ -129,47 +130,49 @@ PARTS: dict[str, Part] = {
     ),
     "bandwidths": Part(
         words="the map's bandwidths are chosen by people left out",
-        off=(("models.paths.folds:best_bandwidths", lambda *_: Bandwidths()),),
-        source=("models.paths.site_map:best_bandwidths",),
+        off=(("models.paths.folds:best_bandwidths", lambda *_: _COARSE),),
+        source=("models.paths.map_learning:best_bandwidths",),
     ),
     "path test": Part(
         words="a map that does not fit has no part",
         off=(("models.paths.path_test:UsualFit.has_changed", lambda *_: False),),
         source=("models.paths.path_test:UsualFit.has_changed",),
     ),
-    "known ground": Part(
-        words="no heading is told on ground that the reference never saw",
-        off=(("models.pose.fusion:on_known_ground", lambda *_: True),),
-        source=("models.paths.heading:on_known_ground", "models.paths.heading:known_share"),
+    "seen ground": Part(
+        words="no heading is identifiable on ground that the reference never saw",
+        off=(("models.pose.fusion:on_seen_ground", lambda *_: True),),
+        source=("models.paths.heading:on_seen_ground",),
     ),
     "halves of the people": Part(
         words="the heading is less sure where halves find it apart",
-        off=(("models.pose.fusion:_unrepeated", _nothing(4)),),
-        source=("models.pose.fusion:_unrepeated", "models.paths.heading:variance_of_halves"),
+        off=(("models.pose.fusion:_covariance_of_halves", _nothing(4)),),
+        source=(
+            "models.pose.fusion:_covariance_of_halves",
+            "models.paths.heading:variance_of_halves",
+        ),
     ),
     "flat posterior": Part(
         words="a posterior flatter than its peak widens the heading",
-        off=(("models.pose.fusion:flatter", _nothing(4)),),
-        source=("models.pose.modes:flatter",),
+        off=(("models.pose.fusion:covariance_beyond_gaussian", _nothing(4)),),
+        source=("models.pose.modes:covariance_beyond_gaussian",),
     ),
     "Birge ratio": Part(
         words="speeds and places that disagree are less sure",
-        off=(("models.pose.fusion:apart", lambda *_: 1.0),),
-        source=("models.pose.modes:apart",),
+        off=(("models.pose.fusion:birge_ratio", lambda *_: 1.0),),
+        source=("models.pose.modes:birge_ratio",),
     ),
     "other modes": Part(
         words="other poses that explain the tracks widen the covariance",
-        off=(("models.pose.fusion:elsewhere", _nothing(4)),),
-        source=("models.pose.modes:elsewhere",),
+        off=(("models.pose.fusion:covariance_between", _nothing(4)),),
+        source=("models.pose.modes:covariance_between",),
     ),
     "change search": Part(
         words="a window begins anew at a change",
-        off=(("models.pose.change_search:_suspected", lambda *_: iter(())),),
+        off=(("models.pose.change_search:_suspects", lambda *_: iter(())),),
         source=(
             "models/pose/change_search.py",
             "models/pose/change_point.py",
-            "models/pose/confirmation.py",
-            "models/pose/after_change.py",
+            "models/pose/change_confirmation.py",
             "models/paths/turn_detection.py",
         ),
     ),

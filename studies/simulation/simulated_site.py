@@ -10,7 +10,7 @@ from models.errors import DegenerateGeometryError, TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import CameraSite, Observations, learn_site, observe
-from models.pose.fusion import FusedEstimate
+from models.pose.pose_fit import FusedEstimate
 from models.simulation.simulated_site import Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import Trajectory, by_end
 from studies.protocol.served import served_pose
@@ -87,7 +87,7 @@ def learn_simulated_site(simulated: SimulatedSite, reference: Observations) -> L
         speed_tracks=SPEED_TRACKS,
         chart=False,
     )
-    if site.flow is None:
+    if site.paths is None:
         raise TooFewTrajectoriesError("tracks: 12 that walk are needed for a flow map")
     return LearnedSite(simulated=simulated, site=site)
 

@@ -18,9 +18,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from models.paths.reference import learn_flow
+from models.paths.reference import learn_paths
 from models.pose.change_point import find_change
 from models.pose.fusion import fused_estimate
+from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
@@ -61,17 +62,18 @@ def _fused(console: Console) -> float:
     known, after = tracks_of(0, (PRIOR, max(MAPS)), (PANNED, TRACKS))
     tracks = seen(after)
     speeds = learn_speed_reference(seen(known[: min(MAPS)]), PRIOR, WalkConfig(), 0)
+    site = CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds)
     joint = joint_estimate(tracks, PRIOR, speeds)
     joint_s = _median_s(lambda: joint_estimate(tracks, PRIOR, speeds))
     console.print(f"joint estimate of {TRACKS} tracks, with a pan: {joint_s:.2f} s")
     slowest_s = 0.0
     for size in MAPS:
         reference_tracks = seen(known[:size])
-        flow = learn_flow(reference_tracks, LENS, PRIOR, 0)
+        flow = learn_paths(reference_tracks, LENS, PRIOR, 0)
         assert flow is not None
-        learned_s = _median_s(lambda of=reference_tracks: learn_flow(of, LENS, PRIOR, 0))
+        learned_s = _median_s(lambda of=reference_tracks: learn_paths(of, LENS, PRIOR, 0))
         fused_s = _median_s(
-            lambda flow=flow: fused_estimate(tracks, LENS, PRIOR, joint, speeds, flow)
+            lambda flow=flow: fused_estimate(tracks, replace(site, paths=flow), joint)
         )  # fmt: skip
         console.print(
             f"map of {size} tracks: learned in {learned_s:.2f} s ({learned_s / joint_s:.1f} joint "

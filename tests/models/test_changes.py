@@ -10,8 +10,8 @@ from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of
 from models.paths.turn_detection import moved_within
 from models.pose import estimate_pose, learn_site
-from models.pose.after_change import least_covariance
-from models.pose.change_search import posed
+from models.pose.change_confirmation import least_covariance
+from models.pose.change_search import pose_fit_of
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -47,8 +47,8 @@ def test_a_crowd_that_changes_its_ways_before_a_knocked_camera_is_no_move(site, 
     """First one lane's people, then the others': from the prior pose, that is a move."""
     tracks = window((lanes[:1], KNOCKED, 50), (lanes[1:], KNOCKED, 60), seed=5)
     at = candidate_of(PRIOR)
-    paths = site.flow.site(LENS)
-    assert moved_within(walkers_of(tracks, at), paths, at, site.flow.still, 1e-6) is not None
+    paths = site.paths.model(LENS)
+    assert moved_within(walkers_of(tracks, at), paths, at, site.paths.still, 1e-6) is not None
     assert estimate_pose(tracks, site).change_idx is None
 
 
@@ -67,7 +67,7 @@ def test_a_pose_after_a_change_is_less_sure_than_one_of_as_many_people(site, lan
     tracks = window((lanes, PRIOR, 80), (lanes, PANNED, 40), seed=7)
     found = estimate_pose(tracks, site)
     assert found.change_idx is not None
-    alone = posed(of_tracks(tracks, np.arange(found.first, tracks.tracks)), site)
+    alone = pose_fit_of(of_tracks(tracks, np.arange(found.first, tracks.tracks)), site)
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
     more = np.linalg.eigvalsh(found.fused.covariance - alone.fused.covariance)
     assert more.min() > -1e-12
@@ -75,7 +75,7 @@ def test_a_pose_after_a_change_is_less_sure_than_one_of_as_many_people(site, lan
 
 
 def test_no_people_are_surer_than_the_reference_s_were_twice_over(site):
-    few, many = (least_covariance(count, site.speed_reference, site.flow) for count in (10, 40))
+    few, many = (least_covariance(count, site.speed_reference, site.paths) for count in (10, 40))
     ratio = np.sqrt(np.diag(few) / np.diag(many))
     assert (ratio > 1.5).all()
     assert (ratio < 2.01).all()  # the root of four times as many

@@ -9,12 +9,12 @@ import pytest
 from models.errors import CheckpointError
 from models.geometry.pose import CameraPose
 from models.pose import (
+    config,
     estimate_pose,
-    last_pose_from_bytes,
-    last_pose_to_bytes,
     learn_site,
     observe,
-    warm_start,
+    warm_start_from_bytes,
+    warm_start_to_bytes,
 )
 from models.simulation.pose_offset import PoseOffset, offset_trajectory
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
@@ -58,10 +58,12 @@ def follow(every, site, window=WINDOW, step=STEP):
     for came in range(window, every.tracks + 1, step):
         since = max(since, came - window)
         tracks = of_tracks(every, np.arange(since, came))
-        full, found = estimate_pose(tracks, site), estimate_pose(tracks, site, last=last)
-        refined = found.last is not None and found.last.search.to_s < tracks.ended_s.max()
+        full, found = estimate_pose(tracks, site), estimate_pose(tracks, site, warm_start=last)
+        refined = (
+            found.warm_start is not None and found.warm_start.search.to_s < tracks.ended_s.max()
+        )
         yield full, found, refined
-        last, since = found.last, since + full.first
+        last, since = found.warm_start, since + full.first
 
 
 def apart(full, found):
@@ -109,17 +111,17 @@ def test_a_knock_in_mid_window_is_found_as_soon(site, people):
 
 def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     def came(tracks, last):
-        found = estimate_pose(tracks, site, last=last)
-        return found.last is None or found.last.search.to_s == tracks.ended_s.max()
+        found = estimate_pose(tracks, site, warm_start=last)
+        return found.warm_start is None or found.warm_start.search.to_s == tracks.ended_s.max()
 
     every = observe(people, LENS, PRIOR)
     first = of_tracks(every, np.arange(WINDOW))
-    last = estimate_pose(first, site).last
+    last = estimate_pose(first, site).warm_start
     near = of_tracks(every, np.arange(10, WINDOW + 10))
     assert not came(near, last)
     assert came(near, None)
     assert came(near, replace(last, prior=CameraPose(height_m=6.1, tilt_rad=0.3, roll_rad=0.0)))
-    better = replace(last.search, fit=last.search.fit + 1)
+    better = replace(last.search, path_fit=last.search.path_fit + 1)
     assert came(near, replace(last, search=better))  # it fits worse
     assert came(of_tracks(every, np.arange(85, 250)), last)  # more than half is new
     assert came(of_tracks(every, np.arange(60, WINDOW + 10)), last)  # the window was cut
@@ -128,36 +130,37 @@ def test_where_there_is_any_doubt_all_poses_are_tried(site, people):
     elsewhere = replace(last.fused, values=last.fused.values + [0.0, 0.02, 0.0, 0.0])
     assert came(near, replace(last, fused=elsewhere))  # it has moved by more than chance
     assert came(near, replace(last, registered=False))  # by a site without a map
-    assert came(near, replace(last, said="flow_changed"))
+    assert came(near, replace(last, reason_code="flow_changed"))
 
 
-def test_a_last_pose_that_was_stored_is_the_same_start(site, people):
+def test_a_warm_start_that_was_stored_is_the_same_start(site, people):
     every = observe(people, LENS, PRIOR)
-    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).last
-    data = last_pose_to_bytes(last)
+    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).warm_start
+    data = warm_start_to_bytes(last)
     assert len(data) < 8000
-    stored = last_pose_from_bytes(data)
-    assert last_pose_to_bytes(stored) == data
+    stored = warm_start_from_bytes(data)
+    assert warm_start_to_bytes(stored) == data
     near = of_tracks(every, np.arange(10, WINDOW + 10))
-    first, second = (estimate_pose(near, site, last=begin) for begin in (last, stored))
+    first, second = (estimate_pose(near, site, warm_start=begin) for begin in (last, stored))
     assert second.pose == first.pose
-    assert second.last.search.to_s == last.search.to_s  # no other poses were tried
-    with pytest.raises(CheckpointError, match="last_pose"):
-        last_pose_from_bytes(data[:-9])
+    assert second.warm_start.search.to_s == last.search.to_s  # no other poses were tried
+    with pytest.raises(CheckpointError, match="warm_start"):
+        warm_start_from_bytes(data[:-9])
 
 
 def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, people):
     every = observe(people, LENS, PRIOR)
-    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).last
+    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).warm_start
     near = of_tracks(every, np.arange(10, WINDOW + 10))
     variance = last.fused.covariance[3, 3]
 
     def added(share):
         wider = np.diag([0.0, 0.0, 0.0, share * variance])
-        begin = replace(last, around=replace(last.around, wider=wider))
-        found = estimate_pose(near, site, last=begin)
-        assert found.last.search.to_s == last.search.to_s  # no other poses were tried
-        return found.last.around.wider[3, 3] / variance
+        around = replace(last.neighbourhood, extra_covariance=wider)
+        begin = replace(last, neighbourhood=around)
+        found = estimate_pose(near, site, warm_start=begin)
+        assert found.warm_start.search.to_s == last.search.to_s  # no other poses were tried
+        return found.warm_start.neighbourhood.extra_covariance[3, 3] / variance
 
     assert added(0.05) == pytest.approx(0.05)
     assert added(0.2) != pytest.approx(0.2)
@@ -167,7 +170,7 @@ def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, peo
 @pytest.mark.parametrize("knock", [None, LARGE])
 def test_recorded_people_come_to_the_same(monkeypatch, knock):
     """The scene with the most people: as many as a window is refined with are in none of them."""
-    monkeypatch.setattr(warm_start, "_FEWEST", 100)
+    monkeypatch.setattr(config, "WARM_TRACKS", 100)
     scene = load_recording(SCENES / "wildtrack_c6")[0]
     tracks = by_end(track.trajectory for track in scene.tracks if track.trajectory.long_enough)
     lens, pose, half = scene.intrinsics, scene.true_pose, len(tracks) // 2

@@ -21,7 +21,7 @@ from models.pose import (
     observe,
 )
 from models.pose.change_point import find_change
-from models.pose.fusion import by_speeds_alone
+from models.pose.pose_fit import by_speeds_alone
 from models.simulation.simulated_site import SiteConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
@@ -71,7 +71,7 @@ def test_the_pose_is_from_the_change_on(site, window, tracks):
     assert alone.change_idx is None
     np.testing.assert_array_equal(found.fused.values, alone.fused.values)
     assert found.fused.registered
-    assert not found.lacks
+    assert not found.failures
 
 
 def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
@@ -124,8 +124,8 @@ def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, trac
     )
     assert evenly.speed_reference is faded.speed_reference is site.speed_reference
     assert evenly.chart.walking_groups > site.chart.walking_groups
-    assert site.flow.people < evenly.flow.people
-    assert faded.flow.people < evenly.flow.people
+    assert site.paths.people < evenly.paths.people
+    assert faded.paths.people < evenly.paths.people
 
 
 def test_speeds_of_the_first_tracks_and_a_map_of_all(site, tracks):
@@ -133,13 +133,13 @@ def test_speeds_of_the_first_tracks_and_a_map_of_all(site, tracks):
     found = learn_site(every, LENS, PRIOR, speed_tracks=150, chart=False)
     np.testing.assert_array_equal(found.speed_reference.offset, site.speed_reference.offset)
     assert found.chart is None
-    assert found.flow.people > site.flow.people
+    assert found.paths.people > site.paths.people
 
 
 def test_few_people_make_no_map_and_fewer_no_site(tracks):
     few = learn_site(seen(tracks[0][:8]), LENS, PRIOR)
     assert few.learned
-    assert (few.flow, few.chart) == (None, None)
+    assert (few.paths, few.chart) == (None, None)
     found = estimate_pose(seen(tracks[2]), few)
     assert not found.fused.registered
     assert alarm_chart_result(seen(tracks[2]), few, ONE_A_YEAR) is None
@@ -161,16 +161,16 @@ def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
 def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, tracks, fails_at):
     asked = seen(tracks[1])
     if fails_at == "search":
-        flow = replace(site.flow, still=replace(site.flow.still, covariance=np.eye(3)))
+        paths = replace(site.paths, still=replace(site.paths.still, covariance=np.eye(3)))
     else:
-        flow = replace(site.flow, bias=np.zeros(3))
-    spoilt = replace(site, flow=flow)
+        paths = replace(site.paths, bias=np.zeros(3))
+    spoilt = replace(site, paths=paths)
     found = estimate_pose(asked, spoilt)
-    (lack,) = found.lacks
+    (lack,) = found.failures
     assert lack.part == "flow_map"
     assert isinstance(lack.error, ValueError)
     assert not found.fused.registered
-    blind = estimate_pose(asked, replace(site, flow=None))
+    blind = estimate_pose(asked, replace(site, paths=None))
     assert found.change_idx == blind.change_idx
     np.testing.assert_array_equal(found.fused.values, blind.fused.values)
     with pytest.raises(ValueError, match="dimension|shape|broadcast|signature|match"):
@@ -203,7 +203,7 @@ def refusals(site, tracks):
         "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
         "estimate_pose": lambda: estimate_pose(mixed, site),
         "alarm_chart_result": lambda: alarm_chart_result(mixed, site, ONE_A_YEAR),
-        "score_groups": lambda: score_groups(mixed, site.usual(site.flow, site.chart)),
+        "score_groups": lambda: score_groups(mixed, site.usual(site.paths, site.chart)),
         "find_change": lambda: find_change(mixed, PRIOR, site.speed_reference),
         "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speed_reference, folds, 0),
     }

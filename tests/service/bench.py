@@ -8,7 +8,7 @@ import numpy as np
 
 from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose import CameraPose
-from models.pose.fusion import FusedEstimate, by_speeds_alone
+from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
 from service.estimation.estimates import save_estimate

@@ -69,7 +69,7 @@ def test_a_curve_has_medians_of_the_numbers_that_all_seeds_have():
 
 def test_pictures_are_written(scene, tmp_path):
     learned = learn_case(draw_case(scene, 1, PANNED))
-    assert learned.site.flow is not None
+    assert learned.site.paths is not None
     turned = replace(PRIOR, heading_rad=0.1)
     plot_flow(learned, {"prior": PRIOR, "fused": turned}, tmp_path / "flow.png")
     points = [

@@ -76,7 +76,7 @@ def test_speeds_make_the_map_surer(learned):
 
 
 def test_without_a_map_registration_says_nothing_and_fused_is_the_joint_estimate(learned):
-    blind = replace(learned, site=replace(learned.site, flow=None))
+    blind = replace(learned, site=replace(learned.site, paths=None))
     nothing = registration(blind)
     assert (nothing.tracks, nothing.identifiable, nothing.heading_rad) == (0, (), None)
     assert_array_equal(fused(blind).values, joint(blind).values)

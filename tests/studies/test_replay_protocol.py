@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.geometry.upright import tops_of_boxes
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site, observe
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory
@@ -49,8 +49,8 @@ def test_what_is_served_of_a_recorded_scene_is_the_offline_protocol(service, sce
     )
     drawn_by = service.settings.seed
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
-    stored = flow_from_bytes(flow_to_bytes(site.flow))
-    found = estimate_pose(seen, replace(site, flow=stored))
+    stored = paths_from_bytes(paths_to_bytes(site.paths))
+    found = estimate_pose(seen, replace(site, paths=stored))
     offline = found.fused
     pose = pose_of_plane_parameters(offline.values[:3], case.prior_pose)
     body = service.http.get(f"/cameras/{case.scene_id}-{knock}-{seed}/pose").json()

@@ -9,7 +9,7 @@ from models.geometry.pose import CameraPose
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, of_tracks
 from models.walking import config
-from models.walking.fit import assumed, fit_pose, held_out_log_likelihood
+from models.walking.fit import FitStart, assumed, fit_pose, held_out_log_likelihood
 from models.walking.heads.reference import learn_heads
 from models.walking.measures import measure_speeds
 from models.walking.mixed.variance_inflation import (
@@ -36,16 +36,17 @@ def learn_speed_reference(
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
     at, weak = plane_parameters_of(prior), pose_prior(prior)
+    start = FitStart(candidate=at)
     blank = assumed_speed_reference(observations, prior, walk)
     blank = _cross_validated(observations, prior, blank, seed)
     learned = learned_at(observations, prior, blank, config.EM_ROUNDS)
-    whole = fit_pose(channels_of(observations, learned, prior), at, weak)
+    whole = fit_pose(channels_of(observations, learned, prior), start, weak)
     offset = whole.candidate - at
     unlearned = _with_components(blank, learned)
 
     def error_ratio(train: Tracks, test: Tracks) -> float:
         part = learned_at(of_tracks(observations, train), prior, unlearned, 0)
-        fit = fit_pose(channels_of(of_tracks(observations, test), part, prior), at, weak)
+        fit = fit_pose(channels_of(of_tracks(observations, test), part, prior), start, weak)
         return squared_ratio(fit.candidate - at - offset, fit.covariance)
 
     walkers = np.unique(observations.steps.rows.owner_idx)

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from models.pose.change_point import FEWEST_BESIDE, find_change
+from models.pose.change_point import find_change
+from models.pose.config import FEWEST_BESIDE
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
@@ -51,7 +52,7 @@ def test_a_still_camera_has_no_change(known, pose):
 @pytest.mark.parametrize("after", [SLIGHT, KNOCKED, PRIOR])
 def test_a_look_from_the_pose_of_all_finds_the_same(known, after):
     tracks = window((PRIOR, 60), (after, 60))
-    near = joint_estimate(tracks, PRIOR, known).near
+    near = joint_estimate(tracks, PRIOR, known).warm_start
     assert find_change(tracks, PRIOR, known, near) == find_change(tracks, PRIOR, known)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from models.geometry.pose_parameters import PARAMETERS
-from models.pose.confirmation import moved_beyond_doubt
-from models.pose.fusion import FusedEstimate
+from models.pose.change_confirmation import moved_beyond_doubt
+from models.pose.pose_fit import FusedEstimate
 
 
 def estimate(values=(0.3, 0.0, 1.8, 0.1), covariance=None, identifiable=PARAMETERS):

@@ -201,5 +201,5 @@ def test_days_of_a_chart_begin_with_none(first):
     assert (log.day_idx.size, log.since_day) == (0, 3.0)
     assert log.reference_groups == site.chart.walking_groups
     assert np.linalg.eigvalsh(log.information).min() > 0
-    empty = score_groups(observe([], LENS, PRIOR), site.usual(site.flow, site.chart))
+    empty = score_groups(observe([], LENS, PRIOR), site.usual(site.paths, site.chart))
     assert not add_day(log, site.chart, 5, empty).pulls.any()

@@ -24,7 +24,7 @@ from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_gro
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.verdict_reasons import may_be_clock
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
@@ -62,9 +62,9 @@ def learned(lanes):
     known = walk(lanes, PRIOR, 200, 4)
     site = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     folds = fold_maps(known, LENS, AT, 0)
-    flow = learn_flow(known, LENS, PRIOR, 0, folds=folds)
+    flow = learn_paths(known, LENS, PRIOR, 0, folds=folds)
     chart = learn_chart(known, PRIOR, site, folds, 0)
-    return chart, Usual(prior=PRIOR, speed_reference=chart.speed_reference, paths=flow.site(LENS))
+    return chart, Usual(prior=PRIOR, speed_reference=chart.speed_reference, paths=flow.model(LENS))
 
 
 def turned(**by):

@@ -1,4 +1,4 @@
-"""The compiled loops of the flow map, against numbers by hand and differences of values.
+"""The compiled loops of the paths, against numbers by hand and differences of values.
 
 Most of the cameras look straight down, with the top of the picture north: a ray (x, y, 1) lands at
 h (x, -y), so that a density over the ground is h^2 times as much over the image, and its directions
@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import models.paths.compiled
+import models.paths
 from models.compiled import _Compiled
-from models.paths.likelihood import Walkers, anchored_scores, likelihood, track_values
-from models.paths.map import placement
-from models.paths.map.density_map import DIRECTIONS, FlowMap
-from models.paths.map.placement import place_steps
-from models.paths.map.view import Coverage, coverage_of, in_view, known_shares
+from models.paths.config import DIRECTIONS
+from models.paths.coverage import Coverage, anchored_shares, coverage_of, in_view
+from models.paths.density_map import PathDensityMap
+from models.paths.ground_steps import place_steps
+from models.paths.likelihood import PathModel, Walkers
 from models.tracks.observations import Rows, Steps
 from tests.models.sites import LENS
 
@@ -56,11 +56,15 @@ def walkers_between(starts: list, ends: list, owner_idx: list | None = None) -> 
     )
 
 
-def sloping_map(unseen_by_y: float = 0.0, unseen: float = 0.0) -> FlowMap:
+def model(density: PathDensityMap, coverage: Coverage) -> PathModel:
+    return PathModel(density=density, coverage=coverage, intrinsics=LENS)
+
+
+def sloping_map(unseen_by_y: float = 0.0, unseen: float = 0.0) -> PathDensityMap:
     """A map of 21 x 21 nodes, 1 m apart, around the foot; all linear, and any way as likely."""
     x, y = np.meshgrid(np.arange(-10.0, 11.0), np.arange(-10.0, 11.0), indexing="ij")
     log_density = np.repeat((BY_X * x + BY_Y * y - 4.0)[None, :, :, None], DIRECTIONS, axis=3)
-    return FlowMap(
+    return PathDensityMap(
         corner=np.array([-10.0, -10.0]),
         cell_m=1.0,
         log_density=log_density,
@@ -72,7 +76,7 @@ def sloping_map(unseen_by_y: float = 0.0, unseen: float = 0.0) -> FlowMap:
     )
 
 
-def rough_map(slots: int) -> FlowMap:
+def rough_map(slots: int) -> PathDensityMap:
     rng = np.random.default_rng(0)
     return replace(
         sloping_map(),
@@ -84,14 +88,14 @@ def rough_map(slots: int) -> FlowMap:
 def all_in_view(at: tuple[float, float] = (0.0, 0.0), slots: int = 1) -> Coverage:
     """One block, wholly in the picture, with everybody on it."""
     return Coverage(
-        places=np.array([at]), shares=np.ones((slots, 1)), unknown=np.zeros(1), block_m=0.5
+        places=np.array([at]), shares=np.ones((slots, 1)), unseen=np.zeros(1), block_m=0.5
     )
 
 
 def test_one_step_by_hand():
     """Ray (0.2, 0.1) to (0.4, 0.1): its middle lands at 5 (0.3, -0.1) m, and it goes east."""
     walkers = walkers_between([(0.2, 0.1)], [(0.4, 0.1)])
-    said = likelihood(walkers, sloping_map(), all_in_view(), LENS, DOWN)
+    said = model(sloping_map(), all_in_view()).likelihood(walkers, DOWN)
     x, y = 1.5, -0.5
     assert said.value == pytest.approx(BY_X * x + BY_Y * y - 4.0 + 2 * math.log(HEIGHT_M))
     turned = BY_X * y - BY_Y * x  # clockwise; straight down, rolling is the same
@@ -107,7 +111,7 @@ def test_one_step_by_hand():
 
 def test_off_the_grid_only_the_change_of_measure_has_a_slope():
     walkers = walkers_between([(2.9, 0.0)], [(3.1, 0.0)])  # 15 m to the east
-    said = likelihood(walkers, sloping_map(), all_in_view(), LENS, DOWN)
+    said = model(sloping_map(), all_in_view()).likelihood(walkers, DOWN)
     assert said.value == pytest.approx(-9.0 + 2 * math.log(HEIGHT_M))
     assert_allclose(said.scores, [[0, 0, 2, 0]], atol=1e-12)
 
@@ -115,11 +119,11 @@ def test_off_the_grid_only_the_change_of_measure_has_a_slope():
 def test_what_is_not_on_the_ground_costs_and_pulls_nowhere():
     """The second track ends above the horizon, and has no part in its score."""
     walkers = walkers_between([(0.0, 0.1), (0.0, 0.1)], [(0.1, 0.1), (0.0, -2.0)])
-    said = likelihood(walkers, sloping_map(), all_in_view((0.0, 8.0)), LENS, AHEAD)
+    said = model(sloping_map(), all_in_view((0.0, 8.0))).likelihood(walkers, AHEAD)
     assert said.values[1] == -30.0
     assert said.values[0] > -30.0
     assert not said.scores[1].any()
-    at_anchor = anchored_scores(walkers, sloping_map(), all_in_view((0.0, 8.0)), LENS, AHEAD, AHEAD)
+    at_anchor = model(sloping_map(), all_in_view((0.0, 8.0))).scores(walkers, AHEAD, AHEAD)
     assert at_anchor[0].any()
     assert not at_anchor[1].any()
     assert place_steps(walkers.steps, AHEAD).valid.tolist() == [True, False]
@@ -127,15 +131,15 @@ def test_what_is_not_on_the_ground_costs_and_pulls_nowhere():
 
 def test_who_is_out_of_sight_of_all_is_rare_and_not_impossible():
     walkers = walkers_between([(0.2, 0.1)], [(0.4, 0.1)])
-    seen = likelihood(walkers, sloping_map(), all_in_view(), LENS, DOWN)
-    behind = likelihood(walkers, sloping_map(), all_in_view((90.0, 0.0)), LENS, DOWN)
+    seen = model(sloping_map(), all_in_view()).likelihood(walkers, DOWN)
+    behind = model(sloping_map(), all_in_view((90.0, 0.0))).likelihood(walkers, DOWN)
     assert behind.value == pytest.approx(seen.value - math.log(1e-3))
 
 
 def test_unseen_ground_is_as_busy_as_is_likeliest():
     walkers = walkers_between([(0.0, 0.0)], [(0.1, 0.0)])
     flow = replace(sloping_map(unseen=1.0), log_density=np.full((1, 21, 21, DIRECTIONS), -6.0))
-    coverage = replace(all_in_view(), unknown=np.array([0.5]))
+    coverage = replace(all_in_view(), unseen=np.array([0.5]))
     found = []
     for log_busy in np.linspace(math.log(0.02), math.log(4.0), 9):
         busy = math.exp(log_busy)
@@ -143,7 +147,7 @@ def test_unseen_ground_is_as_busy_as_is_likeliest():
         found.append((value - 0.5 * (log_busy - math.log(0.5)) ** 2, value))
     _, by_hand = max(found)
     assert max(found) not in (found[0], found[-1])
-    said = likelihood(walkers, flow, coverage, LENS, DOWN)
+    said = model(flow, coverage).likelihood(walkers, DOWN)
     assert said.value == pytest.approx(by_hand + 2 * math.log(HEIGHT_M))
 
 
@@ -156,9 +160,9 @@ def test_nobody_says_nothing():
         rows=replace(walkers.steps.rows, owner_idx=np.empty(0, np.int64), time_s=np.empty(0)),
     )
     nobody = replace(walkers, steps=steps, weight=np.empty(0))
-    said = likelihood(nobody, sloping_map(), all_in_view(), LENS, DOWN)
+    said = model(sloping_map(), all_in_view()).likelihood(nobody, DOWN)
     assert (said.value, said.values.tolist(), said.scores.tolist()) == (0.0, [0.0], [[0.0] * 4])
-    assert not anchored_scores(nobody, sloping_map(), all_in_view(), LENS, DOWN, DOWN).any()
+    assert not model(sloping_map(), all_in_view()).scores(nobody, DOWN, DOWN).any()
 
 
 @pytest.mark.parametrize("slots", [1, 4])
@@ -172,13 +176,13 @@ def test_scores_of_each_track_are_differences_of_its_value(slots):
     ends = starts + rng.normal(0, 1e-4, (60, 2))
     walkers = walkers_between(starts.tolist(), ends.tolist(), (np.arange(60) // 3).tolist())
     flow, coverage = rough_map(slots), all_in_view((2.5, 8.0), slots)
-    said = likelihood(walkers, flow, coverage, LENS, AHEAD)
+    said = model(flow, coverage).likelihood(walkers, AHEAD)
 
     def values(candidate: np.ndarray) -> np.ndarray:
-        return track_values(walkers, flow, coverage, LENS, candidate[None])[0]
+        return model(flow, coverage).track_log_likelihoods(walkers, candidate[None])[0]
 
     assert_allclose(values(AHEAD), said.values, rtol=1e-13)
-    both = track_values(walkers, flow, coverage, LENS, np.array([AHEAD + 0.01, AHEAD]))
+    both = model(flow, coverage).track_log_likelihoods(walkers, np.array([AHEAD + 0.01, AHEAD]))
     assert_allclose(both, [values(AHEAD + 0.01), said.values], rtol=1e-13)
     assert coverage.seen_from(LENS, AHEAD)[0] == pytest.approx(1)
     for number, step in enumerate(1e-6 * np.eye(4)):
@@ -191,10 +195,10 @@ def test_anchored_scores_count_known_ground_as_seen_from_the_anchor():
     walkers = walkers_between([(0.2, 0.0)], [(0.4, 0.0)])
     flow = sloping_map(UNSEEN_BY_Y, 0.2)
     anchor = DOWN - [0, 0, 0, math.pi / 2]
-    said = likelihood(walkers, sloping_map(), all_in_view(), LENS, DOWN)
-    anchored = anchored_scores(walkers, flow, all_in_view(), LENS, DOWN, anchor)
-    here = anchored_scores(walkers, flow, all_in_view(), LENS, DOWN, DOWN)
-    share = known_shares(
+    said = model(sloping_map(), all_in_view()).likelihood(walkers, DOWN)
+    anchored = model(flow, all_in_view()).scores(walkers, DOWN, anchor)
+    here = model(flow, all_in_view()).scores(walkers, DOWN, DOWN)
+    share = anchored_shares(
         all_in_view(), flow, LENS, DOWN + 0.01 * np.concatenate([np.eye(4), -np.eye(4)]), DOWN
     )
     pull = (np.log(share[:4, 0]) - np.log(share[4:, 0])) / 0.02
@@ -202,16 +206,16 @@ def test_anchored_scores_count_known_ground_as_seen_from_the_anchor():
     assert_allclose(anchored[0, 2], (0.8 - UNSEEN_BY_Y * 1.5) * said.scores[0, 2], rtol=1e-9)
 
 
-def test_known_shares_go_by_the_part_of_the_picture():
+def test_anchored_shares_go_by_the_part_of_the_picture():
     """A camera turned to the east has at its right what is south; so the anchor has it east."""
     flow = sloping_map(UNSEEN_BY_Y, 0.3)
     east = DOWN + [0, 0, 0, math.pi / 2]
     coverage = all_in_view((1.0, 0.0))  # ahead of it: to the north, as the anchor sees it
     assert_allclose(
-        known_shares(coverage, flow, LENS, np.array([[DOWN, east]]), DOWN),
+        anchored_shares(coverage, flow, LENS, np.array([[DOWN, east]]), DOWN),
         [[[1 - 0.3], [1 - 0.3 - UNSEEN_BY_Y * 1.0]]],
     )
-    assert known_shares(coverage, flow, LENS, east, DOWN).shape == (1,)
+    assert anchored_shares(coverage, flow, LENS, east, DOWN).shape == (1,)
 
 
 def test_a_block_at_the_edge_is_in_view_by_halves():
@@ -245,17 +249,19 @@ def test_one_kind_of_arguments_is_compiled_whoever_calls():
         turned = replace(flow, unseen=np.asfortranarray(flow.unseen), cell_m=1, elsewhere=-9)
         for some, asked in ((flow, walkers), (turned, every_other)):
             coverage = coverage_of(some)
-            likelihood(asked, some, coverage, LENS, AHEAD)
-            track_values(asked, some, coverage, LENS, np.array([AHEAD, DOWN]))
-            track_values(asked, some, coverage, LENS, np.array([AHEAD, DOWN, DOWN]).T[:, :2].T)
+            model(some, coverage).likelihood(asked, AHEAD)
+            model(some, coverage).track_log_likelihoods(asked, np.array([AHEAD, DOWN]))
+            model(some, coverage).track_log_likelihoods(
+                asked, np.array([AHEAD, DOWN, DOWN]).T[:, :2].T
+            )
             place_steps(asked.steps, AHEAD)
-            anchored_scores(asked, some, coverage, LENS, AHEAD, DOWN)
+            model(some, coverage).scores(asked, AHEAD, DOWN)
             in_view(LENS, np.array([AHEAD, DOWN]), coverage.places, 1)
-            some.look(np.zeros((2, 2)).T, np.zeros(4)[::2], np.zeros(2, np.int64))
-            some.look_unseen(np.zeros((3, 2)))
-    rooms = [placement] + [
-        importlib.import_module(f"models.paths.compiled.{part.name}")
-        for part in pkgutil.iter_modules(models.paths.compiled.__path__)
+            some.log_density_at(np.zeros((2, 2)).T, np.zeros(4)[::2], np.zeros(2, np.int64))
+            some.unseen_at(np.zeros((3, 2)))
+    rooms = [
+        importlib.import_module(f"models.paths.{part.name}")
+        for part in pkgutil.iter_modules(models.paths.__path__)
     ]
     loops = {loop for room in rooms for loop in vars(room).values() if isinstance(loop, _Compiled)}
     assert len(loops) > 15

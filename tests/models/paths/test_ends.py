@@ -1,4 +1,4 @@
-"""Ends of climbs that are none."""
+"""Modes that are none, and what is added for flat ones."""
 
 import math
 from types import SimpleNamespace
@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from models.pose.modes import flatter, not_far_above
+from models.pose.modes import covariance_beyond_gaussian, not_far_above
 
 
 def end(height_m):
@@ -34,8 +34,8 @@ def spread(asked, sd):
 def test_a_posterior_that_is_twice_as_wide_as_its_peak_says_adds_the_difference():
     covariance = np.diag([0.01, 0.01, 0.01, 0.04])
     covariance[2, 3] = covariance[3, 2] = 0.01
-    assert np.abs(flatter(spread([], 0.2), covariance)).max() < 1e-7
-    added = flatter(spread([], 0.4), covariance)
+    assert np.abs(covariance_beyond_gaussian(spread([], 0.2), covariance)).max() < 1e-7
+    added = covariance_beyond_gaussian(spread([], 0.4), covariance)
     # Of t = -4 .. 4 weighed by exp(-t^2 / 8) the mean of t^2 is 16.792 / 4.898 = 3.4285.
     assert added[3, 3] == pytest.approx(2.4285 * 0.04, rel=1e-3)
     assert added[2, 3] == pytest.approx(added[3, 3] / 4)
@@ -46,5 +46,5 @@ def test_where_nothing_is_known_no_height_beyond_all_numbers_is_asked_for():
     covariance = np.diag([0.01, 0.01, 1e6, 0.04])
     covariance[2, 3] = covariance[3, 2] = 100.0  # 2,500 for each radian: exp(2,000) is no number
     asked = []
-    assert (flatter(spread(asked, 0.2), covariance) == 0).all()
+    assert (covariance_beyond_gaussian(spread(asked, 0.2), covariance) == 0).all()
     assert not asked

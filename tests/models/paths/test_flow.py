@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.geometry.ground_flow import rotation_and_turns
-from models.paths.compiled.step import slope_of, step_on_ground
-from models.paths.likelihood import likelihood, walkers_of
-from models.paths.map.density_map import DIRECTIONS
-from models.paths.map.placement import place_steps
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.config import DIRECTIONS
+from models.paths.ground_steps import place_steps, slope_of, step_on_ground
+from models.paths.likelihood import walkers_of
+from models.paths.reference import candidate_of, learn_paths
 from models.pose.fusion import fused_estimate
+from models.pose.site import CameraSite
 from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Steps
@@ -28,7 +28,7 @@ SITE = SiteConfig(aside_m=0.8, standing_share=0.0)
 @pytest.fixture(scope="module")
 def site():
     known, after, still = tracks_of(3, (PRIOR, 200), (TURNED, 100), (PRIOR, 100), config=SITE)
-    reference = learn_flow(seen(known), LENS, PRIOR, 0)
+    reference = learn_paths(seen(known), LENS, PRIOR, 0)
     speeds = learn_speed_reference(seen(known), PRIOR, WalkConfig(), 0)
     assert reference is not None
     return reference, speeds, seen(after), seen(still), seen(known)
@@ -83,45 +83,47 @@ def test_the_change_of_measure_is_the_jacobian_written_out():
 
 
 def test_the_density_is_one_in_all_and_high_where_people_walk(site):
-    flow, known = site[0].flow, site[4]
+    flow, known = site[0].density, site[4]
     node = flow.cell_m**2 * 2 * math.pi / DIRECTIONS
     assert np.exp(flow.log_density).sum() * node == pytest.approx(1, abs=1e-3)
     walkers = walkers_of(known, candidate_of(PRIOR))
     placed = place_steps(walkers.steps, candidate_of(PRIOR))
     all_day = np.zeros(len(placed.place), dtype=np.int64)
-    along, _, _ = flow.look(placed.place, placed.direction, all_day)
-    across, _, _ = flow.look(placed.place, placed.direction + math.pi / 2, all_day)
+    along, _, _ = flow.log_density_at(placed.place, placed.direction, all_day)
+    across, _, _ = flow.log_density_at(placed.place, placed.direction + math.pi / 2, all_day)
     assert np.mean(along) > np.mean(across) + 1
     assert np.mean(along) > flow.elsewhere + 4
 
 
 def test_slopes_of_the_map_are_those_of_differences(site):
     rng = np.random.default_rng(0)
-    flow = site[0].flow
+    flow = site[0].density
     place = flow.corner + rng.uniform(5, 30, (40, 2))
     direction = rng.uniform(-math.pi, math.pi, 40)
     all_day = np.zeros(40, dtype=np.int64)
 
     def value(place: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        return flow.look(place, direction, all_day)[0]
+        return flow.log_density_at(place, direction, all_day)[0]
 
-    _, by_place, by_direction = flow.look(place, direction, all_day)
-    unseen, unseen_by_place = flow.look_unseen(place)
+    _, by_place, by_direction = flow.log_density_at(place, direction, all_day)
+    unseen, unseen_by_place = flow.unseen_at(place)
     assert unseen.min() < 0.1 < 0.9 < unseen.max()
     for axis in (0, 1):
         step = 1e-7 * np.eye(2)[axis]
         found = (value(place + step, direction) - value(place - step, direction)) / 2e-7
         assert_allclose(by_place[:, axis], found, atol=1e-4)
-        found = flow.look_unseen(place + step)[0] - flow.look_unseen(place - step)[0]
+        found = flow.unseen_at(place + step)[0] - flow.unseen_at(place - step)[0]
         assert_allclose(unseen_by_place[:, axis], found / 2e-7, atol=1e-4)
     turned = value(place, direction + 1e-7) - value(place, direction - 1e-7)
     assert_allclose(by_direction, turned / 2e-7, atol=1e-4)
 
 
 def test_off_the_grid_is_elsewhere(site):
-    flow = site[0].flow
+    flow = site[0].density
     at = flow.corner[None] - 1.0
-    value, by_place, by_direction = flow.look(at, np.zeros(1), np.zeros(1, dtype=np.int64))
+    value, by_place, by_direction = flow.log_density_at(
+        at, np.zeros(1), np.zeros(1, dtype=np.int64)
+    )
     assert_allclose(value, flow.elsewhere)
     assert not by_place.any()
     assert not by_direction.any()
@@ -146,9 +148,9 @@ def test_scores_are_derivatives_of_the_likelihood(site):
     walkers = walkers_of(after, at)
 
     def value(candidate: np.ndarray) -> float:
-        return likelihood(walkers, reference.flow, reference.coverage, LENS, candidate).value
+        return reference.model(LENS).likelihood(walkers, candidate).value
 
-    said = likelihood(walkers, reference.flow, reference.coverage, LENS, at).scores.sum(axis=0)
+    said = reference.model(LENS).likelihood(walkers, at).scores.sum(axis=0)
     for number, step in enumerate(1e-3 * np.eye(4)):
         slope = (value(at + step) - value(at - step)) / 2e-3
         assert said[number] == pytest.approx(slope, rel=0.1, abs=0.1 * np.abs(said).max())
@@ -158,7 +160,11 @@ def test_a_turned_camera_is_told_with_its_heading(site):
     reference, speeds, after, still, _ = site
     for tracks, pose in ((after, TURNED), (still, PRIOR)):
         joint = joint_estimate(tracks, PRIOR, speeds)
-        fused = fused_estimate(tracks, LENS, PRIOR, joint, speeds, reference)
+        fused = fused_estimate(
+            tracks,
+            CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=reference),
+            joint,
+        )
         assert fused.registered
         assert fused.identifiable == ("tilt", "roll", "height", "heading")
         off = fused.values - candidate_of(pose)
@@ -170,9 +176,13 @@ def test_a_turned_camera_is_told_with_its_heading(site):
 def test_few_people_make_no_map_and_no_registration(site):
     reference, speeds, _, _, _ = site
     (few,) = tracks_of(3, (PRIOR, 8))
-    assert learn_flow(seen(few), LENS, PRIOR, 0) is None
+    assert learn_paths(seen(few), LENS, PRIOR, 0) is None
     joint = joint_estimate(seen(few[:3]), PRIOR, speeds)
-    fused = fused_estimate(seen(few[:3]), LENS, PRIOR, joint, speeds, reference)
+    fused = fused_estimate(
+        seen(few[:3]),
+        CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=reference),
+        joint,
+    )
     assert not fused.registered
     assert "heading" not in fused.identifiable
     assert_allclose(fused.values, [*joint.values, PRIOR.heading_rad])

@@ -8,9 +8,10 @@ import pytest
 
 from models.paths.likelihood import walkers_of
 from models.paths.path_test import UsualFit
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.paths.turn_detection import StillScores, learn_scores, moved_within
 from models.pose.fusion import fused_estimate
+from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
 from models.simulation.simulated_site import (
     Lane,
@@ -34,6 +35,10 @@ def feet(tracks):
     return observe([replace(track, top_v=None) for track in tracks], LENS)
 
 
+def camera_site(speeds, flow):
+    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=flow)
+
+
 @pytest.fixture(scope="module")
 def lanes():
     return draw_lanes(LENS, PRIOR, CONFIG, np.random.default_rng(3))
@@ -46,7 +51,7 @@ def known(lanes):
 
 @pytest.fixture(scope="module")
 def flow(known):
-    reference = learn_flow(known, LENS, PRIOR, 0)
+    reference = learn_paths(known, LENS, PRIOR, 0)
     assert reference is not None
     return reference
 
@@ -81,7 +86,7 @@ def test_a_move_is_found_where_it_happened_and_not_twice(lanes, flow):
     before = walk_site(LENS, PRIOR, lanes, CONFIG, 90, np.random.default_rng(9))
     after = walk_site(LENS, turned, lanes, CONFIG, 90, np.random.default_rng(10))
     later = [replace(track, time_s=track.time_s + 1e5) for track in after]
-    site = flow.site(LENS)
+    site = flow.model(LENS)
     both = walkers_of(feet(before + later), AT)
     found = moved_within(both, site, AT, flow.still, 1e-6)
     assert found is not None
@@ -96,7 +101,7 @@ def test_changed_paths_are_named_and_move_nothing(lanes, known, flow):
     new_lane = draw_new_lane(LENS, PRIOR, lanes, CONFIG, rng)
     changed = feet(walk_changed(LENS, PRIOR, lanes[1:], new_lane, CONFIG, 200, rng))
     joint = joint_estimate(changed, PRIOR, speeds)
-    fused = fused_estimate(changed, LENS, PRIOR, joint, speeds, flow)
+    fused = fused_estimate(changed, camera_site(speeds, flow), joint)
     assert fused.reason == Reason(code=TracksCode.PATHS_CHANGED)
     assert not fused.registered
     np.testing.assert_allclose(fused.values[:3], joint.values)
@@ -113,7 +118,7 @@ def test_times_that_are_wrong_change_no_paths(lanes, known, flow):
         for track in walk_site(LENS, PRIOR, lanes, CONFIG, 120, np.random.default_rng(12))
     ]
     joint = joint_estimate(feet(slow), PRIOR, speeds)
-    fused = fused_estimate(feet(slow), LENS, PRIOR, joint, speeds, flow)
+    fused = fused_estimate(feet(slow), camera_site(speeds, flow), joint)
     assert joint.values[2] == pytest.approx(math.log(1.5 * PRIOR.height_m), abs=0.15)
     assert fused.reason is None
     np.testing.assert_allclose(fused.covariance[:3, :3], joint.covariance)
@@ -146,23 +151,23 @@ def test_parts_of_the_day_are_told_apart_where_paths_swap(lanes):
             shift = hour * 3600 + number % 2 * day_s - track.time_s[0] + 20 * number
             tracks.append(replace(track, time_s=track.time_s + shift))
     tracks = by_end(tracks)
-    reference = learn_flow(feet(tracks), LENS, PRIOR, 0)
+    reference = learn_paths(feet(tracks), LENS, PRIOR, 0)
     assert reference is not None
-    assert reference.flow.slots == 4
+    assert reference.density.slots == 4
     mixed = [replace(t, time_s=t.time_s - t.time_s[0] + 20.0 * k) for k, t in enumerate(tracks)]
-    reference = learn_flow(feet(mixed), LENS, PRIOR, 0)
+    reference = learn_paths(feet(mixed), LENS, PRIOR, 0)
     assert reference is not None
-    assert reference.flow.slots == 1
+    assert reference.density.slots == 1
 
 
 def test_older_tracks_count_less(lanes, known):
-    counted = learn_flow(known, LENS, PRIOR, 0, np.linspace(0.01, 1, known.tracks))
-    evenly = learn_flow(known, LENS, PRIOR, 0)
+    counted = learn_paths(known, LENS, PRIOR, 0, np.linspace(0.01, 1, known.tracks))
+    evenly = learn_paths(known, LENS, PRIOR, 0)
     assert counted is not None
     assert evenly is not None
     assert evenly.people == pytest.approx(200, abs=2)
     assert counted.people == pytest.approx(150, abs=6)  # (sum w)^2 / sum w^2 of weights 0..1
-    assert counted.flow.people.sum() == pytest.approx(evenly.flow.people.sum() / 2, rel=0.05)
+    assert counted.density.people.sum() == pytest.approx(evenly.density.people.sum() / 2, rel=0.05)
 
 
 def test_a_site_that_looks_alike_after_a_turn_says_so():
@@ -176,12 +181,12 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     visible = spokes[4:9]
     rng = np.random.default_rng(13)
     known = feet(walk_site(LENS, PRIOR, visible, walked, 200, rng))
-    flow = learn_flow(known, LENS, PRIOR, 0)
+    flow = learn_paths(known, LENS, PRIOR, 0)
     assert flow is not None
     speeds = learn_speed_reference(known, PRIOR, WalkConfig(), 0)
     turned = replace(PRIOR, heading_rad=PRIOR.heading_rad + math.radians(12))
     after = feet(walk_site(LENS, turned, spokes[5:10], walked, 40, rng))
-    fused = fused_estimate(after, LENS, PRIOR, joint_estimate(after, PRIOR, speeds), speeds, flow)
+    fused = fused_estimate(after, camera_site(speeds, flow), joint_estimate(after, PRIOR, speeds))
     assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS

@@ -7,25 +7,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.errors import CheckpointError
-from models.paths.map.rounding import rounded
-from models.paths.map.view import coverage_of
-from models.paths.reference import learn_flow
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.coverage import coverage_of
+from models.paths.density_map import of_levels, to_levels
+from models.paths.reference import learn_paths
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
-NESTED = ("flow", "coverage", "still", "fit")
+NESTED = ("density", "coverage", "still", "fit")
 
 
 @pytest.fixture(scope="module")
 def learned():
     (known,) = tracks_of(3, (PRIOR, 60))
-    reference = learn_flow(seen(known), LENS, PRIOR, 0)
+    reference = learn_paths(seen(known), LENS, PRIOR, 0)
     assert reference is not None
     return reference
 
 
 def test_bytes_keep_a_learned_flow_to_the_bit(learned):
-    back = flow_from_bytes(flow_to_bytes(learned))
+    back = paths_from_bytes(paths_to_bytes(learned))
     pairs = [(back, learned)]
     pairs += [(getattr(back, part), getattr(learned, part)) for part in NESTED]
     for found, expected in pairs:
@@ -37,30 +37,30 @@ def test_bytes_keep_a_learned_flow_to_the_bit(learned):
 
 def test_rounding_changes_a_log_density_by_less_than_a_hundredth():
     rough = np.linspace(-30, 5, 9999)
-    assert_allclose(rounded(rough), rough, atol=0.008)
+    assert_allclose(of_levels(to_levels(rough)), rough, atol=0.008)
 
 
 def test_what_was_rounded_once_comes_back_to_the_bit(learned):
-    data = flow_to_bytes(learned)
-    assert flow_to_bytes(flow_from_bytes(data)) == data
+    data = paths_to_bytes(learned)
+    assert paths_to_bytes(paths_from_bytes(data)) == data
 
 
 def test_the_largest_map_is_some_hundred_kilobytes(learned):
     rng = np.random.default_rng(0)
     rough = np.log(rng.gamma(2.0, size=(1, 160, 160, 16))) - 9.0  # a map without any empty ground
     flow = replace(
-        learned.flow,
-        log_density=rounded(rough),
+        learned.density,
+        log_density=of_levels(to_levels(rough)),
         unseen=np.zeros((160, 160)),
         people=rng.gamma(2.0, size=(160, 160)).astype(np.float32),
     )
-    data = flow_to_bytes(replace(learned, flow=flow, coverage=coverage_of(flow)))
+    data = paths_to_bytes(replace(learned, density=flow, coverage=coverage_of(flow)))
     assert len(data) < 1_000_000
-    assert_array_equal(flow_from_bytes(data).flow.log_density, flow.log_density)
+    assert_array_equal(paths_from_bytes(data).density.log_density, flow.log_density)
 
 
 @pytest.mark.parametrize("wrong", [b"", b"nothing", b"PK\x03\x04 cut", None])
 def test_what_is_no_flow_is_named_so(learned, wrong):
-    data = flow_to_bytes(learned)[:-200] if wrong is None else wrong
+    data = paths_to_bytes(learned)[:-200] if wrong is None else wrong
     with pytest.raises(CheckpointError, match="not readable"):
-        flow_from_bytes(data)
+        paths_from_bytes(data)

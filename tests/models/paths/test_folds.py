@@ -6,8 +6,8 @@ import pytest
 
 from models.paths import folds
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of, learn_flow
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.reference import candidate_of, learn_paths
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import learn_site
 from models.tracks.trajectory import by_end
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
@@ -42,17 +42,17 @@ def asked(monkeypatch):
 
 
 def test_a_map_of_kept_bandwidths_is_that_of_chosen_ones(known, chosen, asked):
-    first = learn_flow(known, LENS, PRIOR, 0)
+    first = learn_paths(known, LENS, PRIOR, 0)
     assert len(asked) == 1
     again = learn_site(known, LENS, PRIOR, chart=False, chosen=first.bandwidths)
     assert len(asked) == 1
-    assert flow_to_bytes(again.flow) == flow_to_bytes(first)
-    assert again.flow.bandwidths == chosen
+    assert paths_to_bytes(again.paths) == paths_to_bytes(first)
+    assert again.paths.bandwidths == chosen
 
 
 def test_bytes_keep_them(known, chosen):
-    learned = learn_flow(known, LENS, PRIOR, 0)
-    assert flow_from_bytes(flow_to_bytes(learned)).bandwidths == chosen
+    learned = learn_paths(known, LENS, PRIOR, 0)
+    assert paths_from_bytes(paths_to_bytes(learned)).bandwidths == chosen
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.paths.reference import candidate_of, learn_flow
+from models.paths.reference import candidate_of, learn_paths
 from models.paths.registration import Belief
 from models.pose.fusion import fused_estimate
-from models.pose.modes import apart
+from models.pose.modes import birge_ratio
+from models.pose.site import CameraSite
 from models.reasons import TracksCode
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
-from models.walking.estimate import joint_estimate, joint_near
+from models.walking.estimate import joint_at_heading, joint_estimate
 from models.walking.reference.learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR, seen
 
@@ -38,7 +39,11 @@ def walk(lanes, pose, count, seed):
 @pytest.fixture(scope="module")
 def site(lanes):
     known = walk(lanes, PRIOR, 240, 4)
-    return learn_speed_reference(known, PRIOR, WalkConfig(), 0), learn_flow(known, LENS, PRIOR, 0)
+    return learn_speed_reference(known, PRIOR, WalkConfig(), 0), learn_paths(known, LENS, PRIOR, 0)
+
+
+def site_of(speeds, flow):
+    return CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=speeds, paths=flow)
 
 
 def panned(degrees):
@@ -48,7 +53,7 @@ def panned(degrees):
 def fused(tracks, site):
     speeds, flow = site
     joint = joint_estimate(tracks, PRIOR, speeds)
-    return joint, fused_estimate(tracks, LENS, PRIOR, joint, speeds, flow)
+    return joint, fused_estimate(tracks, site_of(speeds, flow), joint)
 
 
 @pytest.mark.parametrize("degrees", [-12, 12])
@@ -61,16 +66,14 @@ def test_a_pan_alone_moves_neither_tilt_nor_roll(lanes, site, degrees):
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 0.5
     assert abs(off[2]) < 0.03
     # The fast lane's people are where, and go as, they did: seen with the heading that they have.
-    assert (
-        joint_near(tracks, PRIOR, site[0], candidate_of(pose)).log_likelihood
-        > joint.log_likelihood + 1
-    )
+    turned = joint_at_heading(tracks, PRIOR, site[0], candidate_of(pose))
+    assert turned.log_likelihood > joint.log_likelihood + 1
 
 
 def test_speeds_asked_at_the_prior_heading_are_the_joint_estimate(lanes, site):
     tracks = walk(lanes, PRIOR, 60, 6)
     joint = joint_estimate(tracks, PRIOR, site[0])
-    near = joint_near(tracks, PRIOR, site[0], np.append(joint.values, PRIOR.heading_rad))
+    near = joint_at_heading(tracks, PRIOR, site[0], np.append(joint.values, PRIOR.heading_rad))
     np.testing.assert_allclose(near.values, joint.values, atol=1e-5)
     assert near.log_likelihood == pytest.approx(joint.log_likelihood, abs=1e-3)
 
@@ -79,8 +82,8 @@ def test_what_contradicts_is_less_sure_by_as_much():
     belief = Belief(mean=np.zeros(4), precision=np.diag([1.0, 1.0, 1.0, 1e-6]))
     known = np.diag([3.0, 1.0, 1.0, 1.0])
     # Speeds say 0, places 4 with a third of their variance: between them, 3; 3^2 + 3 (4 - 3)^2.
-    assert apart(belief, known, np.array([3.0, 0.0, 0.0, 0.0])) == pytest.approx(12 / 3)
-    assert apart(belief, known, np.array([0.1, 0.0, 0.0, 0.0])) == 1.0
+    assert birge_ratio(belief, known, np.array([3.0, 0.0, 0.0, 0.0])) == pytest.approx(12 / 3)
+    assert birge_ratio(belief, known, np.array([0.1, 0.0, 0.0, 0.0])) == 1.0
 
 
 def test_no_heading_is_identifiable_at_the_edge_of_the_search(lanes, site):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sqlalchemy import delete, select
 
-from models.paths.serialization import flow_from_bytes
+from models.paths.serialization import paths_from_bytes
 from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
@@ -76,7 +76,7 @@ def test_a_map_is_learned_with_its_reference(known):
     first = map_of(known)
     assert (first.tracks, first.weight) == (WANTED, WANTED)
     assert first.to_s == pytest.approx(ended(known, 0, WANTED)[-1])
-    assert flow_from_bytes(first.data).flow.log_density.shape[3] == 16
+    assert paths_from_bytes(first.data).density.log_density.shape[3] == 16
 
 
 def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
@@ -90,7 +90,7 @@ def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     assert grown.tracks == WANTED + 50  # the newest 60 are what it is to judge
     assert grown.to_s == pytest.approx(ended(known, 0, WANTED + 50)[-1])
     assert grown.data != first.data
-    assert flow_from_bytes(grown.data).bandwidths.tracks == WANTED  # kept: few more, the same hours
+    assert paths_from_bytes(grown.data).bandwidths.tracks == WANTED  # kept: the same hours
     known.look()
     assert map_of(known).learned_at == grown.learned_at
     known.keep_to_lanes(PRIOR, 20)

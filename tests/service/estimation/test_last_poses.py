@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.pose import last_pose_from_bytes
+from models.pose import warm_start_from_bytes
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.last_poses import basis_of, begin_of
@@ -34,9 +34,9 @@ def test_the_next_estimate_begins_at_the_last_and_comes_to_the_same(laned):
     laned.keep_to_lanes(PRIOR, 5)
     evidence = evidence_of(laned)
     found, full = compute_finding(evidence, 0), compute_finding(replace(evidence, last=None), 0)
-    before, after = (last_pose_from_bytes(each.last.data) for each in (evidence, found))
+    before, after = (warm_start_from_bytes(each.last.data) for each in (evidence, found))
     assert after.search.to_s == before.search.to_s < evidence.tracks[-1].ended_s  # no others tried
-    assert last_pose_from_bytes(full.last.data).search.to_s == evidence.tracks[-1].ended_s
+    assert warm_start_from_bytes(full.last.data).search.to_s == evidence.tracks[-1].ended_s
     sd = np.sqrt(np.diag(full.joint.covariance))
     assert (np.abs(found.joint.values - full.joint.values) < 0.05 * sd).all()
     assert found.fused.identifiable == full.fused.identifiable

@@ -7,7 +7,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from models.paths.serialization import flow_from_bytes, flow_to_bytes
+from models.paths.serialization import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site
 from models.walking.estimate import joint_estimate
 from models.walking.serialization import reference_from_bytes
@@ -28,7 +28,7 @@ def reference_of(street):
 
 
 def as_stored(flow):
-    return flow_from_bytes(flow_to_bytes(flow))
+    return paths_from_bytes(paths_to_bytes(flow))
 
 
 def served(body):
@@ -71,7 +71,7 @@ def test_what_is_served_is_what_the_estimator_says_offline(street):
     body = street.look()
     known, seen = street.observed(0, WANTED), street.observed(WANTED, WANTED + 50)
     site = learn_site(known, LENS, PRIOR)
-    found = estimate_pose(seen, replace(site, flow=as_stored(site.flow)))
+    found = estimate_pose(seen, replace(site, paths=as_stored(site.paths)))
     joint, offline = found.joint, found.fused
     tilt, roll, log_height, _ = offline.values
     assert served(body) == pytest.approx(

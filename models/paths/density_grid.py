@@ -1,4 +1,4 @@
-"""One place of the flow map: what its grid has there, between nodes, with slopes.
+"""The grid of a path density between its nodes, with slopes.
 
 Places are in metres from the camera's foot point, directions in radians from +X towards +Y.
 """
@@ -19,7 +19,7 @@ _LAST = 1.001  # nodes: on the last one a place has no cell any more
 
 
 class Grid(NamedTuple):
-    """A flow map's `log_density` (S, X, Y, W), `unseen` (X, Y), `corner` (2,) and the rest."""
+    """A map's `log_density` (S, X, Y, W), `unseen` (X, Y), `corner` (2,) and the rest."""
 
     log_density: Array
     unseen: Array
@@ -46,7 +46,7 @@ class Blend(NamedTuple):
     by_y: float
 
 
-class Look(NamedTuple):
+class LogDensity(NamedTuple):
     """A log density, and its slopes by place (1/m) and direction (1/rad)."""
 
     value: float
@@ -82,7 +82,7 @@ def blended(
 
 @compiled
 def unseen_at(grid: Grid, x_m: float, y_m: float) -> Blend:
-    """Which part of the ground at a place was not seen; 0 outside of the grid."""
+    """The part of the ground at a place that was not seen; 0 outside of the grid."""
     cell = cell_at(grid, x_m, y_m)
     if not cell.inside:
         return Blend(0.0, 0.0, 0.0)
@@ -121,11 +121,11 @@ def cubic(part: float) -> tuple[Four, Four]:
 
 
 @compiled
-def look_at(grid: Grid, slot: int, x_m: float, y_m: float, direction: float) -> Look:
+def log_density_at(grid: Grid, slot: int, x_m: float, y_m: float, direction: float) -> LogDensity:
     """The log density at a place and direction in a part of the day."""
     cell = cell_at(grid, x_m, y_m)
     if not cell.inside:
-        return Look(grid.elsewhere, 0.0, 0.0, 0.0)
+        return LogDensity(grid.elsewhere, 0.0, 0.0, 0.0)
     nodes, column, row = grid.log_density, cell.column, cell.row
     directions = nodes.shape[3]
     turns = direction * _TURNS_PER_RAD
@@ -149,11 +149,11 @@ def look_at(grid: Grid, slot: int, x_m: float, y_m: float, direction: float) -> 
         value_3, turning_3 = value_3 + share * node_3, turning_3 + slope * node_3
     at = blended(cell, grid.nodes_per_m, value_0, value_1, value_2, value_3)
     turning = blended(cell, grid.nodes_per_m, turning_0, turning_1, turning_2, turning_3)
-    return Look(at.value, at.by_x, at.by_y, turning.value * directions * _TURNS_PER_RAD)
+    return LogDensity(at.value, at.by_x, at.by_y, turning.value * directions * _TURNS_PER_RAD)
 
 
 @compiled
-def looks_at(
+def log_densities_at(
     grid: Grid, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
     """Log densities (M,) at places (M, 2), with slopes by place (M, 2) and direction (M,)."""
@@ -161,15 +161,15 @@ def looks_at(
     value, by_place, by_direction = np.empty(count), np.empty((count, 2)), np.empty(count)
     for number in range(count):
         x_m, y_m = place[number, 0], place[number, 1]
-        look = look_at(grid, slot_idx[number], x_m, y_m, direction[number])
-        value[number], by_direction[number] = look.value, look.by_direction
-        by_place[number, 0], by_place[number, 1] = look.by_x, look.by_y
+        found = log_density_at(grid, slot_idx[number], x_m, y_m, direction[number])
+        value[number], by_direction[number] = found.value, found.by_direction
+        by_place[number, 0], by_place[number, 1] = found.by_x, found.by_y
     return value, by_place, by_direction
 
 
 @compiled
 def unseen_at_places(grid: Grid, place: Array) -> tuple[Array, Array]:
-    """Which part (M,) of the ground at places (M, 2) was not seen, and its slopes (M, 2)."""
+    """The part (M,) of the ground at places (M, 2) that was not seen, and its slopes (M, 2)."""
     value, by_place = np.empty(len(place)), np.empty((len(place), 2))
     for number in range(len(place)):
         unseen = unseen_at(grid, place[number, 0], place[number, 1])

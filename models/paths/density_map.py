@@ -1,4 +1,6 @@
-"""The flow map: how often people are where, and which way they walk, on a grid of the ground.
+"""The path density map: how often people are where, and which way they walk, on a grid.
+
+Log densities are rounded to 1/64, so that they are the same offline as they are stored.
 
 Source: Silverman 1982, a kernel density by binning; von Mises kernels over directions are Hall,
 Watson and Cabrera's, 1987.
@@ -12,41 +14,31 @@ import numpy.typing as npt
 
 from models.durations import DAY_S
 from models.geometry.rotation import Array
-from models.paths.compiled.place import Grid, looks_at, unseen_at_places
-from models.paths.map.placement import Placement
-from models.paths.map.rounding import rounded
-
-DIRECTIONS = 16
-_CELL_M = 0.5
-_MOST_CELLS = 160  # along one side of the grid; a wider site has larger cells
-_MARGIN_M = 12.0  # around where people were seen: where a knock may put them
-_ANYWHERE = 0.1  # of all people walk anywhere in the grid, any way
-_ANY_WAY = 0.15  # of those at a place walk any way
-_QUANTILE = 0.002  # of the places at each side are left out of the grid
-_UNKNOWN_COST = 0.5  # of a person on ground that nobody knows, against the usual log density
-_SLOT_WEIGHT = 100.0  # people of the whole day that a part of the day begins with
+from models.paths import config
+from models.paths.density_grid import Grid, log_densities_at, unseen_at_places
+from models.paths.ground_steps import Placement
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bandwidths:
     """Of a map: the Gaussian's over places, the von Mises kernel's over directions, the day's.
 
-    `slots` is into how many parts the day falls.
+    `slots` is the number of equal parts of the day.
     """
 
-    place_m: float = 1.0
-    direction_kappa: float = 6.0  # 24 deg
+    place_m: float
+    direction_kappa: float
     slots: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlowMap:
+class PathDensityMap:
     """A log density (S, X, Y, 16) over place (1/m^2) and direction (1/rad) at grid nodes.
 
     Nodes stand `cell_m` apart from `corner` (2,) on; directions from +X on, evenly; S equal parts
     of the day from midnight UTC on, or one. `elsewhere` is the log density off the grid. `unseen`
     (X, Y) is how much of each node's ground the reference did not see. Were people as many there as
-    on the known ground, `log_level` would be their mean log density and `log_typical` that of a
+    on the seen ground, `log_level` would be their mean log density and `log_typical` that of a
     person: they heap on paths there, too. `people` (X, Y) is how
     many people's steps made a node: how sure it is.
     """
@@ -62,7 +54,7 @@ class FlowMap:
 
     @property
     def slots(self) -> int:
-        """Into how many parts the day falls."""
+        """The number of parts of the day."""
         return int(self.log_density.shape[0])
 
     def slot_of(self, time_s: Array) -> npt.NDArray[np.int64]:
@@ -80,19 +72,19 @@ class FlowMap:
             elsewhere=float(self.elsewhere),
         )
 
-    def look(
+    def log_density_at(
         self, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
     ) -> tuple[Array, Array, Array]:
         """Log densities (M,) and their derivatives by place (M, 2) and direction (M,)."""
-        return looks_at(
+        return log_densities_at(
             self.grid,
             np.ascontiguousarray(place),
             np.ascontiguousarray(direction),
             np.ascontiguousarray(slot_idx),
         )
 
-    def look_unseen(self, place: Array) -> tuple[Array, Array]:
-        """Which part (M,) of the ground at places was not seen, and its slopes (M, 2).
+    def unseen_at(self, place: Array) -> tuple[Array, Array]:
+        """The part (M,) of the ground at places that was not seen, and its slopes (M, 2).
 
         Outside of the grid both are 0.
         """
@@ -100,7 +92,7 @@ class FlowMap:
 
 
 def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
-    """Which of so many equal parts of a UTC day each time (M,) is in."""
+    """The one of so many equal parts of a UTC day that each time (M,) is in."""
     if slots == 1:
         return np.zeros(time_s.shape, dtype=np.int64)
     return np.floor(time_s % DAY_S / DAY_S * slots).astype(np.int64) % slots
@@ -112,7 +104,7 @@ def learn_map(
     time_s: Array,
     seen_at: Callable[[Array], Array],
     bandwidths: Bandwidths,
-) -> FlowMap:
+) -> PathDensityMap:
     """The map of steps seen from a known pose, each counted by its weight (M,).
 
     Args:
@@ -129,9 +121,9 @@ def learn_map(
     if not used.any():
         raise ValueError("steps: at least one must count, got none")
     place, direction, weight = placed.place[used], placed.direction[used], weight[used]
-    low, high = (np.quantile(place, q, axis=0) for q in (_QUANTILE, 1 - _QUANTILE))
-    low, high = low - _MARGIN_M, high + _MARGIN_M
-    cell_m = max(_CELL_M, float((high - low).max()) / (_MOST_CELLS - 2))
+    low, high = (np.quantile(place, q, axis=0) for q in (config.QUANTILE, 1 - config.QUANTILE))
+    low, high = low - config.MARGIN_M, high + config.MARGIN_M
+    cell_m = max(config.CELL_M, float((high - low).max()) / (config.MOST_CELLS - 2))
     size = np.ceil((high - low) / cell_m).astype(np.int64) + 2
     at = (place - low) / cell_m
     slots, sd = bandwidths.slots, bandwidths.place_m / cell_m
@@ -144,48 +136,51 @@ def learn_map(
     )
     whole = counts.sum(axis=0)
     if slots > 1:
-        counts = counts + _SLOT_WEIGHT * whole / whole.sum()
+        counts = counts + config.SLOT_PEOPLE * whole / whole.sum()
     counts = counts / counts.sum(axis=(1, 2, 3), keepdims=True)
-    counts = (1 - _ANY_WAY) * counts + _ANY_WAY * counts.mean(axis=3, keepdims=True)
-    share = counts * (1 - _ANYWHERE) + _ANYWHERE / whole.size
+    counts = (1 - config.ANY_WAY) * counts + config.ANY_WAY * counts.mean(axis=3, keepdims=True)
+    share = counts * (1 - config.ANYWHERE) + config.ANYWHERE / whole.size
     nodes = low + cell_m * np.indices(tuple(size.tolist())).reshape(2, -1).T
     seen = seen_at(nodes).reshape(size)
-    node = cell_m**2 * 2 * np.pi / DIRECTIONS
-    return FlowMap(
+    node = cell_m**2 * 2 * np.pi / config.DIRECTIONS
+    return PathDensityMap(
         corner=low,
         cell_m=cell_m,
-        log_density=rounded(np.log(share / node)),
-        elsewhere=float(np.log(_ANYWHERE / whole.size / node)),
+        log_density=of_levels(to_levels(np.log(share / node))),
+        elsewhere=float(np.log(config.ANYWHERE / whole.size / node)),
         unseen=np.rint((1 - seen) * 255) / 255,
-        log_level=float(-np.log(max(seen.sum(), 1.0) * DIRECTIONS * node)),
-        log_typical=float((share * np.log(share / node)).sum() / slots) - _UNKNOWN_COST,
+        log_level=float(-np.log(max(seen.sum(), 1.0) * config.DIRECTIONS * node)),
+        log_typical=float((share * np.log(share / node)).sum() / slots) - config.UNSEEN_COST,
         people=(whole.sum(axis=2) * 2 * np.pi * sd**2).astype(np.float32),
     )
 
 
 def _binned(at: Array, direction: Array, weight: Array, size: npt.NDArray[np.int64]) -> Array:
     """Weights spread linearly over the nodes (X, Y, 16) around each step."""
-    turn = (direction % (2 * np.pi)) / (2 * np.pi) * DIRECTIONS
+    turn = (direction % (2 * np.pi)) / (2 * np.pi) * config.DIRECTIONS
     at = np.clip(at, 0, size - 1.001)
     first, way = np.floor(at).astype(np.int64), np.floor(turn).astype(np.int64)
     parts = np.concatenate([at - first, (turn - way)[:, None]], axis=1)
-    counts = np.zeros((*size, DIRECTIONS))
+    counts = np.zeros((*size, config.DIRECTIONS))
     for corner in np.ndindex(2, 2, 2):
         share = np.where(np.array(corner) == 1, parts, 1 - parts).prod(axis=1)
-        node = (first[:, 0] + corner[0], first[:, 1] + corner[1], (way + corner[2]) % DIRECTIONS)
+        turned = (way + corner[2]) % config.DIRECTIONS
+        node = (first[:, 0] + corner[0], first[:, 1] + corner[1], turned)
         np.add.at(counts, node, weight * share)
     return counts
 
 
 def _smoothed(counts: Array, bandwidths: Bandwidths, cell_m: float) -> Array:
     """Counts (X, Y, 16) smoothed by a Gaussian over places and a von Mises over directions."""
+    from scipy.linalg import circulant  # late: the HTTP process has no use for it
+
     sd = bandwidths.place_m / cell_m
-    along = [_circulant(_gaussian(length, sd)) for length in counts.shape[:2]]
-    angles = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
+    along = [circulant(_gaussian(length, sd)) for length in counts.shape[:2]]
+    angles = np.arange(config.DIRECTIONS) * 2 * np.pi / config.DIRECTIONS
     kernel = np.exp(bandwidths.direction_kappa * (np.cos(angles) - 1))
     # Products of matrices, one for each axis, take a quarter of the time of Fourier transforms.
     smooth = along[1] @ np.tensordot(along[0], counts, axes=1)
-    return np.asarray(np.clip(smooth @ _circulant(kernel / kernel.sum()), 0.0, None))
+    return np.asarray(np.clip(smooth @ circulant(kernel / kernel.sum()), 0.0, None))
 
 
 def _gaussian(length: int, sd: float) -> Array:
@@ -194,7 +189,11 @@ def _gaussian(length: int, sd: float) -> Array:
     return np.asarray(np.fft.ifft(np.exp(-0.5 * (sd * rates) ** 2)).real)
 
 
-def _circulant(weights: Array) -> Array:
-    """The matrix (N, N) of a symmetric kernel (N,) that goes around."""
-    nodes = np.arange(weights.size)
-    return np.asarray(weights[(nodes[:, None] - nodes) % weights.size])
+def to_levels(log_density: Array) -> npt.NDArray[np.int16]:
+    """Log densities between -500 and 500 as whole numbers, of the same shape."""
+    return np.rint(log_density * config.LEVELS).astype(np.int16)
+
+
+def of_levels(levels: npt.NDArray[np.int16]) -> Array:
+    """The log densities of `to_levels`, rounded."""
+    return levels.astype(np.float64) / config.LEVELS

@@ -1,19 +1,23 @@
-"""One step on the ground: where it is, which way it goes, and how that moves with a candidate.
+"""Steps on the ground: where they are, which way they go, and how that moves with a candidate.
 
-Lengths are in camera heights, from the camera's foot point; axes are the world's. A candidate is
-(tilt, roll, log height, heading).
+A candidate is (tilt, roll, log height, heading). Lengths of one step are in camera heights, of many
+in metres, from the camera's foot point; axes are the world's, directions from +X towards +Y.
 
 Ours: the change of variables from the image to the ground, det J = h^2 / w_z^3 for the homography's
 Jacobian J.
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from models.compiled import compiled
 from models.geometry.ground_flow import ground_flow
 from models.geometry.landing import landing
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Mask, rotation_from_angles
+from models.tracks.observations import Steps
 
 _LEAST_LENGTH = 1e-12
 _LEAST_RAY = 1e-9
@@ -90,7 +94,7 @@ def log_ratio_of(step: Step, log_height: float) -> float:
 
 @compiled
 def slope_of(step: Step, turns: Array, parameter: int) -> Slope:
-    """How a step on the ground moves with one of the four parameters.
+    """The slope of a step on the ground by one of the four parameters.
 
     `turns` (2, 3, 3) are those of `rotation_and_turns`. The place is in camera heights of now.
     """
@@ -112,3 +116,49 @@ def slope_of(step: Step, turns: Array, parameter: int) -> Slope:
         return Slope(step.x, step.y, 0.0, 2.0)
     # A camera that turns clockwise takes its ground along.
     return Slope(step.y, -step.x, -1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placement:
+    """M steps: `place` (M, 2), `direction` (M,), `length_m` (M,), `valid` (M,) below the horizon.
+
+    A density over place and direction times exp(`log_ratio`) (M,) is one over the place and
+    direction of a step in the image.
+    """
+
+    place: Array
+    direction: Array
+    length_m: Array
+    valid: Mask
+    log_ratio: Array
+
+
+def place_steps(steps: Steps, candidate: Array) -> Placement:
+    """The steps on the ground as a candidate (4,) sees them."""
+    tilt, roll, log_height, heading = (float(number) for number in candidate)
+    place, direction, length_m, valid, log_ratio = _placed(
+        np.ascontiguousarray(steps.start_rays),
+        np.ascontiguousarray(steps.end_rays),
+        rotation_from_angles(tilt, roll, heading),
+        log_height,
+    )
+    return Placement(
+        place=place, direction=direction, length_m=length_m, valid=valid, log_ratio=log_ratio
+    )
+
+
+@compiled
+def _placed(
+    starts: Array, ends: Array, rotation: Array, log_height: float
+) -> tuple[Array, Array, Array, Mask, Array]:
+    """The fields of a placement of steps between rays (M, 3)."""
+    count, height_m = len(starts), math.exp(log_height)
+    place, direction, length_m = np.empty((count, 2)), np.empty(count), np.empty(count)
+    valid, log_ratio = np.empty(count, dtype=np.bool_), np.empty(count)
+    for number in range(count):
+        step = step_on_ground(starts, ends, number, rotation)
+        place[number, 0], place[number, 1] = step.x * height_m, step.y * height_m
+        direction[number] = math.atan2(step.way_y, step.way_x)
+        length_m[number] = step.length * height_m
+        valid[number], log_ratio[number] = step.valid, log_ratio_of(step, log_height)
+    return place, direction, length_m, valid, log_ratio

@@ -1,1 +1,0 @@
-"""The map itself: cells and ways, and how a camera sees them."""

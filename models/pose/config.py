@@ -1,0 +1,64 @@
+"""Numbers that a pose hangs on: unit, source, and how the result hangs on them.
+
+Where no source is named, a number was tuned on the recorded scenes by `python -m studies protocol`.
+"""
+
+import math
+
+import numpy as np
+
+from models.monitoring.config import HABITS_OF_DAYS
+
+# The search for modes.
+HEADING_SD = math.radians(15.0)  # a pose offset's, before any track: wider, and far headings win
+REACH_RAD = math.radians(30.0)  # of the headings tried, both ways: beyond, none is identifiable
+EDGE_RAD = math.radians(2.0)  # of that reach: so near to it, a better heading may be beyond
+HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))  # tried: a map's peaks are some 4 deg wide
+ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hundredths of a sd
+WARM_ROUNDS = 1  # from a warm start, whose heading is known
+UNLIKELY = 12.0  # of the log posterior, below the best: speeds are not fitted again there
+FAR_LOG_HEIGHT = 0.7  # from the speeds': twice as high, everybody walks where nobody was seen
+LARGEST_LOG_HEIGHT = 5.0  # from a pose's: 150 times as high or as low, nothing is seen
+SHARED = 3  # parameters that speeds and places both determine, tilt, roll, height: Birge's freedom
+
+# What a fused estimate needs, and says.
+FEWEST_GROUPS = 5  # walking groups: of fewer, places have no part
+BY_CHANCE = 0.01  # of still cameras seem turned in tilt or roll: else changed paths are a clock's
+RIVAL = 0.05  # odds against the best from which another pose is named
+NO_RIVAL = 1e-6  # odds below which another pose is not even begun at next time
+FAR_APART = 6.6  # of a variance: chi square of one degree of freedom, one case of 100
+CLOSE = 0.5  # of FAR_APART: less than that at a rough look is far from it
+NARROW = 0.1  # of a variance: so little was added to it that a warm start adds the same
+
+# A change of the pose within a window.
+FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own
+CHANGE_BY_CHANCE = 1e-3  # of windows differ so much where they are cut; their cuts are dependent
+CUT_ROUNDS = 2  # of fitting both sides and cutting anew
+CLEARLY_BELOW = 0.8  # of the limit: a rough look is the same within a few hundredths
+SUSPECTED = 1.0  # of the limit, by derivatives: it is twice that wherever a cut is confirmed
+SUSPECT_RATE = 0.01  # of windows of a still camera that are looked at twice for their places
+MOVED_BY_CHANCE = 1e-4  # of windows that are suspected already: Hotelling's T squared
+MOVED_BY_HABIT = 1e-5  # of them, people's habits being normal: a chi square
+GROUPS_OF_A_COVARIANCE = 7  # more than there are parameters, for it to be known at all
+# Variances by the four parameters of what people of one hour do otherwise than those of another: a
+# pace that is 3 % off is a height that is 3 % off.
+HABITS = (
+    np.append(
+        HABITS_OF_DAYS[:2], [np.hypot(HABITS_OF_DAYS[2], HABITS_OF_DAYS[4]), HABITS_OF_DAYS[3]]
+    )
+    ** 2
+)
+# How much surer a part of a window may be of a parameter than as many people of the reference were:
+# another view may be a better one.
+BETTER_VIEW = 2.0
+
+# When a warm start is enough: estimates from one are then within 0.05 sd of a full search.
+WARM_TRACKS = 150  # at least: of fewer a full search is soon made, and each counts for much
+NEW = 0.5  # of the window since the last full search; with a quarter, estimates are no nearer
+FARTHEST = 1.0  # standard deviations that a few new tracks move a pose by
+WIDER = 1.25  # times the standard deviation
+WORSE = 10.0  # of the log likelihood: other modes are some 40 below, or known
+SUSPICION, MORE_SUSPICION = 0.4, 1.25  # of the limit; times what it was where nothing was found
+
+# An anchor's creep, in radians: a track turned by less is taken as it is.
+NO_TURN_RAD = np.radians(0.02)
