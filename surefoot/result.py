@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
+from models.durations import DAY_S
 from models.geometry.pose_parameters import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
@@ -17,7 +18,7 @@ from surefoot.tracks import Track, in_order
 _LIMITS = DriftLimits(
     sigmas=5.0, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
 )
-_YEAR_S = 365.25 * 86_400
+_YEAR_S = 365.25 * DAY_S
 _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 
 

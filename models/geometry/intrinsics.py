@@ -136,7 +136,7 @@ class Intrinsics:
         return np.where(near_centre, 1.0, start / np.where(near_centre, 1.0, wanted))[..., None]
 
     def _radial(self, squared_radius: Array) -> Array:
-        """By how much the lens lengthens a ray of a squared radius (...)."""
+        """Factor by which the lens lengthens a ray of a squared radius (...)."""
         k1, k2, _, _, k3 = self.distortion
         s = squared_radius
         return 1 + s * (k1 + s * (k2 + s * k3))

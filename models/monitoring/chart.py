@@ -50,7 +50,7 @@ class GridOffset:
 
     @property
     def stretch(self) -> float:
-        """By what times are too long."""
+        """Factor by which times are too long."""
         return float(np.exp(self.size)) if self.parameter == CLOCK else 1.0
 
 
@@ -267,6 +267,6 @@ def slope_of(chart: DriftChart, parameter: int) -> Array:
 
 
 def _unsure(walking_groups: float, scores: int) -> float:
-    """By how much a covariance of so few walking groups makes ratios too large, on average."""
+    """Factor by which a covariance of so few walking groups makes ratios too large, on average."""
     freedom = walking_groups - 1
     return float(min(freedom / max(freedom - scores - 1, freedom / 3), 3.0))

@@ -52,7 +52,7 @@ class DriftLimits:
     clear_ratio: float
 
     def of(self, name: str, sd: float) -> float:
-        """From where on a parameter's drift counts, given its standard deviation."""
+        """Limit of a parameter's drift, given its standard deviation."""
         floor = self.floor_m if name == "height" else self.floor_rad
         return max(self.sigmas * sd, floor, 1e-12)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.durations import DAY_S, HOUR_S
 from models.geometry.rotation import Array
 from models.monitoring.arrivals import (
     ArrivalProcess,
@@ -24,11 +25,10 @@ from models.monitoring.arrivals import (
     learn_arrivals,
 )
 
-RULE = SilenceRule(false_per_year=1.0, least_s=600.0, limit_s=86_400.0)
+RULE = SilenceRule(false_per_year=1.0, least_s=600.0, limit_s=DAY_S)
 _PAST_DAYS, _FIRST_DAYS = 28, 7
 _DAYS = _FIRST_DAYS + 365
-_HOUR_S, _DAY_S = 3600.0, 86_400.0
-_LOOK_BACK_S = 3 * _HOUR_S
+_LOOK_BACK_S = 3 * HOUR_S
 _HOURS = np.arange(24)
 _KINDS = ("commuters", "shops", "promenade", "evenings", "station")
 _POSTS = ("live", "hourly", "nightly", "stalling")
@@ -74,7 +74,7 @@ def _study_year(rng: np.random.Generator) -> YearResult:
         process, delay_s = _learned(year, cells, day)
         false_alerts += _false_alerts(year, cells, process, delay_s, day)
         if day in outage_days and day % 7 < 5 and not year.quiet_days[day]:
-            noticed_h.append(_noticed_h(year, cells, process, delay_s, (day + 0.5) * _DAY_S))
+            noticed_h.append(_noticed_h(year, cells, process, delay_s, (day + 0.5) * DAY_S))
     return YearResult(
         kind=kind,
         posts=posts,
@@ -86,16 +86,16 @@ def _study_year(rng: np.random.Generator) -> YearResult:
 
 def _learned(year: _Year, cells: np.ndarray, day: int) -> tuple[ArrivalProcess, float]:
     """Arrival model and delay that are known at a day's beginning."""
-    now_s, first_day = day * _DAY_S, max(day - _PAST_DAYS, 0)
-    stored = (year.received_s <= now_s) & (year.received_s > first_day * _DAY_S)
+    now_s, first_day = day * DAY_S, max(day - _PAST_DAYS, 0)
+    stored = (year.received_s <= now_s) & (year.received_s > first_day * DAY_S)
     ended_s = year.ended_s[stored]
-    first, last = 24 * first_day, int(ended_s.max() // _HOUR_S)
-    counts = np.bincount((ended_s // _HOUR_S).astype(int), minlength=last + 1)[first:last]
+    first, last = 24 * first_day, int(ended_s.max() // HOUR_S)
+    counts = np.bincount((ended_s // HOUR_S).astype(int), minlength=last + 1)[first:last]
     known = np.ones(len(counts), dtype=bool)
     process = learn_arrivals(counts.astype(float), cells[first:last], known, first, ended_s)
     lags_s, days = (
         year.received_s[stored] - ended_s,
-        (year.received_s[stored] // _DAY_S).astype(int),
+        (year.received_s[stored] // DAY_S).astype(int),
     )
     latest = np.full(day + 1, -np.inf)
     np.maximum.at(latest, days, lags_s)
@@ -106,7 +106,7 @@ def _false_alerts(
     year: _Year, cells: np.ndarray, process: ArrivalProcess, delay_s: float, day: int
 ) -> int:
     """Alerts about the silences that end on a day; the longest moment of each is its last."""
-    begin, end = np.searchsorted(year.received_s, [day * _DAY_S, (day + 1) * _DAY_S])
+    begin, end = np.searchsorted(year.received_s, [day * DAY_S, (day + 1) * DAY_S])
     ends_s = np.maximum.accumulate(year.ended_s[: end + 1])[max(begin - 1, 0) :]
     received_s = year.received_s[max(begin - 1, 0) : end + 1]
     silent_s = np.minimum(received_s[1:] - delay_s - ends_s[:-1], np.diff(received_s))
@@ -149,7 +149,7 @@ def _alerts(
 
 
 def _expected(process: ArrivalProcess, cells: np.ndarray, from_s: float, to_s: float) -> float:
-    first, last = max(int(from_s // _HOUR_S), 0), int(to_s // _HOUR_S) + 1
+    first, last = max(int(from_s // HOUR_S), 0), int(to_s // HOUR_S) + 1
     return expected_tracks(process, cells[first:last], first, from_s, to_s)
 
 
@@ -172,11 +172,11 @@ def _simulate(rng: np.random.Generator, kind: str, posts: str, noon: float) -> _
         ended_s = np.repeat(trains_s + 300, crowd) + rng.exponential(60, crowd.sum())
     else:
         walking_groups = rng.poisson(rates / 1.6)
-        starts_s = np.repeat(_HOUR_S * np.arange(len(rates)), walking_groups)
-        starts_s = starts_s + _HOUR_S * rng.random(len(starts_s))
+        starts_s = np.repeat(HOUR_S * np.arange(len(rates)), walking_groups)
+        starts_s = starts_s + HOUR_S * rng.random(len(starts_s))
         sizes = 1 + rng.poisson(0.6, len(starts_s))
         ended_s = np.repeat(starts_s, sizes) + rng.exponential(3, sizes.sum())
-    ended_s = np.sort(ended_s[(ended_s > 0) & (ended_s < _DAYS * _DAY_S)])
+    ended_s = np.sort(ended_s[(ended_s > 0) & (ended_s < _DAYS * DAY_S)])
     return _Year(ended_s=ended_s, received_s=_received(rng, posts, ended_s), quiet_days=quiet)
 
 
@@ -202,14 +202,14 @@ def _received(rng: np.random.Generator, posts: str, ended_s: Array) -> Array:
     live_s = ended_s + rng.exponential(2, len(ended_s))
     if posts == "hourly":
         late_s = rng.exponential(90, _DAYS * 24 + 2)
-        slots = np.ceil(ended_s / _HOUR_S).astype(int)
-        live_s = _HOUR_S * slots + late_s[slots]
+        slots = np.ceil(ended_s / HOUR_S).astype(int)
+        live_s = HOUR_S * slots + late_s[slots]
     elif posts == "nightly":
-        late_s = 2 * _HOUR_S + rng.exponential(900, _DAYS + 2)
-        slots = np.ceil(ended_s / _DAY_S).astype(int)
-        live_s = _DAY_S * slots + late_s[slots]
+        late_s = 2 * HOUR_S + rng.exponential(900, _DAYS + 2)
+        slots = np.ceil(ended_s / DAY_S).astype(int)
+        live_s = DAY_S * slots + late_s[slots]
     elif posts == "stalling":
-        for begins_s in rng.uniform(0, _DAYS * _DAY_S, rng.poisson(_DAYS / 30)):
+        for begins_s in rng.uniform(0, _DAYS * DAY_S, rng.poisson(_DAYS / 30)):
             ends_s = begins_s + rng.uniform(60, 900)
             live_s = np.where((live_s > begins_s) & (live_s < ends_s), ends_s, live_s)
     return np.maximum.accumulate(live_s)

@@ -8,13 +8,14 @@ from typing import Self
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.geometry.pose import CameraPose
 from models.monitoring.config import CREEP_SHARE
 from models.monitoring.creep import Creep, creep_result
 from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
 from models.simulation.pose_offset import PoseOffset
 from models.tracks.trajectory import Trajectory
-from studies.simulation.habits import DAY_S, HabitConfig, draw_mixes, walk_days
+from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
 from studies.simulation.simulated_site import (
     SimulatedSite,
     draw_simulated_site,

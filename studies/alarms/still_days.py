@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.geometry.rotation import Array
 from models.monitoring.chart import OFFSET_GRID, DriftChart, Ratios, ratios_of, slope_of, trace
 from models.monitoring.config import RUN
@@ -31,7 +32,7 @@ _REFERENCE = 1000  # tracks
 _BEGIN = (0, 1500, 3000)
 _FEWEST = 600  # tracks after the reference
 _BLOCK = 100  # walking groups
-_YEAR_S = 365.25 * 86_400
+_YEAR_S = 365.25 * DAY_S
 _LEAD, _WAIT, _MOMENTS, _MOVED = 150, 350, 4, 2500
 _DEG = float(np.radians(1))
 _NUMBERS = ("tilt", "roll", "height", "pan", "pace")

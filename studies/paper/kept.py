@@ -47,7 +47,7 @@ def is_begun(out: Path, name: str) -> bool:
 
 
 def write_manifest(out: Path) -> None:
-    """By what, on what and how long each part took, of all that the folder has."""
+    """Write code, machine and time of each part that the folder has."""
     parts = {}
     for name in PARTS:
         if not is_begun(out, name):

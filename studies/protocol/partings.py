@@ -6,11 +6,12 @@ from enum import StrEnum
 
 import numpy as np
 
+from models.durations import HOUR_S
 from models.geometry.pose import CameraPose
 from models.simulation.pose_offset import offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack
 
-_NIGHT_S = 4 * 3600.0  # without anybody: another day begins
+_NIGHT_S = 4 * HOUR_S  # without anybody: another day begins
 
 
 class Split(StrEnum):

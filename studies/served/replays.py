@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import judge
 from models.pose import (
@@ -30,7 +31,7 @@ from studies.protocol.partings import first_seen
 from studies.served.outcomes import ParameterOutcome, parameters_beside, reason_of
 from studies.served.windows import Look, Window, looks
 
-_YEAR_S = 365.25 * 86_400
+_YEAR_S = 365.25 * DAY_S
 _MOVED_BETWEEN = (0.2, 0.8)  # of the tracks after the reference
 _MEASURED_AFTER = 250  # tracks
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.pose import (
     CameraSite,
     Observations,
@@ -16,8 +17,6 @@ from models.pose import (
 from models.tracks.observations import of_tracks
 from models.walking.config import FEWEST_WALKERS
 from studies.protocol.served import served_pose
-
-_DAY_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +66,7 @@ def looks(
     for came in [*range(step, len(tracks), step), len(tracks)]:
         if not came:
             return
-        oldest_s = max(from_s, float(ended_s[came - 1]) - window.days * _DAY_S)
+        oldest_s = max(from_s, float(ended_s[came - 1]) - window.days * DAY_S)
         since = int(np.searchsorted(ended_s[:came], oldest_s, side="left"))
         first = max(since, came - window.tracks)
         seen = of_tracks(every, np.arange(first, came))

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.durations import DAY_S, HOUR_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.tracks.trajectory import Trajectory, by_end
 
-DAY_S = 86_400.0
 _LANE_MIXES = 10  # lanes stand so often in a list as people take them
 
 
@@ -95,7 +95,7 @@ def walk_days(
             count = int(rng.poisson(many))
             taken = _mixed(lanes, mixes[int(weekend), number], rng)
             paced = replace(config, speed_mean_mps=config.speed_mean_mps * math.exp(pace))
-            start_s = DAY_S * day + 3600 * part.hour
+            start_s = DAY_S * day + HOUR_S * part.hour
             if not count:
                 continue
             tracks += [

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.durations import DAY_S
 from models.geometry.ground import ground_from_pixel
 from models.monitoring.chart import OFFSET_GRID, DriftChart, GridOffset, ratios_of
 from models.monitoring.group_scores import SCORES
@@ -23,7 +24,7 @@ from studies.alarms.results import (
 )
 from studies.alarms.scene_alarms import judge_scene
 from studies.alarms.watch import Watch, first_alarm
-from studies.simulation.habits import DAY_S, HabitConfig, walk_days
+from studies.simulation.habits import HabitConfig, walk_days
 from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 
