@@ -14,7 +14,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api.middleware.dependencies import AppState, StateDep
-from service.api.middleware.direct.feed import Feed, wait
+from service.api.middleware.event_feed import Feed, wait
 from service.api.middleware.guard import still_let_in
 from service.store import events as stored
 from service.store.engines.store import Store

@@ -1,24 +1,18 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
-from datetime import UTC, datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
+from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import PlainTextResponse
 
 from service.api.fields import Moment
 from service.api.middleware.dependencies import (
     ActorDep,
-    AppState,
     ReadDep,
     StateDep,
     WriteDep,
     name_of,
 )
-from service.api.middleware.direct.kept import KeptAnswer
-from service.api.middleware.direct.straight import StraightRoute, straight
-from service.api.middleware.direct.written import written
 from service.api.poses_schemas import (
     AcceptBody,
     History,
@@ -31,56 +25,28 @@ from service.cameras import cameras, decisions, poses
 from service.errors import FieldError, MalformedError
 from service.formats.opencv_yaml import opencv_yaml
 
-router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"], route_class=StraightRoute)
+router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
 
 class _YamlResponse(PlainTextResponse):
     media_type = "application/yaml"
 
 
-def _answer(state: AppState, camera_id: str) -> KeptAnswer:
-    before = datetime.now(UTC)
-    with state.store.read() as session:
-        view = poses.view_pose(session, state.settings, camera_id)
-        body = written(ServedPoseOut.from_value(view))
-    clockwork = view.status.clockwork
-    hands = clockwork.hands(before)
-    # Why nobody is seen says for how long; and something may have come to its time just now.
-    lasts = not view.status.silent and clockwork.hands(datetime.now(UTC)) == hands
-
-    def holds(now: datetime) -> bool:
-        return lasts and clockwork.hands(now) == hands
-
-    return KeptAnswer(etag=view.etag, body=body, holds=holds)
-
-
-async def _show(state: AppState, camera_id: str, if_none_match: str | None) -> Response:
-    version = state.poses.version()
-    answer = state.poses.find(camera_id)
-    if answer is None or not answer.holds(datetime.now(UTC)):
-        answer = await run_in_threadpool(_answer, state, camera_id)
-        state.poses.keep(camera_id, answer, version)
-    headers = {"ETag": answer.etag}
-    if if_none_match is not None and answer.etag in map(str.strip, if_none_match.split(",")):
-        return Response(status_code=304, headers=headers)
-    return Response(answer.body, headers=headers, media_type="application/json")
-
-
-async def _show_plain(request: Request) -> Response:
-    return await _show(
-        request.state.app, request.path_params["camera_id"], request.headers.get("if-none-match")
-    )
-
-
 @router.get("/pose", response_model=ServedPoseOut)
-@straight(_show_plain)
-async def show(
+def show(
     camera_id: str,
     state: StateDep,
+    session: ReadDep,
+    response: Response,
     if_none_match: Annotated[str | None, Header()] = None,
-) -> Response:
+) -> ServedPoseOut | Response:
     """The pose now, how sure it is, and why the state is what it is."""
-    return await _show(state, camera_id, if_none_match)
+    view = poses.view_pose(session, state.settings, camera_id)
+    headers = {"ETag": view.etag}
+    if if_none_match is not None and view.etag in map(str.strip, if_none_match.split(",")):
+        return Response(status_code=304, headers=headers)
+    response.headers.update(headers)
+    return ServedPoseOut.from_value(view)
 
 
 @router.get("/pose.yaml", response_class=_YamlResponse)

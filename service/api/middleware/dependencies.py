@@ -14,8 +14,7 @@ from fastapi import Depends, Header, Request
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
-from service.api.middleware.direct.feed import Feed
-from service.api.middleware.direct.kept import Kept, KeptAnswer
+from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
 from service.cameras.posts import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
@@ -30,8 +29,6 @@ from service.store.engines.turns import Turns
 class AppState:
     """What one application holds from start to stop.
 
-    `poses` are the answers to who asks for the pose of a camera, by its id.
-
     Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
     are read in `large_bodies`' turns.
     """
@@ -42,7 +39,6 @@ class AppState:
     quota: Quota
     stream_polls: anyio.CapacityLimiter
     feed: Feed
-    poses: Kept[KeptAnswer]
     pictures: Pictures = field(default_factory=Pictures)
     watched: Watched = field(default_factory=Watched)
     instruments: Instruments = field(default_factory=Instruments)
