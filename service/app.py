@@ -24,15 +24,20 @@ from service.api import (
     webhooks,
 )
 from service.api.middleware import pages
+from service.api.middleware.authentication import GuardMiddleware
 from service.api.middleware.bodies import BodyMiddleware
+from service.api.middleware.concurrency import (
+    STREAM_POLLS,
+    LaneMiddleware,
+    Lanes,
+    sessions_at_once,
+    start_threads,
+)
 from service.api.middleware.dependencies import AppState
-from service.api.middleware.guard import GuardMiddleware
+from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
-from service.api.middleware.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
-from service.api.middleware.origins import OriginMiddleware
 from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
-from service.api.middleware.rates import RateMiddleware
-from service.api.middleware.threads import start_threads
+from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.posts import Quota
 from service.job_queue import JobQueue
 from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens

@@ -13,9 +13,9 @@ from fastapi import APIRouter, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.api.middleware.authentication import still_let_in
 from service.api.middleware.dependencies import AppState, StateDep
 from service.api.middleware.event_feed import Feed, wait
-from service.api.middleware.guard import still_let_in
 from service.store import events as stored
 from service.store.engines.store import Store
 from service.store.events import EventRecord
@@ -73,7 +73,7 @@ async def events(
 
 
 async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
-    """What came after an event: out of the feed, or of the store where that was long ago."""
+    """Events after one: out of the feed, or of the store where that was long ago."""
     kept = state.feed.since(seen)
     if kept is not None:
         return kept
@@ -86,7 +86,7 @@ async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
 
 
 def feed_of(store: Store, polls: anyio.CapacityLimiter) -> Feed:
-    """What the event streams of an application follow together."""
+    """The feed that all event streams of an application follow."""
 
     async def newest() -> int:
         return await anyio.to_thread.run_sync(_newest_in, store, limiter=polls)

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel
 
 from service.api.middleware.dependencies import CallerDep, StateDep
-from service.api.middleware.reach import auth_on
+from service.api.middleware.hosts import auth_on
 from service.enums import Health, Readiness
 from service.operations import health as checks
 

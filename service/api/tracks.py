@@ -127,7 +127,7 @@ async def posted(
     started_at: str | None = None,
     classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
 ) -> Posted:
-    """What is to be read, in the route's own thread."""
+    """A request, to be read in the route's own thread."""
     return Posted(
         body=body,
         media_type=_media_type(request),

@@ -131,7 +131,7 @@ def read_time(value: Any, pointer: str) -> float:
 def collect(
     items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int = 0
 ) -> Batch:
-    """What could be read of tracks, each with its index, what it was and how to read it."""
+    """The batch of tracks, each given with its index, what it was and how to read it."""
     tracks, rejections = [], []
     for index, raw, read in items:
         try:

@@ -35,14 +35,14 @@ class IncomingTrack:
 
     @property
     def stored_bytes(self) -> int:
-        """How much of the store it takes."""
+        """Size in the store."""
         arrays = (self.points, self.boxes, self.heads)
         return sum(array.nbytes for array in arrays if array is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rejection:
-    """Why one track of a request was not stored; `index` is its place in the request."""
+    """The reason why one track of a request is not stored; `index` is its place in the request."""
 
     index: int
     track_id: str | None
@@ -52,7 +52,7 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What could be read of a request; `left_out` lines or tracks of it were of no person."""
+    """Tracks as read of a request; `left_out` lines or tracks of it were of no person."""
 
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
@@ -61,7 +61,7 @@ class Batch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clock:
-    """How frame numbers become times; unset where the request does not say."""
+    """Conversion of frame numbers to times; unset where the request does not say."""
 
     frame_rate_hz: float | None
     started_at_s: float | None
@@ -69,7 +69,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What tracks have to keep to: the picture, and the time by our clock.
+    """Limits of tracks: the picture, and the time by our clock.
 
     A track of later than now owns the camera's window, which is of the newest tracks, until that
     time comes: `max_ahead_s` is what clocks may differ by.
@@ -219,7 +219,7 @@ def track_name(value: Any) -> str:
 
 
 def is_text(value: str) -> bool:
-    """Whether a text can be stored and sent again; JSON's escapes allow half a surrogate pair."""
+    """True of text that can be stored and sent; JSON's escapes allow half a surrogate pair."""
     try:
         return "\0" not in value and bool(value.encode())
     except UnicodeEncodeError:

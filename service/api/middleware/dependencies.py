@@ -1,4 +1,4 @@
-"""What routes are given: the application's state, sessions and bodies.
+"""Dependencies of routes: the application's state, sessions and bodies.
 
 Coroutines, where nothing waits: anything else is given a thread, which costs more than most of them
 do.
@@ -27,7 +27,7 @@ from service.store.engines.turns import Turns
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppState:
-    """What one application holds from start to stop.
+    """State of one application from start to stop.
 
     Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
     are read in `large_bodies`' turns.
@@ -62,7 +62,7 @@ async def read_session(state: StateDep) -> AsyncIterator[Session]:
 
 
 async def get_caller(request: Request) -> Caller | None:
-    """Who asks; None where access is off."""
+    """The caller; None where access is off."""
     caller: Caller | None = getattr(request.state, "caller", None)
     return caller
 
@@ -79,7 +79,7 @@ ActorDep = Annotated[Actor | None, Depends(get_actor)]
 
 
 def name_of(actor: Actor | None, said: str | None = None) -> str | None:
-    """Who acts: the person who is known; where access is off, whoever the body says."""
+    """The name of who acts: the person who is known; where access is off, whoever the body says."""
     return said if actor is None else actor.name
 
 
