@@ -45,7 +45,7 @@ async def events(
     given = (last_event_id or "").strip()
     seen = min(int(given), _MAX_ID) if _ID.fullmatch(given) else after
     if seen is None:
-        seen = await _ask(state, _newest, state)
+        seen = await _ask(state, _newest, state.store)
     heard_s = checked_s = time.monotonic()
     yield ServerSentEvent(comment="connected", retry=2000)
     await state.feed.join()
@@ -78,7 +78,7 @@ async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
     if kept is not None:
         return kept
     try:
-        return await _ask(state, _after, state, seen)
+        return await _ask(state, _after, state.store, seen)
     except SQLAlchemyError as error:
         # The stream has begun; it goes on when the store can be read again.
         log.warning("events_not_read", extra={"error": str(error)})
@@ -87,14 +87,8 @@ async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
 
 def feed_of(store: Store, polls: anyio.CapacityLimiter) -> Feed:
     """The feed that all event streams of an application follow."""
-
-    async def newest() -> int:
-        return await anyio.to_thread.run_sync(_newest_in, store, limiter=polls)
-
-    async def after(seen: int) -> Sequence[EventRecord]:
-        return await anyio.to_thread.run_sync(_after_in, store, seen, limiter=polls)
-
-    return Feed(newest, after)
+    run = partial(anyio.to_thread.run_sync, limiter=polls)
+    return Feed(lambda: run(_newest, store), lambda seen: run(_after, store, seen))
 
 
 async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answer:
@@ -102,19 +96,11 @@ async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answ
     return await anyio.to_thread.run_sync(partial(what, *args), limiter=state.stream_polls)
 
 
-def _newest(state: AppState) -> int:
-    return _newest_in(state.store)
-
-
-def _after(state: AppState, seen: int) -> Sequence[EventRecord]:
-    return _after_in(state.store, seen)
-
-
-def _newest_in(store: Store) -> int:
+def _newest(store: Store) -> int:
     with store.read() as session:
         return stored.newest_id(session)
 
 
-def _after_in(store: Store, seen: int) -> Sequence[EventRecord]:
+def _after(store: Store, seen: int) -> Sequence[EventRecord]:
     with store.read() as session:
         return stored.after(session, seen, _BATCH)

@@ -3,22 +3,21 @@
 import time
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from service.api.middleware.dependencies import AppState, BodyDep, StateDep
 from service.cameras import tracks
 from service.cameras.posts import StalePictureError
-from service.cameras.tracks import Receipt
 from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
-from service.formats.track import Batch, Clock, Limits, Rejection
+from service.formats.track import Batch, Clock, Limits
 from service.store.cameras import Picture
 
 
@@ -53,14 +52,9 @@ class RejectionOut(BaseModel):
     """Why a track was not stored."""
 
     index: int
-    id: str | None
+    id: str | None = Field(validation_alias="track_id")
     code: str
     detail: str
-
-    @classmethod
-    def from_value(cls, value: Rejection) -> Self:
-        """The body of a rejection."""
-        return cls(index=value.index, id=value.track_id, code=value.code, detail=value.detail)
 
 
 class ReceiptOut(BaseModel):
@@ -68,18 +62,8 @@ class ReceiptOut(BaseModel):
 
     accepted: int
     duplicates: int
-    rejected: list[RejectionOut]
+    rejected: list[RejectionOut] = Field(validation_alias="rejections")
     left_out: int = 0
-
-    @classmethod
-    def from_value(cls, value: Receipt) -> Self:
-        """The body of a receipt."""
-        return cls(
-            accepted=value.accepted,
-            duplicates=value.duplicates,
-            rejected=[RejectionOut.from_value(item) for item in value.rejections],
-            left_out=value.left_out,
-        )
 
 
 _LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
@@ -201,7 +185,9 @@ def _take(state: AppState, camera_id: str, came: Posted) -> Response:
             if now == camera and isinstance(error, MalformedError):
                 raise
             camera = now
-    body = ReceiptOut.from_value(receipt).model_dump_json(exclude_defaults=True)
+    body = ReceiptOut.model_validate(receipt, from_attributes=True).model_dump_json(
+        exclude_defaults=True
+    )
     return Response(body, 202, media_type="application/json")
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.batch import check_count, collect, malformed, refuse
-from service.formats.people import COCO_PEOPLE
 from service.formats.track import (
+    COCO_PEOPLE,
     MAX_ID_LENGTH,
     Batch,
     Clock,
