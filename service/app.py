@@ -24,16 +24,20 @@ from service.api import (
     webhooks,
 )
 from service.api.middleware import pages
+from service.api.middleware.authentication import GuardMiddleware
 from service.api.middleware.bodies import BodyMiddleware
+from service.api.middleware.concurrency import (
+    STREAM_POLLS,
+    LaneMiddleware,
+    Lanes,
+    sessions_at_once,
+    start_threads,
+)
 from service.api.middleware.dependencies import AppState
-from service.api.middleware.direct.kept import Kept
-from service.api.middleware.guard import GuardMiddleware
+from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
-from service.api.middleware.lanes import STREAM_POLLS, LaneMiddleware, Lanes, sessions_at_once
-from service.api.middleware.origins import OriginMiddleware
 from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
-from service.api.middleware.rates import RateMiddleware
-from service.api.middleware.threads import start_threads
+from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.posts import Quota
 from service.job_queue import JobQueue
 from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens
@@ -59,7 +63,6 @@ def create_app(settings: Settings) -> FastAPI:
         # A request is in one thread at a time; some are left for what needs no turn.
         await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
-        changes = store.changes()
         stream_polls = anyio.CapacityLimiter(STREAM_POLLS)
         state = AppState(
             settings=settings,
@@ -69,12 +72,10 @@ def create_app(settings: Settings) -> FastAPI:
             quota=Quota(settings),
             stream_polls=stream_polls,
             feed=events.feed_of(store, stream_polls),
-            poses=Kept(changes),
         )
         yield {"app": state}
         state.stopping.set()
         state.queue.close()
-        changes.close()
         store.close()
 
     app = FastAPI(

@@ -12,7 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 from typer.testing import CliRunner
 
-from service.api.alerts_schemas import AlertOut
+from service.api.alerts import AlertOut
 from service.cli import app
 from service.settings import Settings
 from tests.conftest import ROOT

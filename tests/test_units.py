@@ -6,9 +6,8 @@ from tests.conftest import ROOT
 
 # Who may turn radians into degrees by themselves.
 EDGES = (
-    "service/api/alerts_schemas.py",
     "service/api/geometry_schemas.py",
-    "service/api/poses_schemas.py",
+    "service/api/poses.py",
     "service/api/trainings.py",
     "service/pages/",
     "service/formats/degrees.py",

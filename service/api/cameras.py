@@ -37,7 +37,7 @@ class CameraBody(Body):
     reference_tracks: ReferenceTracks = 200
 
     def to_spec(self) -> CameraSpec:
-        """What the use case takes; an id is made of the name where none is given."""
+        """A camera for the use case; its id is made of the name where none is given."""
         return CameraSpec(
             camera_id=self.id or (slug(self.name) if self.name else None) or None,
             name=self.name or "",

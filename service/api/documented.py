@@ -1,4 +1,4 @@
-"""What `/openapi.json` says of errors, for all routes in one place.
+"""Errors in `/openapi.json`, for all routes in one place.
 
 FastAPI describes its own 422, which is not what is answered here, and no other error. Which errors
 a route may answer follows from what it takes: a name in the path, a body, a header, a change.

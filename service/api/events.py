@@ -13,9 +13,9 @@ from fastapi import APIRouter, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from sqlalchemy.exc import SQLAlchemyError
 
+from service.api.middleware.authentication import still_let_in
 from service.api.middleware.dependencies import AppState, StateDep
-from service.api.middleware.direct.feed import Feed, wait
-from service.api.middleware.guard import still_let_in
+from service.api.middleware.event_feed import Feed, wait
 from service.store import events as stored
 from service.store.engines.store import Store
 from service.store.events import EventRecord
@@ -45,7 +45,7 @@ async def events(
     given = (last_event_id or "").strip()
     seen = min(int(given), _MAX_ID) if _ID.fullmatch(given) else after
     if seen is None:
-        seen = await _ask(state, _newest, state)
+        seen = await _ask(state, _newest, state.store)
     heard_s = checked_s = time.monotonic()
     yield ServerSentEvent(comment="connected", retry=2000)
     await state.feed.join()
@@ -73,12 +73,12 @@ async def events(
 
 
 async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
-    """What came after an event: out of the feed, or of the store where that was long ago."""
+    """Events after one: out of the feed, or of the store where that was long ago."""
     kept = state.feed.since(seen)
     if kept is not None:
         return kept
     try:
-        return await _ask(state, _after, state, seen)
+        return await _ask(state, _after, state.store, seen)
     except SQLAlchemyError as error:
         # The stream has begun; it goes on when the store can be read again.
         log.warning("events_not_read", extra={"error": str(error)})
@@ -86,15 +86,9 @@ async def _since(state: AppState, seen: int) -> Sequence[EventRecord]:
 
 
 def feed_of(store: Store, polls: anyio.CapacityLimiter) -> Feed:
-    """What the event streams of an application follow together."""
-
-    async def newest() -> int:
-        return await anyio.to_thread.run_sync(_newest_in, store, limiter=polls)
-
-    async def after(seen: int) -> Sequence[EventRecord]:
-        return await anyio.to_thread.run_sync(_after_in, store, seen, limiter=polls)
-
-    return Feed(newest, after)
+    """The feed that all event streams of an application follow."""
+    run = partial(anyio.to_thread.run_sync, limiter=polls)
+    return Feed(lambda: run(_newest, store), lambda seen: run(_after, store, seen))
 
 
 async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answer:
@@ -102,19 +96,11 @@ async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answ
     return await anyio.to_thread.run_sync(partial(what, *args), limiter=state.stream_polls)
 
 
-def _newest(state: AppState) -> int:
-    return _newest_in(state.store)
-
-
-def _after(state: AppState, seen: int) -> Sequence[EventRecord]:
-    return _after_in(state.store, seen)
-
-
-def _newest_in(store: Store) -> int:
+def _newest(store: Store) -> int:
     with store.read() as session:
         return stored.newest_id(session)
 
 
-def _after_in(store: Store, seen: int) -> Sequence[EventRecord]:
+def _after(store: Store, seen: int) -> Sequence[EventRecord]:
     with store.read() as session:
         return stored.after(session, seen, _BATCH)

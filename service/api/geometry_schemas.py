@@ -1,6 +1,7 @@
 """Lenses and poses in their forms on the wire."""
 
 import math
+from dataclasses import asdict
 from typing import Annotated, Self
 
 import numpy as np
@@ -42,15 +43,7 @@ class IntrinsicsBody(Body):
     @classmethod
     def from_value(cls, value: Intrinsics) -> Self:
         """The body of a lens."""
-        return cls(
-            width=value.width,
-            height=value.height,
-            fx=value.fx,
-            fy=value.fy,
-            cx=value.cx,
-            cy=value.cy,
-            distortion=list(value.distortion),
-        )
+        return cls.model_validate(asdict(value))
 
 
 class PriorPoseBody(Body):

@@ -54,18 +54,9 @@ class WindowOut(BaseModel):
         state = WindowState.UNDER_WAY if record.from_at <= now else WindowState.PLANNED
         if record.until <= now:
             state = WindowState.OVER
-        return cls(
-            id=record.id,
-            camera_id=record.camera_id,
-            state=state,
-            from_=record.from_at,
-            to=record.to_at,
-            ended_at=record.ended_at,
-            reason=record.reason,
-            by=record.requested_by,
-            created_at=record.created_at,
-            updated_at=record.updated_at,
-        )
+        ends = {"from_": record.from_at, "to": record.to_at, "by": record.requested_by}
+        same = {name: getattr(record, name) for name in cls.model_fields.keys() - {*ends, "state"}}
+        return cls(**same, **ends, state=state)
 
 
 class WindowList(BaseModel):

@@ -30,7 +30,7 @@ class MetricsCollector(Collector):
         self._others = others
 
     def collect(self) -> Iterator[Metric]:
-        """All metrics."""
+        """Collect the metrics of cameras, looks, alerts, webhooks and the service."""
         yield InfoMetricFamily("surefoot_build", "Version.", value={"version": version("surefoot")})
         yield from _of_cameras(self._metrics)
         yield from _of_looks(self._metrics)

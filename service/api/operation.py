@@ -1,12 +1,13 @@
 """`/healthz` and `/readyz`."""
 
+from dataclasses import asdict
 from typing import Self
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel
 
 from service.api.middleware.dependencies import CallerDep, StateDep
-from service.api.middleware.reach import auth_on
+from service.api.middleware.hosts import auth_on
 from service.enums import Health, Readiness
 from service.operations import health as checks
 
@@ -31,15 +32,8 @@ class ReadyOut(BaseModel):
     @classmethod
     def from_value(cls, value: checks.Readiness) -> Self:
         """The body of a readiness check."""
-        return cls(
-            status=Readiness.READY if value.ready else Readiness.NOT_READY,
-            store_writable=value.store_writable,
-            worker_alive=value.worker_alive,
-            worker_silent_s=value.worker_silent_s,
-            queue_lag_s=value.queue_lag_s,
-            failing_cameras=value.failing_cameras,
-            problems=list(value.problems),
-        )
+        status = Readiness.READY if value.ready else Readiness.NOT_READY
+        return cls.model_validate({**asdict(value), "status": status})
 
 
 router = APIRouter(tags=["operation"])

@@ -1,86 +1,210 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
+import math
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any, Self
 
-from fastapi import APIRouter, Header, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
+from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import PlainTextResponse
+from pydantic import BaseModel, ConfigDict, Field
 
-from service.api.fields import Moment
+from models.monitoring.verdict import Drift
+from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Who
+from service.api.geometry_schemas import PoseOut
 from service.api.middleware.dependencies import (
     ActorDep,
-    AppState,
     ReadDep,
     StateDep,
     WriteDep,
     name_of,
 )
-from service.api.middleware.direct.kept import KeptAnswer
-from service.api.middleware.direct.straight import StraightRoute, straight
-from service.api.middleware.direct.written import written
-from service.api.poses_schemas import (
-    AcceptBody,
-    History,
-    HistoryPoint,
-    PutBackBody,
-    ResetBody,
-    ServedPoseOut,
-)
 from service.cameras import cameras, decisions, poses
+from service.cameras.poses import PoseView
+from service.enums import PoseState, ReferenceState
 from service.errors import FieldError, MalformedError
+from service.formats.degrees import in_degrees
 from service.formats.opencv_yaml import opencv_yaml
+from service.reasons import code_of, values_of
+from service.store.access import Actor
+from service.store.estimates import EstimateRecord
+from service.store.serialization import identifiable_drift, identifiable_sd
 
-router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"], route_class=StraightRoute)
+_FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
+
+
+class _DecisionBody(Body):
+    by: Who | None = None
+    note: str | None = Field(None, max_length=2000)
+
+
+class AcceptBody(_DecisionBody):
+    """Who accepts the served pose as the new prior pose, and why."""
+
+
+class PutBackBody(_DecisionBody):
+    """Who says that the camera is back at its prior pose."""
+
+
+class ResetBody(_DecisionBody):
+    """Who says that the camera is at its prior pose and has to be learned anew there."""
+
+
+class SdOut(BaseModel):
+    """Standard deviations of what was estimated; null where the tracks cannot tell."""
+
+    height_m: float | None
+    tilt_deg: float | None
+    roll_deg: float | None
+    heading_deg: float | None
+
+    @classmethod
+    def from_value(cls, drift: Drift) -> Self | None:
+        """The body of what is identifiable; None where nothing is."""
+        return cls(**in_degrees(identifiable_sd(drift))) if drift.identifiable else None
+
+
+class DriftOut(BaseModel):
+    """Estimate against prior pose; null where the tracks leave it open.
+
+    `angle_deg` is the whole rotation that the identifiable angles make.
+    """
+
+    height_m: float | None
+    tilt_deg: float | None
+    roll_deg: float | None
+    heading_deg: float | None
+    angle_deg: float | None
+
+    @classmethod
+    def from_value(cls, drift: Drift) -> Self | None:
+        """The body of what is identifiable; None where nothing is."""
+        return cls(**in_degrees(identifiable_drift(drift))) if drift.identifiable else None
+
+
+class ReferenceOut(BaseModel):
+    """How much of the reference period has been seen."""
+
+    state: ReferenceState
+    tracks: int
+    wanted: int
+    walking_speed_mps: float | None
+
+
+class ServedPoseOut(BaseModel):
+    """The answer of `GET /cameras/{id}/pose`."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    camera_id: str
+    state: PoseState
+    pose: PoseOut
+    estimated: list[str]
+    sd: SdOut | None
+    drift: DriftOut | None
+    estimates: dict[str, Any]
+    reference: ReferenceOut
+    tracks: int
+    from_: datetime | None = Field(serialization_alias="from")
+    to: datetime | None
+    model_id: str | None
+    updated_at: datetime | None
+    reason: str
+    reason_code: ReasonCode | None
+    reason_values: ReasonValues
+
+    @classmethod
+    def from_value(cls, view: PoseView) -> Self:
+        """The body of a served pose."""
+        estimate = view.estimate
+        return cls(
+            camera_id=view.camera_id,
+            state=view.state,
+            pose=PoseOut.from_value(view.pose),
+            estimated=[field for name, field in _FIELDS.items() if name in view.identifiable],
+            sd=None if estimate is None else SdOut.from_value(estimate.drift),
+            drift=None if estimate is None else DriftOut.from_value(estimate.drift),
+            estimates={} if estimate is None else in_degrees(estimate.raw),
+            reference=ReferenceOut(
+                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
+                tracks=view.reference.tracks,
+                wanted=view.reference.wanted,
+                walking_speed_mps=view.reference.walking_speed_mps,
+            ),
+            tracks=0 if estimate is None else estimate.tracks,
+            from_=None if estimate is None else moment(estimate.from_s),
+            to=None if estimate is None else moment(estimate.to_s),
+            model_id=view.model_id,
+            updated_at=None if estimate is None else estimate.created_at,
+            reason=view.reason,
+            reason_code=code_of(view.reasons),
+            reason_values=values_of(view.reasons),
+        )
+
+
+class HistoryPoint(BaseModel):
+    """One estimate of the history."""
+
+    at: datetime
+    state: PoseState
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+    heading_deg: float
+    sd: SdOut | None
+    drift: DriftOut | None
+    tracks: int
+    to: datetime
+
+    @classmethod
+    def from_record(cls, record: EstimateRecord) -> Self:
+        """The body of a stored estimate."""
+        return cls(
+            at=record.created_at,
+            state=record.state,
+            height_m=record.pose.height_m,
+            tilt_deg=math.degrees(record.pose.tilt_rad),
+            roll_deg=math.degrees(record.pose.roll_rad),
+            heading_deg=math.degrees(record.pose.heading_rad),
+            sd=SdOut.from_value(record.drift),
+            drift=DriftOut.from_value(record.drift),
+            tracks=record.tracks,
+            to=moment(record.to_s),
+        )
+
+
+class History(BaseModel):
+    """Estimates, oldest first."""
+
+    items: list[HistoryPoint]
+
+
+def moment(seconds: float) -> datetime:
+    """The aware UTC time of seconds since the epoch."""
+    return datetime.fromtimestamp(seconds, UTC)
+
+
+router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
 
 class _YamlResponse(PlainTextResponse):
     media_type = "application/yaml"
 
 
-def _answer(state: AppState, camera_id: str) -> KeptAnswer:
-    before = datetime.now(UTC)
-    with state.store.read() as session:
-        view = poses.view_pose(session, state.settings, camera_id)
-        body = written(ServedPoseOut.from_value(view))
-    clockwork = view.status.clockwork
-    hands = clockwork.hands(before)
-    # Why nobody is seen says for how long; and something may have come to its time just now.
-    lasts = not view.status.silent and clockwork.hands(datetime.now(UTC)) == hands
-
-    def holds(now: datetime) -> bool:
-        return lasts and clockwork.hands(now) == hands
-
-    return KeptAnswer(etag=view.etag, body=body, holds=holds)
-
-
-async def _show(state: AppState, camera_id: str, if_none_match: str | None) -> Response:
-    version = state.poses.version()
-    answer = state.poses.find(camera_id)
-    if answer is None or not answer.holds(datetime.now(UTC)):
-        answer = await run_in_threadpool(_answer, state, camera_id)
-        state.poses.keep(camera_id, answer, version)
-    headers = {"ETag": answer.etag}
-    if if_none_match is not None and answer.etag in map(str.strip, if_none_match.split(",")):
-        return Response(status_code=304, headers=headers)
-    return Response(answer.body, headers=headers, media_type="application/json")
-
-
-async def _show_plain(request: Request) -> Response:
-    return await _show(
-        request.state.app, request.path_params["camera_id"], request.headers.get("if-none-match")
-    )
-
-
 @router.get("/pose", response_model=ServedPoseOut)
-@straight(_show_plain)
-async def show(
+def show(
     camera_id: str,
     state: StateDep,
+    session: ReadDep,
+    response: Response,
     if_none_match: Annotated[str | None, Header()] = None,
-) -> Response:
+) -> ServedPoseOut | Response:
     """The pose now, how sure it is, and why the state is what it is."""
-    return await _show(state, camera_id, if_none_match)
+    view = poses.view_pose(session, state.settings, camera_id)
+    headers = {"ETag": view.etag}
+    if if_none_match is not None and view.etag in map(str.strip, if_none_match.split(",")):
+        return Response(status_code=304, headers=headers)
+    response.headers.update(headers)
+    return ServedPoseOut.from_value(view)
 
 
 @router.get("/pose.yaml", response_class=_YamlResponse)
@@ -130,8 +254,7 @@ def accept(
     body: AcceptBody | None = None,
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
-    said = body or AcceptBody()
-    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
+    decision = _decision(camera_id, actor, body)
     return ServedPoseOut.from_value(
         decisions.accept_pose(session, state.queue, state.settings, decision)
     )
@@ -146,8 +269,7 @@ def put_back(
     body: PutBackBody | None = None,
 ) -> ServedPoseOut:
     """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
-    said = body or PutBackBody()
-    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
+    decision = _decision(camera_id, actor, body)
     return ServedPoseOut.from_value(
         decisions.put_back(session, state.queue, state.settings, decision)
     )
@@ -162,8 +284,14 @@ def reset(
     body: ResetBody | None = None,
 ) -> ServedPoseOut:
     """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
-    said = body or ResetBody()
-    decision = decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
+    decision = _decision(camera_id, actor, body)
     return ServedPoseOut.from_value(
         decisions.learn_anew(session, state.queue, state.settings, decision)
     )
+
+
+def _decision(
+    camera_id: str, actor: Actor | None, body: _DecisionBody | None
+) -> decisions.Decision:
+    said = body or _DecisionBody()
+    return decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)

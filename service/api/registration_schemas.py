@@ -28,7 +28,7 @@ _FOLLOWS = "default_factory_not_called"  # of another error, which is told
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadForm:
-    """What a form says: values as far as they can be read, and what is wrong or missing where."""
+    """Values of a form as far as they can be read, and what is wrong or missing where."""
 
     lens: IntrinsicsBody | None
     pose: PriorPoseBody | None
@@ -61,7 +61,7 @@ class RegistrationForm(Body):
     reference_tracks: Typed = ""
 
     def read(self) -> ReadForm:
-        """What can be read of it, and what is wrong or missing."""
+        """Read it as far as that goes, and say what is wrong or missing."""
         errors: list[FieldError] = []
         lens = self._read(TypedLens, errors)
         pose: PriorPoseBody | None = None
@@ -89,7 +89,7 @@ class RegistrationForm(Body):
         return CameraBody.model_validate({"intrinsics": read.lens, "prior_pose": read.pose, **rest})
 
     def _read(self, kind: type[Made], errors: list[FieldError]) -> Made | None:
-        """What those of a kind's fields make that are not empty."""
+        """A kind, made of those of its fields that are not empty."""
         typed = {name: str(getattr(self, name, "")).strip() for name in kind.model_fields}
         return _made(kind, {name: text for name, text in typed.items() if text}, errors)
 
@@ -138,7 +138,7 @@ class TriedOut(BaseModel):
 
 
 class FilledOut(BaseModel):
-    """What a calibration file says, as the form's fields have it."""
+    """A calibration file as the form's fields have it."""
 
     fields: dict[str, str]
     text: str

@@ -20,7 +20,7 @@ class TokenBody(Body):
     expires_at: Moment | None = None
 
     def to_spec(self) -> TokenSpec:
-        """What the use case takes."""
+        """A token for the use case."""
         return TokenSpec(
             name=self.name,
             scopes=tuple(self.scopes),

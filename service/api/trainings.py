@@ -1,6 +1,5 @@
 """Trainings: queue, list, show, cancel."""
 
-import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -11,6 +10,7 @@ from service import training
 from service.api.fields import Body, Who
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
 from service.enums import TrainingState
+from service.formats.degrees import in_degrees
 from service.store.trainings import TrainingRecord
 
 
@@ -58,28 +58,10 @@ class TrainingOut(BaseModel):
     @classmethod
     def from_record(cls, record: TrainingRecord) -> Self:
         """The body of a stored training."""
-        return cls(
-            id=record.id,
-            camera_id=record.camera_id,
-            state=record.state,
-            recipe=record.recipe,
-            seed=record.seed,
-            around=None
-            if record.around is None
-            else CentreOut(
-                height_m=record.around["height_m"],
-                tilt_deg=math.degrees(record.around["tilt_rad"]),
-                roll_deg=math.degrees(record.around["roll_rad"]),
-            ),
-            progress=ProgressOut(
-                step=record.step, steps=record.steps, loss=record.loss, eta_s=record.eta_s
-            ),
-            queued_at=record.queued_at,
-            started_at=record.started_at,
-            finished_at=record.finished_at,
-            error=record.error,
-            metrics=record.metrics,
-        )
+        own = {name: getattr(record, name) for name in cls.model_fields if name != "progress"}
+        around = record.around and CentreOut(**in_degrees(record.around))
+        progress = ProgressOut.model_validate(record, from_attributes=True)
+        return cls.model_validate({**own, "around": around, "progress": progress})
 
 
 class TrainingList(BaseModel):

@@ -1,4 +1,4 @@
-"""What people type into a form, as bodies: numbers with commas, numbers pasted with brackets."""
+"""Bodies out of what people type: numbers with commas, numbers pasted with brackets."""
 
 import math
 import re
@@ -55,7 +55,7 @@ def _number(text: str) -> float:
 
 
 def _numbers(*counts: int) -> Callable[[str], list[float]]:
-    """What reads so many numbers that were pasted."""
+    """A reader of so many numbers that were pasted."""
 
     def read(text: str) -> list[float]:
         parts = [part for part in _SEPARATORS.split(text) if part]
@@ -116,7 +116,7 @@ class TypedMatrix(Body):
 
 
 class TypedRest(Body):
-    """What else there is of a camera."""
+    """The other fields of a camera."""
 
     id: CameraId | None = None
     name: CameraName | None = None

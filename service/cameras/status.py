@@ -6,14 +6,14 @@ it was a false alarm, its pose is accepted), nothing that was estimated before c
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
-from service.alerts.arrival_models import ArrivalModel, unpacked
+from service.alerts.arrival_models import unpacked
 from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
@@ -26,31 +26,12 @@ from service.store.references import SiteReferenceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Clockwork:
-    """All by which the clock alone, with nothing new in the store, changes how a camera stands.
-
-    `moments` are when somebody comes to the camera or leaves it, and when an alert's silence ends.
-    """
-
-    settings: Settings
-    rhythm: ArrivalModel | None
-    last_track_s: float | None
-    moments: tuple[datetime, ...]
-
-    def silent(self, now: datetime) -> bool:
-        """True if nobody has been seen for longer than is usual; the reasons say for how long."""
-        return is_no_data(self.settings, self.rhythm, self.last_track_s, now)
-
-    def hands(self, now: datetime) -> tuple[bool, ...]:
-        """A value that is the same at two times between which nothing changes."""
-        return (self.silent(now), *(at <= now for at in self.moments))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraFacts:
     """The stored facts that a camera's status follows from, at a moment.
 
-    `estimate` is the newest, `last_identifiable` the newest of which something is identifiable.
+    `estimate` is the newest, `last_identifiable` the newest of which something is identifiable. It
+    is `silent` where nobody has been seen for longer than is usual; `last_track_s` is the end of
+    the newest track of those that count.
     """
 
     reference: SiteReferenceRecord
@@ -58,7 +39,8 @@ class CameraFacts:
     last_identifiable: EstimateRecord | None
     attended: Attendance
     firing: Sequence[AlertRecord]
-    clockwork: Clockwork
+    silent: bool
+    last_track_s: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,12 +63,7 @@ class CameraStatus:
     alerts: tuple[AlertRecord, ...]
     attended: Attendance
     silent: bool
-    clockwork: Clockwork
-
-    @property
-    def last_track_s(self) -> float | None:
-        """The end of the newest track of those that count."""
-        return self.clockwork.last_track_s
+    last_track_s: float | None
 
     @property
     def drift(self) -> Drift | None:
@@ -120,19 +97,15 @@ def camera_statuses(
     before = metrics.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, each in newest.items():
-        attending = windows.get(camera_id, [])
+        arrivals = None if each.rhythm is None else unpacked(each.rhythm)
         facts = CameraFacts(
             reference=each.reference,
             estimate=each.estimate,
             last_identifiable=before.get(camera_id) if camera_id in without else each.estimate,
-            attended=attendance_by(attending, now),
+            attended=attendance_by(windows.get(camera_id, []), now),
             firing=firing[camera_id],
-            clockwork=Clockwork(
-                settings=settings,
-                rhythm=None if each.rhythm is None else unpacked(each.rhythm),
-                last_track_s=each.last_track_s,
-                moments=tuple(_moments(attending, firing[camera_id])),
-            ),
+            silent=is_no_data(settings, arrivals, each.last_track_s, now),
+            last_track_s=each.last_track_s,
         )
         found[camera_id] = status_of(facts, now)
     return found
@@ -146,14 +119,13 @@ def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
     alerts = tuple(sorted(facts.firing, key=lambda alert: _urgency(alert, now)))
     cause = _cause(reference, facts.attended, now)
     holding = _holds(alerts)
-    silent = facts.clockwork.silent(now)
     state: PoseState
     if holding:
         estimate = estimate if judged else facts.last_identifiable
         state = PoseState.DRIFTING
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
-    elif silent:
+    elif facts.silent:
         state = PoseState.NO_DATA
     elif judged and estimate is not None:
         state = estimate.state
@@ -169,25 +141,14 @@ def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
         cause=cause,
         alerts=alerts,
         attended=facts.attended,
-        silent=silent,
-        clockwork=facts.clockwork,
+        silent=facts.silent,
+        last_track_s=facts.last_track_s,
     )
 
 
 def _identifies(estimate: EstimateRecord | None) -> bool:
     """True if the newest estimate is the last that tells something; none is the last, too."""
     return estimate is None or bool(estimate.identifiable)
-
-
-def _moments(
-    windows: Sequence[MaintenanceRecord], firing: Sequence[AlertRecord]
-) -> Iterator[datetime]:
-    for window in windows:
-        yield window.from_at
-        yield window.until
-    for alert in firing:
-        if alert.silenced_until is not None:
-            yield alert.silenced_until
 
 
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
@@ -246,8 +207,8 @@ def _since(
     reference = facts.reference
     if alerts:
         return alert_since(alerts[0])
-    if state == PoseState.NO_DATA and facts.clockwork.last_track_s is not None:
-        return datetime.fromtimestamp(facts.clockwork.last_track_s, UTC)
+    if state == PoseState.NO_DATA and facts.last_track_s is not None:
+        return datetime.fromtimestamp(facts.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
         return reference.answered_at
     return reference.created_at if reference.ready_at is None else reference.ready_at

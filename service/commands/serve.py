@@ -14,7 +14,7 @@ import uvicorn
 
 from service.access.tokens import count_tokens
 from service.api.middleware.connections import ConnectionGuard, protocol_factory
-from service.api.middleware.reach import auth_on, is_loopback
+from service.api.middleware.hosts import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings

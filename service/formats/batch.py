@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
-from service.formats.people import NoPersonError
+from service.formats.json_track import read_track
 from service.formats.track import (
     MAX_ID_LENGTH,
     MAX_TRACKS,
@@ -16,10 +16,10 @@ from service.formats.track import (
     Clock,
     IncomingTrack,
     Limits,
+    NoPersonError,
     Rejection,
     TrackRejectedError,
     is_text,
-    read_track,
 )
 
 DEFAULT_SOURCE = "unnamed"
@@ -131,7 +131,7 @@ def read_time(value: Any, pointer: str) -> float:
 def collect(
     items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int = 0
 ) -> Batch:
-    """What could be read of tracks, each with its index, what it was and how to read it."""
+    """The batch of tracks, each given with its index, what it was and how to read it."""
     tracks, rejections = [], []
     for index, raw, read in items:
         try:

@@ -29,7 +29,7 @@ _free = threading.BoundedSemaphore(_AT_ONCE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationFile:
-    """What a file says; None where it does not. `rotation` has 9 numbers, or 3 of a vector."""
+    """Numbers of a file; None where it has none. `rotation` has 9 numbers, or 3 of a vector."""
 
     matrix: tuple[float, ...] | None
     distortion: tuple[float, ...] | None

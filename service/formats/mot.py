@@ -8,8 +8,8 @@ import numpy as np
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.batch import check_count, collect, malformed, refuse
-from service.formats.people import COCO_PEOPLE
 from service.formats.track import (
+    COCO_PEOPLE,
     MAX_ID_LENGTH,
     Batch,
     Clock,
@@ -31,7 +31,7 @@ _MOST_NAMED = 12  # class numbers in a message
 
 @dataclass(slots=True)
 class _Lines:
-    """What was read of a text: numbers of lines by track, lines that cannot be read by track."""
+    """Lines of a text: numbers of lines by track, lines that cannot be read by track."""
 
     rows: dict[str, list[list[float]]] = field(default_factory=dict)
     broken: dict[str, str] = field(default_factory=dict)
@@ -145,7 +145,7 @@ def _class_of(row: list[float], *, given: bool) -> float:
 
 
 def _counts(row: list[float], people: frozenset[float], *, given: bool) -> bool:
-    """Whether a line is one of a person that is not to be ignored."""
+    """True of a line of a person that is not to be ignored."""
     if len(row) > _CONF and row[_CONF] == 0:
         return False
     number = _class_of(row, given=given)

@@ -1,22 +1,21 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from models.geometry.rotation import Array
 from models.tracks.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
-from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
-from service.formats.people import check_person
-from service.formats.rows import LARGEST, plain_rows
 
+# Of detectors trained on COCO, BoxMOT's among them.
+COCO_PEOPLE = frozenset((0.0,))
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
 MAX_ID_LENGTH = 200
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
+FOOT_COLUMNS = 3  # of a point: time, u and v; after them its head's, where it carries one
 _YEAR_9999_S = 253_402_300_799.0
 
 
@@ -35,14 +34,14 @@ class IncomingTrack:
 
     @property
     def stored_bytes(self) -> int:
-        """How much of the store it takes."""
+        """Size in the store."""
         arrays = (self.points, self.boxes, self.heads)
         return sum(array.nbytes for array in arrays if array is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rejection:
-    """Why one track of a request was not stored; `index` is its place in the request."""
+    """The reason why one track of a request is not stored; `index` is its place in the request."""
 
     index: int
     track_id: str | None
@@ -52,7 +51,7 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What could be read of a request; `left_out` lines or tracks of it were of no person."""
+    """Tracks as read of a request; `left_out` lines or tracks of it were of no person."""
 
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
@@ -61,7 +60,7 @@ class Batch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clock:
-    """How frame numbers become times; unset where the request does not say."""
+    """Conversion of frame numbers to times; unset where the request does not say."""
 
     frame_rate_hz: float | None
     started_at_s: float | None
@@ -69,7 +68,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What tracks have to keep to: the picture, and the time by our clock.
+    """Limits of tracks: the picture, and the time by our clock.
 
     A track of later than now owns the camera's window, which is of the newest tracks, until that
     time comes: `max_ahead_s` is what clocks may differ by.
@@ -81,6 +80,10 @@ class Limits:
     max_ahead_s: float
 
 
+class NoPersonError(Exception):
+    """A track is of something that does not walk, as its class says."""
+
+
 class TrackRejectedError(Exception):
     """One track breaks a limit; the others of its request do not suffer."""
 
@@ -88,51 +91,6 @@ class TrackRejectedError(Exception):
         super().__init__(detail)
         self.code = code
         self.detail = detail
-
-
-# How many numbers a row has: of a point three, or five with its head.
-_FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
-_FOOT = 3
-
-
-def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
-    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
-
-    Raises:
-        TrackRejectedError: with a code, the field, the limit and the value received.
-        NoPersonError: its class is none of a person; null is none at all.
-    """
-    if isinstance(raw, OversizedTrack):
-        raise TrackRejectedError(
-            "too_many_points",
-            f"a track of at most {MAX_TRACK_CHARS} characters is taken, got {raw.characters}",
-        )
-    if not isinstance(raw, dict):
-        raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
-    try:
-        check_person(raw.get("class"))
-    except ValueError as error:
-        raise TrackRejectedError("malformed", str(error)) from error
-    given = [name for name in _FORMS if name in raw]
-    if len(given) != 1:
-        raise TrackRejectedError(
-            "malformed",
-            f"one of points, boxes, frames, frame_boxes is needed, got {given or 'none'}",
-        )
-    form = given[0]
-    rows = _numbers(form, raw[form], _FORMS[form])
-    if form.startswith("frame"):
-        if clock.frame_rate_hz is None or clock.started_at_s is None:
-            raise TrackRejectedError(
-                "no_clock", f"{form}: frame_rate_hz and started_at are needed beside it"
-            )
-        rows[:, 0] = clock.started_at_s + rows[:, 0] / clock.frame_rate_hz
-    name = track_name(raw.get("id"))
-    if form.endswith("boxes") or rows.shape[1] == _FOOT:
-        return check_track(name, source, rows, limits)
-    heads = rows[:, _FOOT:]
-    check_heads(rows, (limits.width, limits.height))
-    return replace(check_track(name, source, rows[:, :_FOOT], limits), heads=heads)
 
 
 def check_heads(rows: Array, size: tuple[int, int]) -> None:
@@ -150,7 +108,7 @@ def check_heads(rows: Array, size: tuple[int, int]) -> None:
             f"points/{at}/4: a head above its foot, v_head below {rows[at, 2]:g}, is needed, "
             f"got {rows[at, 4]:g}",
         )
-    _check_inside(rows[:, _FOOT:], size, "heads of points")
+    _check_inside(rows[:, FOOT_COLUMNS:], size, "heads of points")
 
 
 def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> IncomingTrack:
@@ -219,45 +177,11 @@ def track_name(value: Any) -> str:
 
 
 def is_text(value: str) -> bool:
-    """Whether a text can be stored and sent again; JSON's escapes allow half a surrogate pair."""
+    """True of text that can be stored and sent; JSON's escapes allow half a surrogate pair."""
     try:
         return "\0" not in value and bool(value.encode())
     except UnicodeEncodeError:
         return False
-
-
-def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
-    if not isinstance(value, list):
-        raise TrackRejectedError("malformed", f"{form}: a list is needed, got {value!r:.60}")
-    if len(value) > MAX_POINTS:
-        raise TrackRejectedError(
-            "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
-        )
-    if (plain := plain_rows(value, taken)) is not None:
-        return plain
-    columns = taken[0]
-    for at, row in enumerate(value):
-        if not at and isinstance(row, list) and len(row) in taken:
-            columns = len(row)
-        if not isinstance(row, list) or len(row) != columns:
-            needed = str(columns) if at else " or ".join(map(str, taken))
-            if isinstance(row, list) and len(row) in taken:
-                needed += ", as in the first point: all points carry a head or none,"
-            raise TrackRejectedError(
-                "malformed", f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}"
-            )
-        for number in row:
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                # JSON has no NaN; some writers put null or a word in its place.
-                code = "not_finite" if number is None else "malformed"
-                raise TrackRejectedError(
-                    code, f"{form}/{at}: numbers are needed, got {number!r:.40}"
-                )
-            if isinstance(number, int) and abs(number) > LARGEST or math.isinf(number):
-                raise TrackRejectedError(
-                    "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
-                )
-    return np.array(value, dtype=np.float64).reshape(-1, columns)
 
 
 def _check_finite(rows: Array) -> None:

@@ -1,1 +1,1 @@
-"""What stands around the routes: connections, limits, access, errors, dependencies."""
+"""Middleware around the routes: connections, limits, access, errors; their dependencies."""

@@ -1,11 +1,11 @@
-"""Bodies are read whole before anything is done with them, up to a size, and so many at once."""
+"""Limits of bodies: each is read whole before anything is done with it, and so many at once."""
 
 import re
 
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.middleware.lanes import Lanes
+from service.api.middleware.concurrency import Lanes
 from service.errors import OverloadedError, TooLargeError
 from service.settings import Settings
 

@@ -31,7 +31,7 @@ _LATE = (
 
 
 class ConnectionGuard:
-    """What the connections of a server share: their number, and whose they are."""
+    """Shared state of a server's connections: their number, and whose they are."""
 
     def __init__(self, settings: Settings, instruments: Instruments) -> None:
         soft = allow_descriptors()
@@ -46,12 +46,12 @@ class ConnectionGuard:
 
 
 def protocol_factory(guard: ConnectionGuard) -> Callable[..., asyncio.Protocol]:
-    """What uvicorn makes its connections with."""
+    """The factory of uvicorn's connections."""
     return partial(GuardedProtocol, guard=guard)
 
 
 def allow_descriptors() -> int:
-    """As many file descriptors as this process may have, once it may have all it can get."""
+    """The most file descriptors of this process, raised to all that it can get."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != hard:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))

@@ -1,4 +1,4 @@
-"""What routes are given: the application's state, sessions and bodies.
+"""Dependencies of routes: the application's state, sessions and bodies.
 
 Coroutines, where nothing waits: anything else is given a thread, which costs more than most of them
 do.
@@ -14,8 +14,7 @@ from fastapi import Depends, Header, Request
 from sqlalchemy.orm import Session
 
 from service.access.callers import Caller
-from service.api.middleware.direct.feed import Feed
-from service.api.middleware.direct.kept import Kept, KeptAnswer
+from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
 from service.cameras.posts import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
@@ -28,9 +27,7 @@ from service.store.engines.turns import Turns
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppState:
-    """What one application holds from start to stop.
-
-    `poses` are the answers to who asks for the pose of a camera, by its id.
+    """State of one application from start to stop.
 
     Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
     are read in `large_bodies`' turns.
@@ -42,7 +39,6 @@ class AppState:
     quota: Quota
     stream_polls: anyio.CapacityLimiter
     feed: Feed
-    poses: Kept[KeptAnswer]
     pictures: Pictures = field(default_factory=Pictures)
     watched: Watched = field(default_factory=Watched)
     instruments: Instruments = field(default_factory=Instruments)
@@ -66,7 +62,7 @@ async def read_session(state: StateDep) -> AsyncIterator[Session]:
 
 
 async def get_caller(request: Request) -> Caller | None:
-    """Who asks; None where access is off."""
+    """The caller; None where access is off."""
     caller: Caller | None = getattr(request.state, "caller", None)
     return caller
 
@@ -83,7 +79,7 @@ ActorDep = Annotated[Actor | None, Depends(get_actor)]
 
 
 def name_of(actor: Actor | None, said: str | None = None) -> str | None:
-    """Who acts: the person who is known; where access is off, whoever the body says."""
+    """The name of who acts: the person who is known; where access is off, whoever the body says."""
     return said if actor is None else actor.name
 
 

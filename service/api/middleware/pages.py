@@ -1,7 +1,10 @@
-"""What every page shares: templates, static files, and the headers that keep strangers out."""
+"""Templates, files and headers of pages: scripts and styles come from this host alone."""
 
 import gzip
 import hashlib
+from functools import lru_cache
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +16,7 @@ from starlette.types import Scope
 
 _WEB = Path(__file__).parents[2] / "pages"
 _STATIC = _WEB / "static"
+_MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css"}
 _LARGE = 16_384  # bytes; a phone far away gets larger pages packed
 # No other host, no inline script, no inline style, no frame: a name that was typed is never run.
 HEADERS = {
@@ -22,6 +26,27 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
+
+
+# Of what has a version in its path.
+_FOR_EVER = {
+    "Cache-Control": "public, max-age=31536000, immutable",
+    "X-Content-Type-Options": "nosniff",
+}
+
+
+def _versioned_url(package: str, name: str) -> str:
+    path = Path(name)
+    return f"/ui/{path.stem}-{version(package)}{path.suffix}"
+
+
+CHARTS = "package_data/plotly.min.js"
+CHARTS_URL = _versioned_url("plotly", CHARTS)
+# Of the viewer the files alone; none of its code is run.
+VIEWER_MODULE = "fastapi_swagger"
+VIEWER_SCRIPT, VIEWER_STYLE = "resources/swagger-ui-bundle.js", "resources/swagger-ui.css"
+VIEWER_SCRIPT_URL = _versioned_url("fastapi-swagger", VIEWER_SCRIPT)
+VIEWER_STYLE_URL = _versioned_url("fastapi-swagger", VIEWER_STYLE)
 
 
 def _fingerprint() -> str:
@@ -44,8 +69,7 @@ class _KeptFiles(StaticFiles):
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
-        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers.update(_FOR_EVER)
         return response
 
 
@@ -55,7 +79,7 @@ def mount_static(app: FastAPI) -> None:
 
 
 def wants_page(request: Request) -> bool:
-    """Whether somebody looks for a page in a browser, rather than a program for an answer."""
+    """True where somebody looks for a page in a browser, not a program for an answer."""
     looks = request.method == "GET" and request.url.path.startswith("/ui/")
     return looks and "text/html" in request.headers.get("accept", "")
 
@@ -71,3 +95,27 @@ def render(request: Request, template: str, status: int = 200, **context: Any) -
         page.headers["Content-Length"] = str(len(page.body))
         page.headers["Vary"] = "Accept-Encoding"
     return page
+
+
+def packaged_file(module: str, name: str, accept_encoding: str) -> Response:
+    """A file of an installed package, packed where the browser takes that."""
+    path = _path(module, name)
+    headers = {**_FOR_EVER, "Vary": "Accept-Encoding"}
+    packed = "gzip" in accept_encoding
+    if packed:
+        headers["Content-Encoding"] = "gzip"
+    body = _packed(path) if packed else path.read_bytes()
+    return Response(body, media_type=_MEDIA_TYPES[path.suffix], headers=headers)
+
+
+def _path(module: str, name: str) -> Path:
+    # Found without importing the package, which may be large.
+    spec = find_spec(module)
+    assert spec is not None
+    assert spec.submodule_search_locations
+    return Path(spec.submodule_search_locations[0]) / name
+
+
+@lru_cache(maxsize=4)
+def _packed(path: Path) -> bytes:
+    return gzip.compress(path.read_bytes(), 6, mtime=0)

@@ -1,4 +1,4 @@
-"""Every error as a problem document (RFC 9457); for who looks for a page, a page."""
+"""Problem documents (RFC 9457) for all errors; a page for who looks for a page."""
 
 import json
 import logging

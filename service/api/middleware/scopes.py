@@ -1,11 +1,11 @@
-"""What each route needs, in one place; a test fails for a route that is not here."""
+"""Scopes that routes need, in one place; a test fails for a route that is not here."""
 
 import re
 from collections import defaultdict
 
 from starlette.routing import compile_path
 
-from service.api.middleware.packaged import CHARTS_URL, VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
+from service.api.middleware.pages import CHARTS_URL, VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
 from service.enums import TokenScope
 
 # None: whoever asks.
@@ -113,7 +113,7 @@ for (_method, _path), _need in sorted(NEEDS.items(), key=lambda item: item[0][1]
 
 
 def need_of(method: str, path: str) -> tuple[Need, dict[str, str]]:
-    """What a request needs, and the parameters of its path.
+    """The scope that a request needs, and the parameters of its path.
 
     What is not declared needs most: `read` to be told that there is nothing, else `admin`.
     """

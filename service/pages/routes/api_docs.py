@@ -5,15 +5,15 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Request
 from fastapi.responses import HTMLResponse, Response
 
-from service.api.middleware.packaged import (
+from service.api.middleware.pages import (
     VIEWER_MODULE,
     VIEWER_SCRIPT,
     VIEWER_SCRIPT_URL,
     VIEWER_STYLE,
     VIEWER_STYLE_URL,
     packaged_file,
+    render,
 )
-from service.api.middleware.pages import render
 
 router = APIRouter(include_in_schema=False)
 

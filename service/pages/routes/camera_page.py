@@ -6,8 +6,7 @@ from fastapi import APIRouter, Header, Request
 from fastapi.responses import HTMLResponse, Response
 
 from service.api.middleware.dependencies import ReadDep, StateDep
-from service.api.middleware.packaged import CHARTS, CHARTS_URL, packaged_file
-from service.api.middleware.pages import render
+from service.api.middleware.pages import CHARTS, CHARTS_URL, packaged_file, render
 from service.enums import AlertState
 from service.pages.camera_drawings import draw_camera
 from service.pages.camera_page import CameraPage, view_camera_page

@@ -5,10 +5,10 @@ from fastapi.responses import RedirectResponse, Response
 
 from models.durations import HOUR_S
 from service.access import sessions
+from service.api.middleware.authentication import COOKIE, is_proxy, refuse
 from service.api.middleware.dependencies import CallerDep, StateDep, WriteDep
-from service.api.middleware.guard import COOKIE, is_proxy, refuse
+from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import render
-from service.api.middleware.reach import auth_on
 from service.errors import ForbiddenError, ServiceError, TooManyRequestsError, UnauthorizedError
 from service.pages.routes.forms import FormDep
 from service.settings import Settings

@@ -9,8 +9,8 @@ from sqlalchemy.orm import Session
 from service.access import tokens
 from service.access.tokens import MadeToken, TokenSpec
 from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import render
-from service.api.middleware.reach import auth_on
 from service.api.tokens_schemas import TokenBody, TokenList, TokenMade, TokenOut
 from service.errors import FieldError, MalformedError
 from service.pages.routes.forms import Form, FormDep

@@ -90,24 +90,9 @@ class Postgresql:
         """Never: no connection is only to look."""
         return False
 
-    def changes(self) -> "Unwatched":
-        """A watcher of changes to the store."""
-        return Unwatched()
-
     def lock(self, name: str) -> "ServerLock":
         """A lock that one process of all machines has."""
         return ServerLock(self.engine, name)
-
-
-class Unwatched:
-    """Nobody tells whether the store has changed: to ask the server takes as long as to read."""
-
-    def version(self) -> None:
-        """Never known."""
-        return
-
-    def close(self) -> None:
-        """Nothing is open."""
 
 
 def wait_for(connection: Connection, about: str) -> None:

@@ -1,7 +1,6 @@
 """A store in an SQLite file: its connections, and one writer after the other."""
 
 import fcntl
-import logging
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -16,8 +15,6 @@ from service.data_dir import make_file
 from service.store.engines.prepared import Prepared
 from service.store.engines.turns import Turns
 
-log = logging.getLogger("surefoot.store")
-
 _BEGIN = Prepared(text("BEGIN IMMEDIATE"))
 # SQLite asks for a lock that others have less and less often, every tenth of a second in the end:
 # where several processes write all the time, who has waited long is hardly ever there when it is
@@ -27,42 +24,6 @@ _LOOK_ONLY, _LOOK_AND_WRITE = (
     Prepared(text(f"PRAGMA query_only={state}")) for state in ("ON", "OFF")
 )
 _WAL_BYTES = 64 * 2**20  # what stays of the write-ahead log once it has been written back
-
-
-class Changes:
-    """Tells by a number whether a database is as it was; for one thread.
-
-    The number is SQLite's `data_version` of a connection of its own, which never writes: where it
-    is the same twice, nobody, of this process or another, has committed anything in between. It is
-    read from memory that all processes share, and waits for nobody.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._uri = f"{path.absolute().as_uri()}?mode=rw"
-        self._connection: sqlite3.Connection | None = None
-
-    def version(self) -> int | None:
-        """The number now; None where it cannot be told."""
-        try:
-            if self._connection is None:
-                self._connection = self._connected()
-            # All rows, so that the statement ends, and with it its hold on the log.
-            ((version,),) = self._connection.execute("PRAGMA data_version").fetchall()
-        except sqlite3.Error as error:
-            log.warning("changes_unknown", extra={"said": str(error)})
-            return None
-        return int(version)
-
-    def close(self) -> None:
-        """Close the connection."""
-        if self._connection is not None:
-            self._connection.close()
-
-    def _connected(self) -> sqlite3.Connection:
-        # Once: numbers of different connections say nothing of each other.
-        connection = sqlite3.connect(self._uri, uri=True, isolation_level=None, timeout=0)
-        connection.execute("PRAGMA query_only=ON")
-        return connection
 
 
 class FileLock:
@@ -136,10 +97,6 @@ class Sqlite:
     def refused(self, error: DBAPIError) -> bool:
         """True of an error that says that a connection was only to look."""
         return _is(error, sqlite3.SQLITE_READONLY)
-
-    def changes(self) -> Changes:
-        """A watcher of changes to the store."""
-        return Changes(self._path)
 
     def lock(self, name: str) -> FileLock:
         """A lock that one process of this machine has."""

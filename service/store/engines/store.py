@@ -14,15 +14,13 @@ from service.store.engines.dialects import is_sqlite
 from service.store.engines.postgresql import (
     Postgresql,
     ServerLock,
-    Unwatched,
     postgresql_engine,
     wait_for,
 )
-from service.store.engines.sqlite import Changes, FileLock, Sqlite, sqlite_engine
+from service.store.engines.sqlite import FileLock, Sqlite, sqlite_engine
 
 R = TypeVar("R")
 Backend = Sqlite | Postgresql
-Watcher = Changes | Unwatched
 Lock = FileLock | ServerLock
 
 _PATIENCE_S = 30.0  # of workers, who have nobody waiting for an answer
@@ -115,10 +113,6 @@ class Store:
         ):
             self._backend.begin(connection, about)
             yield connection
-
-    def changes(self) -> Watcher:
-        """A watcher of changes to the store; for one thread."""
-        return self._backend.changes()
 
     def lock(self, name: str) -> Lock:
         """A lock that one process of all that share the store has, as long as it lives."""

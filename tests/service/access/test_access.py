@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
-from service.api.middleware.reach import auth_on
+from service.api.middleware.hosts import auth_on
 from service.api.middleware.scopes import NEEDS, need_of
 from service.app import create_app
 from service.store.engines.store import Store

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
-from service.api.middleware.guard import COOKIE
+from service.api.middleware.authentication import COOKIE
 from service.app import create_app
 from service.store.access import SessionRecord
 from service.store.engines.store import Store

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from service.api.middleware.packaged import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
+from service.api.middleware.pages import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
 
 
 def test_the_viewer_asks_no_other_host_and_runs_nothing_inline(http):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 from sqlalchemy.exc import OperationalError
 
-from service.api.middleware.direct import feed as feeds
-from service.api.middleware.direct.feed import Feed, wait
+from service.api.middleware import event_feed as feeds
+from service.api.middleware.event_feed import Feed, wait
 
 
 class Events:

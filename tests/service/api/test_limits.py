@@ -9,7 +9,7 @@ from sqlalchemy import text
 
 from models.tracks.scenes import SceneTrack
 from models.tracks.trajectory import Trajectory
-from service.api.middleware.rates import Buckets
+from service.api.middleware.rate_limits import Buckets
 from service.app import create_app
 from service.commands.replay import post_tracks
 from service.errors import TooManyRequestsError
@@ -44,7 +44,7 @@ class Clock:
 def clock(monkeypatch):
     """The clock of the rates, and of a replay that waits for them."""
     clock = Clock()
-    monkeypatch.setattr("service.api.middleware.rates.time", clock)
+    monkeypatch.setattr("service.api.middleware.rate_limits.time", clock)
     monkeypatch.setattr("service.commands.replay.time", clock)
     return clock
 
@@ -85,7 +85,7 @@ def test_a_caller_asks_so_often_but_health_is_free(settings):
 
 
 def test_a_bucket_fills_again_and_the_quiet_are_forgotten(clock, monkeypatch):
-    monkeypatch.setattr("service.api.middleware.rates._MOST_KEYS", 3)
+    monkeypatch.setattr("service.api.middleware.rate_limits._MOST_KEYS", 3)
     buckets = Buckets("rate", 2.0)
     for _ in range(10):
         buckets.take("a")

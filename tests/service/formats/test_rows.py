@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.formats import track
-from service.formats.rows import LARGEST, plain_rows
+from service.formats import json_track
+from service.formats.json_track import LARGEST, plain_rows
 
 _NUMBERS = st.one_of(
     st.floats(),
@@ -51,8 +51,8 @@ def test_good_rows_are_an_array_of_their_own():
 def closely(rows):
     """What comes of rows where each number is looked at."""
     try:
-        return track._numbers("points", rows, (3, 5)).tolist()
-    except track.TrackRejectedError as refused:
+        return json_track._numbers("points", rows, (3, 5)).tolist()
+    except json_track.TrackRejectedError as refused:
         return refused.code, refused.detail
 
 
@@ -62,5 +62,5 @@ def closely(rows):
 )
 def test_it_comes_to_the_same_as_a_close_look(rows):
     quick = closely(rows)
-    with patch.object(track, "plain_rows", lambda *_: None):
+    with patch.object(json_track, "plain_rows", lambda *_: None):
         assert repr(closely(rows)) == repr(quick)

@@ -6,7 +6,7 @@ import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
 from service.alerts import alerts
-from service.api.alerts_schemas import AlertOut
+from service.api.alerts import AlertOut
 from service.enums import MessageType
 from service.notifications.outbox import alert_body
 from service.reasons import as_said

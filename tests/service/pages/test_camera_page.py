@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from service.api.middleware.packaged import CHARTS_URL
+from service.api.middleware.pages import CHARTS_URL
 from service.app import create_app
 from tests.conftest import CAMERA, track
 from tests.service.bench import PRIOR, moved

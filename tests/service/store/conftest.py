@@ -6,7 +6,6 @@ from tests.stores.databases import only_sqlite
 
 _OF_FILES = {
     "test_backup.py": "backs up the file",
-    "test_changes.py": "looks at the file's data_version",
     "test_check.py": "looks over the file",
     "test_prepared.py": "runs statements on the file's driver",
     "test_small_disk.py": "fills the disk of the file",

@@ -10,7 +10,8 @@ from models.geometry.pose import CameraPose
 from service.cameras.cameras import add_prior_pose
 from service.cameras.tracks import receive_tracks
 from service.estimate_queue import begin_look, end_look, request_estimate
-from service.formats.track import Batch, Clock, Limits, read_track
+from service.formats.json_track import read_track
+from service.formats.track import Batch, Clock, Limits
 from service.store import cameras, tracks, trainings, windows
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store

@@ -1,22 +1,36 @@
-"""Who in a browser may ask: requests for our own names, and acts of our own pages alone.
+"""Hosts that this service goes by, and origins of pages that may ask: its own alone.
 
 Every page of the web can send requests from the browser of an operator, and any name can be made
 to lead to this service. Programs send neither `Origin` nor `Sec-Fetch-Site` and pass.
 """
 
 import socket
+from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.middleware.reach import host_names, is_address, is_loopback
 from service.errors import ServiceError
 from service.settings import Settings
 
+_LOCAL = "localhost"
 _SAFE = frozenset(("GET", "HEAD", "OPTIONS"))
 _OURS = frozenset(("same-origin", "none"))
 _PORTS = {"http": 80, "https": 443}
+
+
+def is_loopback(host: str) -> bool:
+    """True of a name or an address of this machine's own."""
+    return host == _LOCAL or (_is_address(host) and ip_address(host).is_loopback)
+
+
+def auth_on(settings: Settings) -> bool:
+    """True where tokens are needed: by themselves wherever others than this machine may ask."""
+    if settings.auth != "auto":
+        return settings.auth == "on"
+    here = is_loopback(settings.host) and is_loopback(_public_host(settings) or _LOCAL)
+    return not here or bool(settings.proxy_from)
 
 
 class MisdirectedError(ServiceError):
@@ -36,7 +50,7 @@ class OriginMiddleware:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
-        self._names = host_names(settings)
+        self._names = _host_names(settings)
         # A page can be given any name, but no address that it was not fetched from; beyond
         # loopback nobody knows all names and addresses that lead here.
         self._any_address = not is_loopback(settings.host)
@@ -86,7 +100,7 @@ class OriginMiddleware:
         name = (_split(f"//{host}")[0] or "").rstrip(".")
         if name in self._names:
             return
-        if is_address(name) and (self._any_address or is_loopback(name)):
+        if _is_address(name) and (self._any_address or is_loopback(name)):
             return
         raise MisdirectedError(
             f"Host: this service does not go by {host!r:.80}; SUREFOOT_ALLOWED_HOSTS takes the "
@@ -101,6 +115,24 @@ class OriginMiddleware:
                 raise ForeignOriginError(
                     f"Origin: pages of this service alone may do this, got {origin!r:.80}"
                 )
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _public_host(settings: Settings) -> str:
+    return urlsplit(settings.public_url or "").hostname or ""
+
+
+def _host_names(settings: Settings) -> frozenset[str]:
+    """Names and addresses that requests may be for; small letters, without ports."""
+    given = {part.strip().lower().strip("[]") for part in settings.allowed_hosts.split(",")}
+    return frozenset({_LOCAL, settings.host.lower(), _public_host(settings), *given} - {""})
 
 
 def _split(url: str) -> tuple[str | None, int | None]:

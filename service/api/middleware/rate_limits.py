@@ -1,4 +1,4 @@
-"""How often a token, or an address without one, may ask, and how often a camera may be told of."""
+"""Rate limits of a token, or an address without one, and of posts about a camera."""
 
 import re
 import time

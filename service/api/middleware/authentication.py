@@ -1,4 +1,4 @@
-"""Lets in who may come: by a token, a page's session, or a proxy that logs people in."""
+"""Authentication by a token, a page's session, or a proxy that logs people in."""
 
 import hmac
 import logging
@@ -17,9 +17,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
 from service.access.callers import Caller
-from service.api.middleware.lanes import LOOKUPS
+from service.api.middleware.concurrency import LOOKUPS
+from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import STATIC_URL
-from service.api.middleware.reach import auth_on
 from service.api.middleware.scopes import need_of
 from service.enums import TokenScope
 from service.errors import (
@@ -144,7 +144,7 @@ class GuardMiddleware:
 
 
 def still_let_in(request: Request) -> bool:
-    """Whether who asked may still have the answer: one that goes on is asked again and again."""
+    """True while who asked may have the answer: asked again and again of one that goes on."""
     holds: Callable[[], bool] | None = getattr(request.state, "access_holds", None)
     return holds is None or holds()
 
@@ -170,7 +170,7 @@ def refuse(request: Request) -> None:
 
 
 def is_proxy(request: Request, settings: Settings) -> bool:
-    """Whether a request comes from where a proxy of ours is."""
+    """True of a request that comes from where a proxy of ours is."""
     try:
         peer = ip_address(request.client.host if request.client else "")
     except ValueError:
@@ -179,7 +179,7 @@ def is_proxy(request: Request, settings: Settings) -> bool:
 
 
 def address_of(request: Request, settings: Settings) -> str:
-    """Where a request comes from, as far as can be known: through a proxy of ours, behind it."""
+    """The address of a client, as far as can be known: through a proxy of ours, behind it."""
     forwarded = request.headers.get("x-forwarded-for", "").rpartition(",")[2].strip()
     if forwarded and is_proxy(request, settings):
         return forwarded[:64]
@@ -187,7 +187,7 @@ def address_of(request: Request, settings: Settings) -> str:
 
 
 def _finder(request: Request, settings: Settings) -> Callable[[Store], Caller | None]:
-    """How to find out who asks; asked again while an answer goes on and on."""
+    """The look for who asks; repeated while an answer goes on and on."""
     given = request.headers.get("authorization")
     vouched = _vouched_for(request, settings)
     cookie = request.cookies.get(COOKIE)
@@ -228,7 +228,7 @@ def _is_static(request: Request) -> bool:
 
 
 def _looks_for_page(request: Request) -> bool:
-    """Whether a person looks for a page, to be led to the login."""
+    """True of a person who looks for a page, to be led to the login."""
     if request.method != "GET" or "authorization" in request.headers:
         return False
     if request.headers.get("sec-fetch-mode", "navigate") != "navigate":

@@ -1,13 +1,19 @@
-"""So many requests at once, so many waiting, and no more: the others are told to come back.
+"""Limits of concurrency: so many requests at once, so many waiting, the others come back later.
 
 Kinds of requests have lanes of their own, so that none starves another; `/healthz` needs none.
 """
 
 import asyncio
+import math
+import threading
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 
+import anyio
+import anyio.to_thread
+from anyio._backends import _asyncio
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.errors import OverloadedError
@@ -15,6 +21,9 @@ from service.settings import Settings
 
 _COME_BACK_S = 2.0
 _OPERATION_AT_ONCE = 2
+STREAM_POLLS = 2  # of all event streams together
+LOOKUPS = 4  # of who asks, before a request has its turn
+_THREADS_START_S = 30.0  # at the longest
 
 
 class Lane:
@@ -125,9 +134,20 @@ class LaneMiddleware:
 
 
 def sessions_at_once(settings: Settings) -> int:
-    """How many sessions requests may have at once: a request has one at a time."""
+    """The most sessions that requests have at once: a request has one at a time."""
     return 2 * settings.http_at_once + _OPERATION_AT_ONCE + STREAM_POLLS + LOOKUPS
 
 
-STREAM_POLLS = 2  # of all event streams together
-LOOKUPS = 4  # of who asks, before a request has its turn
+async def start_threads(number: int) -> None:
+    """Start as many threads as may answer at once, in this event loop; they end with it.
+
+    The loop waits for a thread that it starts to run, up to 16 ms where 64 clients keep two cores
+    busy, and nobody is answered meanwhile: so all are made before the first request, and kept.
+    """
+    # anyio ends what has been idle for 10 s, and has no setting for it.
+    _asyncio.WorkerThread.MAX_IDLE_TIME = math.inf  # type: ignore[assignment]
+    anyio.to_thread.current_default_thread_limiter().total_tokens = number
+    together = threading.Barrier(number)  # a thread that waits is not given to the next
+    async with anyio.create_task_group() as group:
+        for _ in range(number):
+            group.start_soon(partial(anyio.to_thread.run_sync, together.wait, _THREADS_START_S))

@@ -57,7 +57,7 @@ class Feed:
             self._to = None
 
     def since(self, seen: int) -> list[EventRecord] | None:
-        """What has come after an event; None where that is longer ago than what is kept."""
+        """Events after one; None where that is longer ago than what is kept."""
         if self._to is None or seen < self._from:
             return None
         return [record for record in self._kept if record.id > seen]

@@ -1,1 +1,0 @@
-"""Small requests answered directly: what each of them does not need is left out."""

@@ -1,0 +1,139 @@
+"""One track of a JSON body: what its forms say, and which number of it is wrong."""
+
+import math
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from models.geometry.rotation import Array
+from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
+from service.formats.track import (
+    COCO_PEOPLE,
+    FOOT_COLUMNS,
+    MAX_POINTS,
+    Clock,
+    IncomingTrack,
+    Limits,
+    NoPersonError,
+    TrackRejectedError,
+    check_heads,
+    check_track,
+    track_name,
+)
+
+LARGEST = 2**53  # up to which floats tell whole numbers apart
+_NAMES = frozenset(
+    ("person", "people", "pedestrian", "human", "walker", "man", "woman", "child", "adult")
+)
+# How many numbers a row has: of a point three, or five with its head.
+_FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
+
+
+def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
+    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
+
+    Raises:
+        TrackRejectedError: with a code, the field, the limit and the value received.
+        NoPersonError: its class is none of a person; null is none at all.
+    """
+    if isinstance(raw, OversizedTrack):
+        raise TrackRejectedError(
+            "too_many_points",
+            f"a track of at most {MAX_TRACK_CHARS} characters is taken, got {raw.characters}",
+        )
+    if not isinstance(raw, dict):
+        raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
+    try:
+        _check_person(raw.get("class"))
+    except ValueError as error:
+        raise TrackRejectedError("malformed", str(error)) from error
+    given = [name for name in _FORMS if name in raw]
+    if len(given) != 1:
+        raise TrackRejectedError(
+            "malformed",
+            f"one of points, boxes, frames, frame_boxes is needed, got {given or 'none'}",
+        )
+    form = given[0]
+    rows = _numbers(form, raw[form], _FORMS[form])
+    if form.startswith("frame"):
+        if clock.frame_rate_hz is None or clock.started_at_s is None:
+            raise TrackRejectedError(
+                "no_clock", f"{form}: frame_rate_hz and started_at are needed beside it"
+            )
+        rows[:, 0] = clock.started_at_s + rows[:, 0] / clock.frame_rate_hz
+    name = track_name(raw.get("id"))
+    if form.endswith("boxes") or rows.shape[1] == FOOT_COLUMNS:
+        return check_track(name, source, rows, limits)
+    heads = rows[:, FOOT_COLUMNS:]
+    check_heads(rows, (limits.width, limits.height))
+    return replace(check_track(name, source, rows[:, :FOOT_COLUMNS], limits), heads=heads)
+
+
+def _check_person(value: Any) -> None:
+    """Pass silently if a class is of a person, by English name or COCO's number, or not given.
+
+    Raises:
+        NoPersonError: it is of something else.
+        ValueError: it is neither text nor a number.
+    """
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError(f"class: text or a number is needed, got {value!r:.60}")
+    if not (value.strip().lower() in _NAMES if isinstance(value, str) else value in COCO_PEOPLE):
+        raise NoPersonError
+
+
+def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
+    if not isinstance(value, list):
+        raise TrackRejectedError("malformed", f"{form}: a list is needed, got {value!r:.60}")
+    if len(value) > MAX_POINTS:
+        raise TrackRejectedError(
+            "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
+        )
+    if (plain := plain_rows(value, taken)) is not None:
+        return plain
+    columns = taken[0]
+    for at, row in enumerate(value):
+        if not at and isinstance(row, list) and len(row) in taken:
+            columns = len(row)
+        if not isinstance(row, list) or len(row) != columns:
+            needed = str(columns) if at else " or ".join(map(str, taken))
+            if isinstance(row, list) and len(row) in taken:
+                needed += ", as in the first point: all points carry a head or none,"
+            raise TrackRejectedError(
+                "malformed", f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}"
+            )
+        for number in row:
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                # JSON has no NaN; some writers put null or a word in its place.
+                code = "not_finite" if number is None else "malformed"
+                raise TrackRejectedError(
+                    code, f"{form}/{at}: numbers are needed, got {number!r:.40}"
+                )
+            if isinstance(number, int) and abs(number) > LARGEST or math.isinf(number):
+                raise TrackRejectedError(
+                    "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
+                )
+    return np.array(value, dtype=np.float64).reshape(-1, columns)
+
+
+def plain_rows(value: list[Any], lengths: tuple[int, ...]) -> Array | None:
+    """The array (N, columns) of a list that is right in every way; None of any other.
+
+    All its rows are lists of one of the lengths, of numbers within `LARGEST`. Who says what is
+    wrong looks at one number after another.
+    """
+    if set(map(type, value)) != {list} or len(found := set(map(len, value))) != 1:
+        return None
+    numbers = list(chain.from_iterable(value))
+    if not found <= set(lengths) or not set(map(type, numbers)) <= {int, float}:
+        return None
+    try:
+        rows = np.array(numbers, dtype=np.float64)
+    except OverflowError:  # a whole number that no float holds
+        return None
+    # One more than the largest may have been rounded to it; NaN is below nothing.
+    return rows.reshape(len(value), -1) if np.abs(rows).max() < LARGEST else None
