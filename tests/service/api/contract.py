@@ -20,7 +20,6 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from sqlalchemy import delete, select
 
-from service import training
 from service.cameras import cameras
 from service.enums import MessageType
 from service.formats.still import read_still
@@ -35,6 +34,7 @@ from service.store.maintenance import MaintenanceRecord
 from service.store.snapshots import SnapshotRecord
 from service.store.trainings import TrainingRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
+from service.training.trainings import queue_training
 from service.workers.processes.workers import register_worker
 from tests.conftest import CAMERA, track
 from tests.service.fleet_bench import Fleet
@@ -149,7 +149,7 @@ class Ground:
             kept = SnapshotRecord(camera_id="ok", jpeg=still.jpeg, stored_at=now, **facts)
             snapshots.put(session, kept)
             settings, queue = self.fleet.settings, self.fleet.queue
-            training.queue_training(session, queue, settings, "ok")
+            queue_training(session, queue, settings, "ok")
             if session.scalar(select(WebhookRecord).limit(1)) is None:
                 spec = WebhookSpec(url=URL, name="a", kinds=None, format="webhook", enabled=True)
                 made = webhooks.create_webhook(session, settings, spec).record
