@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_kills_and_a_full_disk_lose_nothing_and_leave_nothing_waiting():
     """Its own process, since it mounts a disk where it may; that comes with its namespace."""

@@ -194,6 +194,7 @@ def crowd(request):
 # The likelihood of a map of real people has small peaks side by side, and a search that begins
 # elsewhere may end at another of these; neither is better. The recorded scenes have fewer people
 # than a window is refined with: theirs are always searched.
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(not LONG.is_dir(), reason="long recordings are not at hand")
 @pytest.mark.parametrize("knock", KNOCKS)
@@ -202,7 +203,10 @@ def test_real_people_come_to_the_same(crowd, knock):
     every = observe(knocked(tracks, lens, pose, *KNOCKS[knock]), lens, pose)
     looks = list(follow(every, site, 400, 25))
     if KNOCKS[knock][1] is None:
-        assert sum(refined for _, _, refined in looks) >= len(looks) // 3
+        # Where people walk elsewhere than an hour ago all poses are looked at, as they should be.
+        calm = [refined for full, _, refined in looks if full.warm_start is not None]
+        assert calm
+        assert sum(calm) >= len(calm) // 3
     far = [apart(full, found) for full, found, refined in looks if refined]
     assert max(far, default=0.0) < 0.4
     assert np.median([apart(full, found) for full, found, _ in looks]) < SAME

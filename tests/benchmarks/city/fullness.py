@@ -24,7 +24,7 @@ from service.settings import Settings
 from service.store.engines.store import Store
 from service.store.serialization import pack
 from service.store.stored_tracks import TrackRecord
-from service.workers.upkeep import limits
+from service.workers.upkeep import retention
 from tests.benchmarks.city.seeding import camera_id, seed_file
 from tests.conftest import track
 from tests.stores.server import Server
@@ -62,9 +62,9 @@ def measure(settings: Settings) -> dict[str, float]:
         stored = count
         found[f"reading_a_look_of_{count}_ms"] = 1000 * _reading_s(store, settings)
     began_s, rows = time.monotonic(), 0
-    for limit in limits.limits_of_camera(settings, camera_id(0)):
-        bite = limits.BITE
-        while bite >= limits.BITE:
+    for limit in retention.limits_of_camera(settings, camera_id(0)):
+        bite = retention.BITE
+        while bite >= retention.BITE:
             bite = store.write_if_needed(camera_id(0), limit.bite)
             rows += bite
     found["retention_of_an_hour_ms"] = 1000 * (time.monotonic() - began_s)

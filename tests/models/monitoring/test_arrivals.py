@@ -183,6 +183,7 @@ def test_what_is_no_rhythm_is_refused(change):
         ArrivalProcess(**{**numbers, **change})
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_simulated_years_keep_the_rate_and_find_outages():
     results = study_rhythm(6, seed=1)

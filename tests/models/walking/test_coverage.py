@@ -16,6 +16,7 @@ SITES = 14
 FEW, MANY = 50, 200
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_intervals_cover_and_errors_fall_as_their_bound_does():
     errors, sds, bounds = np.zeros((3, SITES, 2, 3))

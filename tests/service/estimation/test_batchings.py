@@ -77,6 +77,7 @@ def test_it_matters_not_how_tracks_were_posted(recording, later, end, sizes):
     assert recording.end() == end
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_it_matters_not_if_they_are_posted_one_by_one(recording):
     """The three of above in a row: each is looked at on the way to the next."""
