@@ -1,6 +1,5 @@
 """`parts`: the protocol's figures with each part of the estimator off, and what a part costs."""
 
-import math
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -12,26 +11,18 @@ from pathlib import Path
 
 from rich.console import Console
 
-from models.monitoring.verdict import DriftLimits
 from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
 from studies.runs import with_bar
-from studies.served.figures import Figures, figures_of
+from studies.served.figures import figures_of
 from studies.served.outcomes import ServedOutcome
 from studies.served.parts_catalogue import PARTS
-from studies.served.replays import ReplayPlan
+from studies.served.run import served_plan
 from studies.served.tasks import Table, tasks_of, work
-from studies.served.windows import Window
 
 BETWEEN = markers("parts", "python -m studies parts --write")
 WHOLE = "nothing"
-_PLAN = ReplayPlan(
-    window=Window(),
-    limits=DriftLimits(
-        sigmas=5.0, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
-    ),
-    alarms_a_year=1.0,
-)
+_BATCH = 50  # tracks that come at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,12 +79,14 @@ def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartF
     """The figures of all cases with a part off, or with all of them."""
     table = Table.FAULTS if fault else Table.TIME
     tasks = tasks_of(
-        folders, tables=[table], seeds=range(seeds), batch=50, faults=[fault] if fault else []
+        folders, tables=[table], seeds=range(seeds), batch=_BATCH, faults=[fault] if fault else []
     )
+    plan = served_plan(_BATCH)
     begun_s, rows = time.process_time(), []
     with nullcontext() if part == WHOLE else PARTS[part].switched_off():
         for task in tasks:
-            rows += [each for each in work(task, _PLAN) if each.case_id.fault == fault]
+            if all(case.fault == fault for case in task.case_ids):  # not those without a fault
+                rows += work(task, plan)
     served = [row for row in rows if isinstance(row.outcome, ServedOutcome)]
     outcomes = [row.outcome for row in served if isinstance(row.outcome, ServedOutcome)]
     still = figures_of(
@@ -102,6 +95,7 @@ def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartF
     moved = figures_of(
         [o for r, o in zip(served, outcomes, strict=True) if not _stands(r.case_id.knock)]
     )
+    every = figures_of(outcomes)
     own = [n for outcome in outcomes for n in outcome.parameters if n.identifiable]
     return PartFigures(
         part=part,
@@ -112,8 +106,8 @@ def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartF
         moved_p90_deg=moved.rotation_p90_deg,
         height_error=moved.height_error,
         covered=sum(n.covered for n in own) / max(len(own), 1),
-        beyond=still.beyond + moved.beyond,
-        cut=_of_all(still, moved),
+        beyond=every.beyond,
+        cut=every.cut,
         cpu_s=(time.process_time() - begun_s) / max(len(outcomes), 1),
     )
 
@@ -159,8 +153,3 @@ def _wanted() -> list[tuple[str, str]]:
 
 def _stands(knock: str) -> bool:
     return knock == "still"
-
-
-def _of_all(still: Figures, moved: Figures) -> float:
-    cases = still.cases + moved.cases
-    return (still.cut * still.cases + moved.cut * moved.cases) / cases

@@ -43,14 +43,7 @@ def run_served(
     kept = OutcomeFile(output)
     started = time.monotonic()
     tasks = _left(tasks_of(folders, tables=tables, seeds=seeds, batch=batch, faults=faults), kept)
-    settings = Settings()
-    plan = ReplayPlan(
-        window=Window(
-            tracks=settings.window_tracks, days=settings.window_days, batch=batch or None
-        ),
-        limits=drift_limits(settings),
-        alarms_a_year=settings.false_alarms_per_year,
-    )
+    plan = served_plan(batch)
     failures: list[CaseResult] = []
     if tasks:
         failures = _work_off(tasks, plan, processes, kept, console)
@@ -64,6 +57,18 @@ def run_served(
         raise CalibrationError(
             f"{len(failures)} failed; the first, {first.case_id}: {first.failure}"
         )
+
+
+def served_plan(batch: int) -> ReplayPlan:
+    """The windows and limits of the service's settings, tracks coming so many at once."""
+    settings = Settings()
+    return ReplayPlan(
+        window=Window(
+            tracks=settings.window_tracks, days=settings.window_days, batch=batch or None
+        ),
+        limits=drift_limits(settings),
+        alarms_a_year=settings.false_alarms_per_year,
+    )
 
 
 def _left(tasks: Sequence[Task], kept: OutcomeFile) -> list[Task]:
