@@ -4,9 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from models.geometry.plane_parameters import ANGLES
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS, PoseParameters
+from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters
 from models.geometry.rotation import angle_between
 from models.monitoring.chart import ChartResult
 from models.monitoring.creep import Creep

@@ -4,9 +4,7 @@ import math
 from datetime import UTC, datetime
 
 from models.durations import DAY_S
-from models.geometry.plane_parameters import ANGLES, PLANE_PARAMETERS
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import ANGLES, PARAMETERS, PLANE_PARAMETERS, CameraPose
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.config import (
     CLOCK_LEAST_LOG,

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import array_of
+from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.paths import config
 from models.paths.coverage import Coverage

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import PLANE_PARAMETERS, identifiable_of
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import PARAMETERS, PLANE_PARAMETERS, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.reference import PathReference
 from models.pose import config

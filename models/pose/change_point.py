@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.pose.config import CHANGE_BY_CHANCE, CLEARLY_BELOW, CUT_ROUNDS, FEWEST_BESIDE
 from models.quantiles import chi_squared_above

@@ -5,9 +5,7 @@ Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / 
 
 import numpy as np
 
-from models.geometry.plane_parameters import IDENTIFIABLE_SD, identifiable_of
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import IDENTIFIABLE_SD, PARAMETERS, CameraPose, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.heading import on_seen_ground, variance_of_halves
 from models.paths.likelihood import walkers_of

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.plane_parameters import identifiable_of
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS, PoseParameters
+from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, identifiable_of
 from models.geometry.rotation import Array
 from models.pose.config import HEADING_SD, NARROW
 from models.reasons import Reason

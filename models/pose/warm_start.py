@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.plane_parameters import PLANE_PARAMETERS
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import PARAMETERS, PLANE_PARAMETERS, CameraPose
 from models.geometry.rotation import Array
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, PoseFit

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import (
+from models.geometry.pose import (
     PLANE_PARAMETERS,
+    CameraPose,
     PlaneEstimate,
+    PoseParameters,
     identifiable_of,
     plane_parameters_of,
 )
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode, Value
 from models.tracks.observations import Observations, of_tracks

@@ -8,8 +8,7 @@ import math
 import numpy as np
 
 from models.compiled import compiled
-from models.geometry.ground_flow import ground_flow
-from models.geometry.landing import landing
+from models.geometry.ground import ground_flow, landing
 from models.geometry.rotation import Array, Mask
 
 _LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite

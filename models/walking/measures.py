@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.ground import rotation_and_turns
 from models.geometry.rotation import Array, Mask, rotation_from_angles
 from models.tracks.observations import Rows, Steps, Tops
 from models.walking.ground_loops import heights_of_tops, speeds_of_steps

@@ -8,8 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.reasons import Reason
 from models.serialization import stored_as

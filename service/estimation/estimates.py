@@ -7,8 +7,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
-from models.geometry.plane_parameters import PLANE_PARAMETERS
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.chart import CLOCK
 from models.monitoring.verdict import (
     Drift,

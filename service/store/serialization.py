@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import CameraPose, PoseParameters
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes, uncut
 from models.monitoring.verdict import Drift

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import (
+from models.geometry.pose import (
     PLANE_PARAMETERS,
     PlaneEstimate,
     identifiable_of,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import PLANE_PARAMETERS, identifiable_of
+from models.geometry.pose import PLANE_PARAMETERS, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.likelihood import walkers_of
 from models.paths.reference import candidate_of

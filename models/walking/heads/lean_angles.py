@@ -12,10 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.ground import ground_of_rays
-from models.geometry.ground_flow import rotation_and_turns
-from models.geometry.rotation import Array, Mask
-from models.geometry.vectors import aside_of, dot, norm
+from models.geometry.ground import ground_of_rays, rotation_and_turns
+from models.geometry.rotation import Array, Mask, aside_of, dot, norm
 from models.tracks.head_foot import HeadFootPairs
 from models.tracks.observations import Rows
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.reasons import Reason, TracksCode
 from models.tracks.observations import Observations
 from models.walking import config

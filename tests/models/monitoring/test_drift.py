@@ -4,8 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
 from models.monitoring.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
 from models.monitoring.verdict_reasons import clock_fault

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.ground import rotation_and_turns
 from models.paths.config import DIRECTIONS
 from models.paths.ground_steps import place_steps, slope_of, step_on_ground
 from models.paths.likelihood import walkers_of

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from models.geometry.plane_parameters import plane_parameters_of
+from models.geometry.pose import plane_parameters_of
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_estimate

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_seen
 from models.tracks.observations import of_tracks
