@@ -89,20 +89,20 @@ def _lines(source: str) -> int:
 PARTS: dict[str, Part] = {
     "hidden feet": Part(
         words="boxes whose feet are hidden are found by their heights",
-        off=(("models.tracks.observing:short_boxes", _none_of_points),),
-        source=("models/tracks/loops/short_boxes.py",),
+        off=(("models.tracks.walks:short_boxes", _none_of_points),),
+        source=("models/tracks/hidden_feet.py",),
         faults=("hidden-feet",),
     ),
     "jumps": Part(
         words="points that jump away and back are left out",
-        off=(("models.tracks.observing:jumped", _none_of_points),),
-        source=("models/tracks/loops/jumps.py",),
+        off=(("models.tracks.walks:jumped", _none_of_points),),
+        source=("models/tracks/hidden_feet.py",),
         faults=("jumps",),
     ),
     "pieces": Part(
         words="pieces of one walk are put together",
         off=(("models.tracks.walks:link_pieces", _alone),),
-        source=("models/tracks/linking.py", "models/tracks/ends.py"),
+        source=("models/tracks/linking.py", "models/tracks/linking.py"),
         faults=("fragments",),
     ),
     "walking groups": Part(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import HeadFootPairs
+from models.tracks.observations import HeadFootPairs
 from models.walking import config
 from models.walking.heads.fitting import column_share, fit_angles
 from models.walking.heads.reference import HeadReference

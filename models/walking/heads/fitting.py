@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from models.geometry.rotation import Array
-from models.tracks.head_foot import HeadFootPairs
+from models.tracks.observations import HeadFootPairs
 from models.walking import config
 from models.walking.config import FREEDOM
 from models.walking.heads.lean_angles import LeanAngles, measure_lean_angles

@@ -14,8 +14,7 @@ import numpy as np
 
 from models.geometry.ground import ground_of_rays, rotation_and_turns
 from models.geometry.rotation import Array, Mask, aside_of, dot, norm
-from models.tracks.head_foot import HeadFootPairs
-from models.tracks.observations import Rows
+from models.tracks.observations import HeadFootPairs, Rows
 
 _LEAST_SPAN = 1e-9  # of the product of two rays that are one
 _LEAST_WAY = 0.02  # of camera heights: who goes no farther stands

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.geometry.rotation import Array
 from models.serialization import stored_as
-from models.tracks.head_foot import HeadFootPairs
+from models.tracks.observations import HeadFootPairs
 from models.walking import config
 from models.walking.heads.fitting import LeanComponents, column_share, fit_angles, learn_habit
 from models.walking.mixed.model import Normal

@@ -28,8 +28,8 @@ from models.paths.reference import candidate_of, learn_paths
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
-from models.tracks.observing import observe
 from models.tracks.trajectory import by_end
+from models.tracks.walks import observe_each
 from models.walking.reference.learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR
 
@@ -44,7 +44,7 @@ def chart_result(chart, scores, alarms):
 
 def feet(tracks):
     """What is read of feet, in the order of the tracks' ends."""
-    return observe(by_end(replace(track, top_v=None) for track in tracks), LENS)
+    return observe_each(by_end(replace(track, top_v=None) for track in tracks), LENS)
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,8 @@ from models.simulation.simulated_site import (
     walk_site,
 )
 from models.simulation.walkers import WalkConfig
-from models.tracks.observing import observe
 from models.tracks.trajectory import by_end
+from models.tracks.walks import observe_each
 from models.walking.estimate import joint_estimate
 from models.walking.reference.learning import learn_speed_reference
 from studies.paths.flow_study import draw_new_lane, walk_changed
@@ -32,7 +32,7 @@ CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 
 
 def feet(tracks):
-    return observe([replace(track, top_v=None) for track in tracks], LENS)
+    return observe_each([replace(track, top_v=None) for track in tracks], LENS)
 
 
 def camera_site(speeds, flow):

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from models.pose import estimate_pose, learn_site, observe
 from models.quantiles import Z90
 from models.simulation.pose_offset import PoseOffset, offset_trajectory
-from models.tracks.head_foot import observe_heads
 from models.tracks.trajectory import by_end
+from models.tracks.walks import observe_heads
 from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
 from models.walking.heads.reference import learn_heads
 from models.walking.serialization import reference_from_bytes, reference_to_bytes

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.tracks.head_foot import HeadFootPairs, observe_heads
+from models.tracks.observations import HeadFootPairs
 from models.tracks.trajectory import Trajectory
+from models.tracks.walks import observe_heads
 from models.walking.heads.lean_angles import measure_lean_angles
 
 LENS = Intrinsics(
