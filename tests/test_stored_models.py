@@ -19,8 +19,8 @@ from models.pose import (
     warm_start_to_bytes,
 )
 from models.tracks.trajectory import by_end
-from models.walking.reference.learning import learn_speed_reference
-from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import reference_from_bytes, reference_to_bytes
 from tests.models.sites import LENS, PRIOR, tracks_of
 
 GOLDEN = Path(__file__).parent / "golden" / "stored_models"

@@ -30,7 +30,7 @@ from models.paths.reference import candidate_of
 from models.paths.turn_detection import groups_in_time
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks.observations import Observations, check_in_time, of_tracks
-from models.walking.reference.learning import relearned
+from models.walking.reference_learning import relearned
 from models.walking.speed_reference import SpeedReference
 
 

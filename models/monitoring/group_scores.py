@@ -22,7 +22,8 @@ from models.paths.likelihood import PathModel, Walkers, walkers_of
 from models.paths.reference import candidate_of
 from models.paths.turn_detection import along_paths, groups_in_time, sums_of_groups
 from models.tracks.observations import Observations, Steps, check_in_time
-from models.walking.fit import Learned, per_track
+from models.walking.field import Learned
+from models.walking.fit import per_track
 from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.speed_reference import SpeedReference, channels_of
 

@@ -19,7 +19,7 @@ from models.walking.fit import (
     per_track,
     track_log_likelihoods,
 )
-from models.walking.speed_reference import SpeedReference, channels_of, pose_prior
+from models.walking.speed_reference import SpeedReference, channels_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,7 +117,7 @@ def _first_cut(
     at_prior = plane_parameters_of(prior) + reference.offset
     whole = start.candidate
     if not start.warm:
-        whole = fit_pose(channels, start, pose_prior(prior)).candidate
+        whole = fit_pose(channels, start, prior).candidate
     best, place = -np.inf, FEWEST_BESIDE
     for candidate in (at_prior, whole):
         ratio = _ratios_at(channels, candidate)
@@ -161,4 +161,4 @@ def _fit(
     start: FitStart,
 ) -> Fit:
     channels = channels_of(of_tracks(observations, chosen), reference, prior)
-    return fit_pose(channels, start, pose_prior(prior))
+    return fit_pose(channels, start, prior)

@@ -13,9 +13,8 @@ from models.paths.reference import candidate_of, learn_paths
 from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, check_in_time, of_tracks
-from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference
-from models.walking.speed_reference import SpeedReference
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import SpeedReference, assumed_speed_reference
 
 _USUAL_WALK = WalkConfig()
 

@@ -26,7 +26,7 @@ from models.pose import (
     observe,
 )
 from models.tracks.trajectory import Trajectory
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.people import Unpacked
 from service.references import window_of
 from service.settings import Settings

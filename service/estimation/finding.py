@@ -32,7 +32,7 @@ from models.regression.averaging import (
 )
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, KeptPose, SeenTrack
 from service.estimation.last_poses import basis_of, begin_of, kept_of

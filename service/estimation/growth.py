@@ -20,7 +20,7 @@ from models.paths.serialization import paths_from_bytes
 from models.pose import learn_site, observe, without_creep
 from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.alerts.suspected_moves import SuspectedMove, suspected_moves
 from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
 from service.estimation.people import Unpacked

@@ -116,17 +116,17 @@ PARTS: dict[str, Part] = {
     "noise of directions": Part(
         words="information that is noise of directions is taken off",
         off=(("models.walking.fit:noise_information", _nothing(3)),),
-        source=("models/walking/direction_noise.py",),
+        source=("models/walking/fit.py",),
     ),
     "freedom of the field": Part(
         words="how freely speeds vary by place is chosen by halves",
         off=(
             (
-                "models.walking.reference.learning:_cross_validated",
+                "models.walking.reference_learning:_cross_validated",
                 lambda observations, prior, blank, seed: blank,
             ),
         ),
-        source=("models.walking.reference.learning:_cross_validated",),
+        source=("models.walking.reference_learning:_cross_validated",),
     ),
     "bandwidths": Part(
         words="the map's bandwidths are chosen by people left out",

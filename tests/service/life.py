@@ -18,7 +18,7 @@ from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import observe_each
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from models.walking.speed_reference import SpeedReference
 from service.alerts.staleness import StaleWatch
 from service.app import create_app

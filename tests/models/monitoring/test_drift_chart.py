@@ -30,7 +30,7 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe_each
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR
 
 AT = candidate_of(PRIOR)

@@ -18,7 +18,7 @@ from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Steps
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))

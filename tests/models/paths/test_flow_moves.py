@@ -23,7 +23,7 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe_each
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from studies.paths.flow_study import draw_new_lane, walk_changed
 from tests.models.sites import LENS, PRIOR
 

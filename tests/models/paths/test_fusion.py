@@ -15,7 +15,7 @@ from models.reasons import TracksCode
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_at_heading, joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR, seen
 
 SLOW = SiteConfig(aside_m=0.8, standing_share=0.0, speed_mean_mps=1.1)

@@ -14,10 +14,13 @@ from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.config import PLAUSIBLE_OFFSET
 from models.walking.estimate import joint_estimate
-from models.walking.mixed.variance_inflation import shrink_offset
-from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference
-from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import (
+    assumed_speed_reference,
+    reference_from_bytes,
+    reference_to_bytes,
+)
+from models.walking.variance_inflation import shrink_offset
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FAR = CameraPose(

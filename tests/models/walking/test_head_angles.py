@@ -12,7 +12,7 @@ from models.geometry.pose import CameraPose
 from models.tracks.observations import HeadFootPairs
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import observe_heads
-from models.walking.heads.lean_angles import measure_lean_angles
+from models.walking.head_angles import measure_lean_angles
 
 LENS = Intrinsics(
     width=1920, height=1080, fx=1300, fy=1250, cx=950, cy=560, distortion=(-0.2, 0.05, 1e-3, 0, 0)
