@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
     WalkConfig,
     estimate_pose,

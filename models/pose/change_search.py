@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.paths.likelihood import walkers_of
-from models.paths.turn_detection import moved_within
+from models.paths.path_tests import moved_within
 from models.pose.change_confirmation import moved_beyond_doubt, widened
 from models.pose.change_point import find_change, suspicion
 from models.pose.config import SUSPECT_RATE, SUSPECTED

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart_learning import learn_chart
 from models.paths.folds import ChosenBandwidths, fold_maps
-from models.paths.reference import candidate_of, learn_paths
+from models.paths.reference import learn_paths
 from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, check_in_time, of_tracks
@@ -60,7 +60,7 @@ def learn_site(
         first = of_tracks(tracks, np.arange(count))
         speed_reference = learn_speed_reference(first, prior, walk, seed)
     site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
-    folds = fold_maps(tracks, intrinsics, candidate_of(prior), seed, weights, chosen)
+    folds = fold_maps(tracks, intrinsics, array_of(prior), seed, weights, chosen)
     if folds is None:
         return site
     return replace(

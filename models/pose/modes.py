@@ -7,7 +7,7 @@ import numpy as np
 
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.paths.path_test import loss
+from models.paths.path_tests import loss
 from models.paths.registration import Belief, Peak, Posterior, distinct, register
 from models.pose import config
 from models.pose.site import CameraSite

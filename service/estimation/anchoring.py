@@ -16,7 +16,7 @@ from models.monitoring.serialization import (
     creep_log_from_bytes,
     creep_log_to_bytes,
 )
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
     CameraSite,
     Creep,

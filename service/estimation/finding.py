@@ -9,7 +9,7 @@ import numpy as np
 from models.monitoring.chart import ChartResult
 from models.monitoring.config import CREEP_SHARE
 from models.monitoring.serialization import chart_from_bytes
-from models.paths.serialization import paths_from_bytes
+from models.paths.reference import paths_from_bytes
 from models.pose import (
     AlarmRate,
     CameraSite,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from models.paths.density_map import Bandwidths
+from models.paths.map_learning import Bandwidths
 
 _ROOT = Path(__file__).parents[2]
 _COARSE = Bandwidths(place_m=1.0, direction_kappa=6.0)
@@ -135,20 +135,20 @@ PARTS: dict[str, Part] = {
     ),
     "path test": Part(
         words="a map that does not fit has no part",
-        off=(("models.paths.path_test:UsualFit.has_changed", lambda *_: False),),
-        source=("models.paths.path_test:UsualFit.has_changed",),
+        off=(("models.paths.path_tests:UsualFit.has_changed", lambda *_: False),),
+        source=("models.paths.path_tests:UsualFit.has_changed",),
     ),
     "seen ground": Part(
         words="no heading is identifiable on ground that the reference never saw",
         off=(("models.pose.fusion:on_seen_ground", lambda *_: True),),
-        source=("models.paths.heading:on_seen_ground",),
+        source=("models.paths.registration:on_seen_ground",),
     ),
     "halves of the people": Part(
         words="the heading is less sure where halves find it apart",
         off=(("models.pose.fusion:_covariance_of_halves", _nothing(4)),),
         source=(
             "models.pose.fusion:_covariance_of_halves",
-            "models.paths.heading:variance_of_halves",
+            "models.paths.registration:variance_of_halves",
         ),
     ),
     "flat posterior": Part(
@@ -173,7 +173,7 @@ PARTS: dict[str, Part] = {
             "models/pose/change_search.py",
             "models/pose/change_point.py",
             "models/pose/change_confirmation.py",
-            "models/paths/turn_detection.py",
+            "models/paths/path_tests.py",
         ),
     ),
 }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from models.errors import CheckpointError
+from models.geometry.pose import array_of
 from models.monitoring import chart_learning
 from models.monitoring.chart import (
     CLOCK,
@@ -24,7 +25,7 @@ from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_gro
 from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
 from models.monitoring.verdict_reasons import may_be_clock
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of, learn_paths
+from models.paths.reference import learn_paths
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
@@ -33,7 +34,7 @@ from models.tracks.walks import observe_each
 from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR
 
-AT = candidate_of(PRIOR)
+AT = array_of(PRIOR)
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = 1000 / 36_500  # a run is 1000 walking groups: of 100 a day
 

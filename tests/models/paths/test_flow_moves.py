@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.geometry.pose import array_of
 from models.paths.likelihood import walkers_of
-from models.paths.path_test import UsualFit
-from models.paths.reference import candidate_of, learn_paths
-from models.paths.turn_detection import StillScores, learn_scores, moved_within
+from models.paths.path_tests import StillScores, UsualFit, learn_scores, moved_within
+from models.paths.reference import learn_paths
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
@@ -27,7 +27,7 @@ from models.walking.reference_learning import learn_speed_reference
 from studies.paths.flow_study import draw_new_lane, walk_changed
 from tests.models.sites import LENS, PRIOR
 
-AT = candidate_of(PRIOR)
+AT = array_of(PRIOR)
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 
 

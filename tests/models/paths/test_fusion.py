@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.paths.reference import candidate_of, learn_paths
+from models.geometry.pose import array_of
+from models.paths.reference import learn_paths
 from models.paths.registration import Belief
 from models.pose.fusion import fused_estimate
 from models.pose.modes import birge_ratio
@@ -62,11 +63,11 @@ def test_a_pan_alone_moves_neither_tilt_nor_roll(lanes, site, degrees):
     tracks = walk(lanes, pose, 120, 5)
     joint, found = fused(tracks, site)
     assert found.identifiable == ("tilt", "roll", "height", "heading")
-    off = found.values - candidate_of(pose)
+    off = found.values - array_of(pose)
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 0.5
     assert abs(off[2]) < 0.03
     # The fast lane's people are where, and go as, they did: seen with the heading that they have.
-    turned = joint_at_heading(tracks, PRIOR, site[0], candidate_of(pose))
+    turned = joint_at_heading(tracks, PRIOR, site[0], array_of(pose))
     assert turned.log_likelihood > joint.log_likelihood + 1
 
 

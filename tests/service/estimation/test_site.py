@@ -7,7 +7,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site
 from models.walking.estimate import joint_estimate
 from models.walking.speed_reference import reference_from_bytes
