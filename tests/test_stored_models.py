@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
+from models.monitoring.chart import chart_from_bytes, chart_to_bytes
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
     WalkConfig,

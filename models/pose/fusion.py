@@ -27,9 +27,8 @@ from models.pose.modes import (
     find_modes,
     odds_of,
 )
-from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, by_speeds_alone
+from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, WarmStart, by_speeds_alone
 from models.pose.site import CameraSite
-from models.pose.warm_start import WarmStart
 from models.quantiles import chi_squared_above
 from models.reasons import Reason, TracksCode
 from models.tracks.observations import Observations

@@ -9,13 +9,9 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.monitoring.chart import chart_from_bytes, chart_to_bytes
 from models.monitoring.config import CREEP_SHARE
-from models.monitoring.serialization import (
-    chart_from_bytes,
-    chart_to_bytes,
-    creep_log_from_bytes,
-    creep_log_to_bytes,
-)
+from models.monitoring.creep import creep_log_from_bytes, creep_log_to_bytes
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
     CameraSite,

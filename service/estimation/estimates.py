@@ -12,12 +12,10 @@ from models.monitoring.chart import CLOCK
 from models.monitoring.verdict import (
     Drift,
     DriftVerdict,
-    judge,
-    pose_after,
-)
-from models.monitoring.verdict_reasons import (
     clock_fault,
+    judge,
     may_be_clock,
+    pose_after,
     reason_of_chart,
     reason_of_creep,
     reason_of_drift,

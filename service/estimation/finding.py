@@ -6,14 +6,14 @@ from functools import partial
 
 import numpy as np
 
-from models.monitoring.chart import ChartResult
+from models.monitoring.chart import ChartResult, chart_from_bytes
 from models.monitoring.config import CREEP_SHARE
-from models.monitoring.serialization import chart_from_bytes
 from models.paths.reference import paths_from_bytes
 from models.pose import (
     AlarmRate,
     CameraSite,
     Creep,
+    FusedEstimate,
     Observations,
     SecondLook,
     alarm_chart_result,
@@ -22,7 +22,6 @@ from models.pose import (
     estimate_pose,
     observe_walks,
 )
-from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 from models.regression.averaging import (
     FEWEST_TRACKS,

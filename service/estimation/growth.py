@@ -15,7 +15,7 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.serialization import creep_log_from_bytes
+from models.monitoring.creep import creep_log_from_bytes
 from models.paths.reference import paths_from_bytes
 from models.pose import learn_site, observe, without_creep
 from models.pose.config import FEWEST_BESIDE

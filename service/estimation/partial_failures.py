@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from models.errors import CheckpointError
-from models.pose.partial_failures import PartialFailure, unless_failed
+from models.pose import PartialFailure, unless_failed
 from models.reasons import Reason
 from service.reasons import ServiceCode
 

@@ -172,7 +172,7 @@ PARTS: dict[str, Part] = {
         source=(
             "models/pose/change_search.py",
             "models/pose/change_point.py",
-            "models/pose/change_confirmation.py",
+            "models/pose/change_point.py",
             "models/paths/path_tests.py",
         ),
     ),

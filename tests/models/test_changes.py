@@ -10,7 +10,7 @@ from models.geometry.pose import array_of
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import estimate_pose, learn_site
-from models.pose.change_confirmation import least_covariance
+from models.pose.change_point import least_covariance
 from models.pose.change_search import pose_fit_of
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.geometry.pose import PARAMETERS
-from models.pose.change_confirmation import moved_beyond_doubt
+from models.pose.change_point import moved_beyond_doubt
 from models.pose.pose_fit import FusedEstimate
 
 

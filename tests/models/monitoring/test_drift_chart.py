@@ -14,6 +14,8 @@ from models.monitoring.chart import (
     OFFSET_GRID,
     DriftChart,
     GridOffset,
+    chart_from_bytes,
+    chart_to_bytes,
     highest,
     ratios_of,
     trace,
@@ -22,8 +24,7 @@ from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
 from models.monitoring.config import LENGTHS
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
-from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.monitoring.verdict_reasons import may_be_clock
+from models.monitoring.verdict import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
