@@ -21,7 +21,7 @@ from models.monitoring.creep import CreepLog, add_day, begin_log, posterior_mean
 from models.monitoring.group_scores import score_groups
 from models.pose.config import NO_TURN_RAD
 from models.pose.site import CameraSite
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 

@@ -9,8 +9,7 @@ import torch
 from torch import Tensor
 
 from models.geometry.rotation import quaternion_from_rotation
-from models.regression.inputs import network_inputs
-from models.regression.network import offsets_of
+from models.regression.network import network_inputs, offsets_of
 from models.regression.recipe import TrainingPlan
 from models.simulation.poses import PoseSet, grid_poses, random_poses
 from models.simulation.walkers import simulate_walks

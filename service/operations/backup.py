@@ -11,7 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.data_dir import (
     DATABASE,
     KEY_FILE,
