@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, rotation_from_angles
+from models.geometry.rotation import Array, Index, rotation_from_angles
 from models.geometry.upright import heads_above, heads_seen, statures, tops_seen
 from models.tracks.trajectory import Trajectory
 
@@ -39,7 +38,7 @@ class PoseSet:
     def __len__(self) -> int:
         return int(self.height_m.size)
 
-    def take(self, indices: npt.NDArray[np.int64]) -> "PoseSet":
+    def take(self, indices: Index) -> "PoseSet":
         """The poses at the given places, in that order."""
         return PoseSet(
             height_m=self.height_m[indices],
