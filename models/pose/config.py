@@ -10,10 +10,10 @@ import numpy as np
 from models.monitoring.config import HABITS_OF_DAYS
 
 # The search for modes.
-HEADING_SD = math.radians(15.0)  # a pose offset's, before any track: wider, and far headings win
-REACH_RAD = math.radians(30.0)  # of the headings tried, both ways: beyond, none is identifiable
-EDGE_RAD = math.radians(2.0)  # of that reach: so near to it, a better heading may be beyond
+HEADING_SD = math.radians(15.0)  # a pose offset's, before any track, around its peak
 HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))  # tried: a map's peaks are some 4 deg wide
+FAR_HEADINGS = np.radians(np.arange(33.0, 328.0, 3.0))  # tried where people fit none of the near
+ON_MAP = 0.5  # of the walking groups must be on seen ground, for a pose to be held by the paths
 ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hundredths of a sd
 WARM_ROUNDS = 1  # from a warm start, whose heading is known
 UNLIKELY = 12.0  # of the log posterior, below the best: speeds are not fitted again there

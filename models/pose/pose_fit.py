@@ -54,7 +54,7 @@ class FusedEstimate:
     `rivals` are headings (radians) of other poses that explain the tracks about as well. `modes`
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `path_fit` is the sum over walking groups of how well they fit the paths at `raw`,
-    in logs.
+    in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors.
     """
 
     values: Array
@@ -65,6 +65,7 @@ class FusedEstimate:
     rivals: tuple[float, ...] = ()
     modes: tuple[Array, ...] = ()
     path_fit: float = 0.0
+    prior_loss: float = 0.0
     neighbourhood: PathNeighbourhood | None = None
 
     @property
