@@ -62,3 +62,16 @@ SUSPICION, MORE_SUSPICION = 0.4, 1.25  # of the limit; times what it was where n
 
 # An anchor's creep, in radians: a track turned by less is taken as it is.
 NO_TURN_RAD = np.radians(0.02)
+
+# What moved. Shares and sizes are guesses by what brackets do: a screw slips in tilt, a hand turns
+# the pan, nearly nothing changes a pole's height. Chosen once on seven scenes by time.
+MOVED_PRIOR = 0.2  # that a window is of a camera that has moved: lower, and small moves are missed
+MOVES_IN = (0.5, 0.4, 0.4, 0.5)  # of moves change tilt, roll, height, heading
+MOVE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.10, math.radians(6.0)])
+FAR_SHARE, FAR_MOVE = 0.15, 5.0  # of moves are so many times as far
+# Degrees of freedom of Student's t: by few groups an estimate is farther off than its covariance.
+LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
+OCCAM = 3.0  # log evidence that a pose which is free to fit gains by that alone
+MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
+# How often paths are not found again: of cameras turned far, and of those that stand.
+LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.05
