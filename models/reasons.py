@@ -20,7 +20,7 @@ class TracksCode(StrEnum):
     """Codes of reasons that tracks give. They are kept by clients and in stores: they stay."""
 
     BEYOND_LIMITS = "beyond_limits"
-    BEYOND_LIMITS_UNCONFIRMED = "beyond_limits_unconfirmed"
+    SUSPECTED = "suspected"
     BEYOND_LIMITS_BEFORE = "beyond_limits_before"
     BEYOND_LIMITS_LAST_IDENTIFIABLE = "beyond_limits_last_told"
     WITHIN_LIMITS = "within_limits"

@@ -9,14 +9,14 @@ from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import AlarmRate, SecondLook, alarm_chart_result, drift_of, estimate_pose, observe
+from models.pose import AlarmRate, alarm_chart_result, estimate_pose, observe
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
 
 # As the service has them unless its settings say otherwise.
 _LIMITS = DriftLimits(
-    sigmas=5.0, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
+    certainty=0.99, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
 )
 _YEAR_S = 365.25 * DAY_S
 _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
@@ -26,11 +26,13 @@ _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 class Result:
     """The pose of tracks beside the prior pose.
 
+    `moved` is what an alert would say, `probability` how likely it is by the pose alone.
     `estimated` names the numbers that the tracks determine; the others are the prior pose's.
     `sd` and `drift` (pose less prior pose) are of those.
     """
 
     moved: bool
+    probability: float
     why: str
     pose: Pose
     estimated: tuple[str, ...]
@@ -67,16 +69,17 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     """
     model, ordered = site.model, in_order(tracks)
     observed = observe(ordered, model.intrinsics, model.prior)
-    found = estimate_pose(observed, model, SecondLook(limits=_LIMITS, drifting=False))
+    found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
-    earlier = None if found.earlier is None else drift_of(found.earlier, model.prior)
-    verdict = judge(found.drift, _LIMITS, (), chart, earlier)
-    drift = {_field(name): _in_unit(name, found.drift.of(name)[0]) for name in PARAMETERS}
-    sd = {_field(name): _in_unit(name, found.drift.of(name)[1]) for name in PARAMETERS}
-    estimated = tuple(_field(name) for name in found.drift.identifiable)
+    offset = found.drift
+    verdict = judge(offset, _LIMITS, (), chart)
+    drift = {_field(name): _in_unit(name, offset.of(name)[0]) for name in PARAMETERS}
+    sd = {_field(name): _in_unit(name, offset.of(name)[1]) for name in PARAMETERS}
+    estimated = tuple(_field(name) for name in offset.identifiable)
     return Result(
         moved=verdict.drifting,
-        why=_why(found.drift, chart),
+        probability=offset.move.moved,
+        why=_why(offset, chart),
         pose=Pose.of(found.pose),
         estimated=estimated,
         sd={name: sd[name] for name in estimated},
@@ -103,6 +106,7 @@ def _why(drift: Drift, chart: ChartResult | None) -> str:
         for name in drift.identifiable
     ]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
+    words = f"moved with a probability of {drift.move.moved:.0%}: {words}"
     if chart is not None and chart.suspicious:
         number = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
         words += (

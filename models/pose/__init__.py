@@ -18,11 +18,10 @@ from models.pose.alarms import (
 from models.pose.estimating import (
     PartialFailure,
     PoseFinding,
-    SecondLook,
-    drift_of,
     estimate_pose,
     unless_failed,
 )
+from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
     WarmStart,
@@ -49,8 +48,8 @@ __all__ = [
     "Observations",
     "PartialFailure",
     "PoseFinding",
+    "PosePosterior",
     "ChartResult",
-    "SecondLook",
     "Trajectory",
     "WalkConfig",
     "Walks",
@@ -64,6 +63,7 @@ __all__ = [
     "link_pieces",
     "log_creep",
     "observe",
+    "pose_posterior",
     "observe_walks",
     "alarm_chart_result",
     "creep_result",

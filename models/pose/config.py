@@ -11,8 +11,12 @@ from models.monitoring.config import HABITS_OF_DAYS
 
 # The search for modes.
 HEADING_SD = math.radians(15.0)  # a pose offset's, before any track, around its peak
-HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))  # tried: a map's peaks are some 4 deg wide
-FAR_HEADINGS = np.radians(np.arange(33.0, 328.0, 3.0))  # tried where people fit none of the near
+HEADINGS = np.radians(
+    np.arange(-30.0, 31.0, 2.0)
+).tolist()  # tried: a map's peaks are some 4 deg wide
+FAR_HEADINGS = np.radians(
+    np.arange(33.0, 328.0, 3.0)
+).tolist()  # tried where people fit none of the near
 ON_MAP = 0.5  # of the walking groups must be on seen ground, for a pose to be held by the paths
 ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hundredths of a sd
 WARM_ROUNDS = 1  # from a warm start, whose heading is known
@@ -74,4 +78,7 @@ LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
 OCCAM = 3.0  # log evidence that a pose which is free to fit gains by that alone
 MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
 # How often paths are not found again: of cameras turned far, and of those that stand.
-LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.05
+LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
+# A still camera is told to stand where a turn would have been noticed: at four sd, 12 deg would.
+NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
+CERTAIN = 0.99  # that a heading moved: then it is told, however unsure

@@ -16,8 +16,9 @@ from itertools import product
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
-from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array
+from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
 from models.reasons import TracksCode
@@ -33,7 +34,8 @@ class PosePosterior:
     """A mixture over hypotheses: weights (K,), means (K, 4) and covariances (K, 4, 4).
 
     Means are offsets of tilt, roll, log height and heading from the prior pose. `moved_in` (K, 4)
-    says which parameters moved by each hypothesis; by the first, none did.
+    says which parameters moved by each hypothesis; by the first, none did. Of those that are not
+    `seen` (4,), the tracks say nothing.
     """
 
     prior: CameraPose
@@ -41,6 +43,7 @@ class PosePosterior:
     means: Array
     covariances: Array
     moved_in: Array
+    seen: Array
 
     @property
     def moved(self) -> float:
@@ -48,17 +51,16 @@ class PosePosterior:
         return float(self.weights[1:].sum())
 
     @property
-    def moved_parameters(self) -> dict[str, float]:
-        """The probability that each parameter changed."""
-        shares = self.weights @ self.moved_in
-        return dict(zip(PARAMETERS, shares.tolist(), strict=True))
-
-    @property
-    def turned(self) -> float:
-        """The probability that an angle changed, given that the camera moved."""
-        angles = [name != "height" for name in PARAMETERS]
-        share = float(self.weights @ self.moved_in[:, angles].any(axis=1))
-        return share / max(self.moved, 1e-300)
+    def move(self) -> MoveProbabilities:
+        """How likely a move is, and of what."""
+        shares = (self.weights @ self.moved_in).tolist()
+        angles = self.seen & [name != "height" for name in PARAMETERS]
+        turned = float(self.weights @ self.moved_in[:, angles].any(axis=1))
+        return MoveProbabilities(
+            moved=self.moved,
+            parameters=dict(zip(PARAMETERS, shares, strict=True)),
+            turned=turned / max(self.moved, 1e-300),
+        )
 
     @property
     def offset(self) -> Array:
@@ -137,6 +139,38 @@ def pose_posterior(
         means=means,
         covariances=covariances,
         moved_in=_MOVED_IN,
+        seen=seen,
+    )
+
+
+def drift_of(
+    fused: FusedEstimate,
+    walking_groups: int,
+    prior: CameraPose,
+    moved_prior: float = config.MOVED_PRIOR,
+) -> Drift:
+    """The drift of a window's estimate from the prior pose, as of `pose_posterior`.
+
+    A heading that certainly moved is told, however unsure it is how far.
+    """
+    posterior = pose_posterior(fused, walking_groups, prior, moved_prior)
+    move = posterior.move
+    sds = np.sqrt(np.diag(fused.covariance))[[name != "height" for name in PARAMETERS]]
+    noticed = fused.registered and bool((sds < config.NOTICED_SD).all())
+    ends = [end for name in ANGLES for end in posterior.interval(name, 0.9)]
+    told = [
+        name
+        for name in PARAMETERS
+        if name in fused.identifiable
+        or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
+    ]
+    return drift_between(
+        posterior.parameters,
+        posterior.sd,
+        told,
+        prior,
+        move,
+        noticed=noticed and max(map(abs, ends)) < config.NOTICED_RAD,
     )
 
 
@@ -146,7 +180,7 @@ def _log_prior(moved_prior: float) -> Array:
     some = shares / (1 - float(np.prod(1 - np.asarray(config.MOVES_IN))))
     weights = moved_prior * some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
     weights[0] = 1 - moved_prior
-    return np.log(weights)
+    return np.asarray(np.log(weights))
 
 
 def _by_paths(

@@ -1,6 +1,7 @@
 """The modes of speeds and places together, from several headings, and their covariances."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,7 +55,7 @@ def find_modes(
     site: CameraSite,
     joint: JointEstimate,
     warm_start: WarmStart | None = None,
-    headings: Array = config.HEADINGS,
+    headings: Sequence[float] = config.HEADINGS,
 ) -> list[Mode]:
     """The modes that are climbed to from several headings and from poses by speeds, the best first.
 
@@ -83,7 +84,7 @@ def find_modes(
 
 
 def _from_afar(
-    posterior: Posterior, joint: JointEstimate, headings: Array
+    posterior: Posterior, joint: JointEstimate, headings: Sequence[float]
 ) -> list[tuple[Peak, int]]:
     """The peaks of several headings and the poses by speeds, with their rounds of speeds.
 
