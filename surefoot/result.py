@@ -71,16 +71,14 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
     earlier = None if found.earlier is None else drift_of(found.earlier, model.prior)
     verdict = judge(found.drift, _LIMITS, (), chart, earlier)
-    drift = {_field(name): _in_unit(name, found.drift.of(name)[0]) for name in PARAMETERS}
-    sd = {_field(name): _in_unit(name, found.drift.of(name)[1]) for name in PARAMETERS}
-    estimated = tuple(_field(name) for name in found.drift.identifiable)
+    known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
     return Result(
         moved=verdict.drifting,
         why=_why(found.drift, chart),
         pose=Pose.of(found.pose),
-        estimated=estimated,
-        sd={name: sd[name] for name in estimated},
-        drift={name: drift[name] for name in estimated},
+        estimated=tuple(_field(name) for name in known),
+        sd={_field(name): sd for name, (_, sd) in known.items()},
+        drift={_field(name): by for name, (by, _) in known.items()},
     )
 
 
@@ -97,11 +95,8 @@ def _rate(tracks: Sequence[Track], alarms_a_year: float) -> AlarmRate:
 
 def _why(drift: Drift, chart: ChartResult | None) -> str:
     """The drift in words: each number with its standard deviation, and what the chart says."""
-    parts = [
-        f"{name} {_in_unit(name, drift.of(name)[0]):+.2f} {_UNITS[name]} "
-        f"(sd {_in_unit(name, drift.of(name)[1]):.2f})"
-        for name in drift.identifiable
-    ]
+    known = {name: _in_unit(name, drift) for name in drift.identifiable}
+    parts = [f"{n} {by:+.2f} {_UNITS[n]} (sd {sd:.2f})" for n, (by, sd) in known.items()]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
     if chart is not None and chart.suspicious:
         number = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
@@ -116,5 +111,7 @@ def _field(name: str) -> str:
     return f"{name}_{_UNITS[name]}"
 
 
-def _in_unit(name: str, value: float) -> float:
-    return value if name == "height" else math.degrees(value)
+def _in_unit(name: str, drift: Drift) -> tuple[float, float]:
+    """The drift of a parameter and its standard deviation, in degrees or metres."""
+    by, sd = drift.of(name)
+    return (by, sd) if name == "height" else (math.degrees(by), math.degrees(sd))

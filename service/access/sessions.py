@@ -8,8 +8,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy.orm import Session
 
 from service.access.activity import note
-from service.access.callers import Caller
-from service.access.tokens import caller_of, caller_of_token, is_valid
+from service.access.tokens import Caller, caller_of, caller_of_token, is_valid
 from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, UnauthorizedError
 from service.settings import Settings
@@ -48,13 +47,7 @@ def log_in(session: Session, settings: Settings, caller: Caller) -> str:
             expires_at=now + timedelta(hours=settings.session_hours),
         )
     )
-    note(
-        session,
-        Activity.SESSION_BEGAN,
-        by=caller.name,
-        via=caller.token_id,
-        subject_id=caller.token_id,
-    )
+    _note(session, Activity.SESSION_BEGAN, caller)
     return cookie
 
 
@@ -63,13 +56,7 @@ def log_out(session: Session, caller: Caller) -> None:
     if caller.session_hash is None:
         return
     access.end_session(session, caller.session_hash)
-    note(
-        session,
-        Activity.SESSION_ENDED,
-        by=caller.name,
-        via=caller.token_id,
-        subject_id=caller.token_id,
-    )
+    _note(session, Activity.SESSION_ENDED, caller)
 
 
 def note_refused(session: Session, address: str) -> None:
@@ -85,6 +72,11 @@ def caller_of_session(session: Session, cookie: str) -> Caller | None:
     if found is None or found[0].expires_at <= now or not is_valid(found[1], now):
         return None
     return replace(caller_of(found[1]), session_hash=id_sha256)
+
+
+def _note(session: Session, what: Activity, caller: Caller) -> None:
+    token_id = caller.token_id
+    note(session, what, by=caller.name, via=token_id, subject_id=token_id)
 
 
 def _hash(cookie: str) -> str:

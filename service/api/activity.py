@@ -6,18 +6,16 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query
 from fastapi.responses import Response, StreamingResponse
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
-from service.api.fields import Text
 from service.api.middleware.dependencies import AppState, StateDep
+from service.api.schemas import Out, Text
 from service.enums import Activity, AlertKind, Outcome
 from service.store import activity
 
 
-class EntryOut(BaseModel):
+class EntryOut(Out):
     """What somebody did; without a name, the service by itself."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     id: int
     at: datetime

@@ -1,15 +1,23 @@
 """`/cameras`: register, list, show, change, remove."""
 
 import re
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Self
 
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field, StringConstraints
 
-from service.api.fields import Body, CameraId, Finite, Text
-from service.api.geometry_schemas import IntrinsicsBody, PoseOut, PriorPoseBody
 from service.api.middleware.dependencies import EtagDep, ReadDep, StateDep, WriteDep
+from service.api.schemas import (
+    Body,
+    CameraId,
+    Finite,
+    IntrinsicsBody,
+    PoseOut,
+    PriorPoseBody,
+    Text,
+)
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 
@@ -83,7 +91,7 @@ class CameraOut(BaseModel):
         return cls(
             id=record.id,
             name=record.name,
-            intrinsics=IntrinsicsBody.from_value(view.intrinsics),
+            intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose),
             frame_rate_hz=record.frame_rate_hz,
             walking_speed=WalkingSpeedBody(

@@ -6,11 +6,11 @@ from typing import Annotated, Any, Self
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field, field_validator
 
-from service.api.fields import Body, ReasonCode
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Out, ReasonCode
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
-from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
+from service.notifications.webhooks import DeliveryView, WebhookSpec, WebhookView
 from service.reasons import code_of
 from service.store.webhooks import WebhookRecord
 from service.wording.reasons import in_words
@@ -65,20 +65,18 @@ class WebhookOut(BaseModel):
     updated_at: datetime
 
     @classmethod
-    def from_value(cls, view: WebhookView) -> Self:
-        """The body of a webhook."""
-        return cls.model_validate({**_fields(view.record), "pending": view.pending})
+    def from_record(cls, record: WebhookRecord, **more: Any) -> Self:
+        """The body of a webhook, with how many messages are pending, and a secret just made."""
+        why = record.disabled_reasons
+        more |= {"disabled_reason": in_words(why) or None, "disabled_reason_code": code_of(why)}
+        own = {name: getattr(record, name) for name in cls.model_fields.keys() - more}
+        return cls.model_validate({**own, **more})
 
 
 class WebhookMade(WebhookOut):
     """A webhook just made: the one answer, beside that of a rotation, that has the secret."""
 
     secret: str | None
-
-    @classmethod
-    def from_made(cls, made: SecretMade) -> Self:
-        """The body of a new webhook."""
-        return cls.model_validate({**_fields(made.record), "pending": 0, "secret": made.secret})
 
 
 class SecretOut(BaseModel):
@@ -94,7 +92,7 @@ class WebhookList(BaseModel):
     items: list[WebhookOut]
 
 
-class AttemptOut(BaseModel):
+class AttemptOut(Out):
     """One request of a delivery."""
 
     started_at: datetime
@@ -120,27 +118,14 @@ class DeliveryOut(BaseModel):
     @classmethod
     def from_value(cls, view: DeliveryView) -> Self:
         """The body of a delivery."""
-        attempts = [
-            AttemptOut.model_validate(attempt, from_attributes=True) for attempt in view.attempts
-        ]
         own = {name: getattr(view.record, name) for name in cls.model_fields if name != "attempts"}
-        return cls(**own, attempts=attempts)
+        return cls.model_validate({**own, "attempts": view.attempts})
 
 
 class DeliveryList(BaseModel):
     """Deliveries, newest first."""
 
     items: list[DeliveryOut]
-
-
-def _fields(record: WebhookRecord) -> dict[str, Any]:
-    names = WebhookOut.model_fields.keys() - {"pending", "disabled_reason", "disabled_reason_code"}
-    why = record.disabled_reasons
-    return {
-        **{name: getattr(record, name) for name in names},
-        "disabled_reason": in_words(why) or None,
-        "disabled_reason_code": code_of(why),
-    }
 
 
 router = APIRouter(tags=["webhooks"])
@@ -180,28 +165,26 @@ def create(
         ),
     )
     response.headers["Location"] = f"/webhooks/{made.record.id}"
-    return WebhookMade.from_made(made)
+    return WebhookMade.from_record(made.record, pending=0, secret=made.secret)
 
 
 @router.get("/webhooks")
 def list_all(session: ReadDep) -> WebhookList:
     """Webhooks, oldest first."""
-    return WebhookList(
-        items=[WebhookOut.from_value(view) for view in webhooks.list_webhooks(session)]
-    )
+    return WebhookList(items=[_shown(view) for view in webhooks.list_webhooks(session)])
 
 
 @router.get("/webhooks/{webhook_id}")
 def show(webhook_id: str, session: ReadDep) -> WebhookOut:
     """A webhook, and how it fares."""
-    return WebhookOut.from_value(webhooks.show_webhook(session, webhook_id))
+    return _shown(webhooks.show_webhook(session, webhook_id))
 
 
 @router.patch("/webhooks/{webhook_id}")
 def change(webhook_id: str, body: CheckedPatch, state: StateDep, session: WriteDep) -> WebhookOut:
     """Change a webhook; with another URL, or enabled again, it is sent what waits for it."""
     changes = body.model_dump(exclude_unset=True)
-    return WebhookOut.from_value(webhooks.change_webhook(session, state.queue, webhook_id, changes))
+    return _shown(webhooks.change_webhook(session, state.queue, webhook_id, changes))
 
 
 @router.delete("/webhooks/{webhook_id}", status_code=204)
@@ -247,3 +230,7 @@ def show_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
 def replay(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
     """Send a delivery anew, at once and under the same `webhook-id`."""
     return DeliveryOut.from_value(webhooks.replay_delivery(session, state.queue, delivery_id))
+
+
+def _shown(view: WebhookView) -> WebhookOut:
+    return WebhookOut.from_record(view.record, pending=view.pending)

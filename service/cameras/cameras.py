@@ -1,8 +1,9 @@
 """Register, change and remove cameras."""
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -95,6 +96,7 @@ def register_camera(
     record = CameraRecord(
         id=camera_id,
         name=spec.name or camera_id,
+        **_columns(spec.intrinsics),
         frame_rate_hz=spec.frame_rate_hz,
         walking_speed_mean_mps=spec.walking_speed_mean_mps,
         walking_speed_sd_mps=spec.walking_speed_sd_mps,
@@ -105,7 +107,6 @@ def register_camera(
         created_at=now,
         updated_at=now,
     )
-    _set_intrinsics(record, spec.intrinsics)
     session.add(record)
     session.flush()
     add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
@@ -146,17 +147,15 @@ def change_camera(
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
     record = view.record
-    if change.intrinsics is not None:
-        _set_intrinsics(record, change.intrinsics)
-    for name in (
-        "name",
-        "frame_rate_hz",
-        "walking_speed_mean_mps",
-        "walking_speed_sd_mps",
-        "reference_tracks",
-    ):
-        if getattr(change, name) is not None:
-            setattr(record, name, getattr(change, name))
+    changed = {
+        field.name: getattr(change, field.name)
+        for field in fields(change)
+        if getattr(change, field.name) is not None
+    }
+    lens = {} if change.intrinsics is None else _columns(change.intrinsics)
+    for name, value in {**changed, **lens}.items():
+        if name not in ("intrinsics", "prior_pose"):
+            setattr(record, name, value)
     record.version += 1
     record.updated_at = datetime.now(UTC)
     if change.reference_tracks is not None:
@@ -174,8 +173,8 @@ def change_camera(
         renew_prior_pose(
             session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
         )
-    fields = [field for field in change.__slots__ if getattr(change, field) is not None]
-    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
+    details = {"fields": list(changed)}
+    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
     session.flush()
     return view_camera(session, camera_id)
 
@@ -244,12 +243,7 @@ def add_prior_pose(
     session.add(
         PriorPoseRecord(
             camera_id=camera_id,
-            height_m=pose.height_m,
-            tilt_rad=pose.tilt_rad,
-            roll_rad=pose.roll_rad,
-            heading_rad=pose.heading_rad,
-            x_m=pose.x_m,
-            y_m=pose.y_m,
+            **asdict(pose),
             origin=origin,
             trusted_by=name_in(session, by),
             created_at=datetime.now(UTC),
@@ -282,7 +276,6 @@ def _check_etag(view: CameraView, etag: str) -> None:
         raise PreconditionFailedError(f"If-Match: the camera is at {view.etag}, got {etag}")
 
 
-def _set_intrinsics(record: CameraRecord, lens: Intrinsics) -> None:
-    record.width, record.height = lens.width, lens.height
-    record.fx, record.fy, record.cx, record.cy = lens.fx, lens.fy, lens.cx, lens.cy
-    record.distortion = list(lens.distortion)
+def _columns(lens: Intrinsics) -> dict[str, Any]:
+    """A lens as the columns of a camera."""
+    return {**asdict(lens), "distortion": list(lens.distortion)}

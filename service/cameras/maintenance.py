@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
@@ -10,7 +9,7 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.enums import Activity
-from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
+from service.errors import ConflictError, MalformedError, NotFoundError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
@@ -20,15 +19,6 @@ from service.store import alerts, maintenance
 from service.store.maintenance import MaintenanceRecord
 
 _FARTHEST = timedelta(days=366)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WindowChange:
-    """Changes to a window; None stays."""
-
-    from_at: datetime | None = None
-    to_at: datetime | None = None
-    reason: str | None = None
 
 
 def open_window(
@@ -89,9 +79,12 @@ def change_window(
     settings: Settings,
     camera_id: str,
     window_id: str,
-    change: WindowChange,
+    *,
+    from_at: datetime | None,
+    to_at: datetime | None,
+    reason: str | None,
 ) -> MaintenanceRecord:
-    """Move a window's ends: to end it now, or to have it end when somebody really left.
+    """Move a window's ends: to end it now, or to have it end when somebody really left; None stays.
 
     Raises:
         NotFoundError: the camera has no such window.
@@ -99,12 +92,11 @@ def change_window(
     """
     record = _require(session, camera_id, window_id)
     now = datetime.now(UTC)
-    from_at, to_at = change.from_at or record.from_at, change.to_at or record.to_at
-    _check(from_at, to_at, now, settings)
-    if change.to_at is not None:
-        record.ended_at = to_at if to_at <= now else None
-    record.from_at, record.to_at, record.updated_at = from_at, to_at, now
-    record.reason = record.reason if change.reason is None else change.reason
+    _check(from_at or record.from_at, to_at or record.to_at, now, settings)
+    if to_at is not None:
+        record.to_at, record.ended_at = to_at, to_at if to_at <= now else None
+    record.from_at, record.updated_at = from_at or record.from_at, now
+    record.reason = record.reason if reason is None else reason
     _note(session, Activity.MAINTENANCE_CHANGED, record, None)
     session.flush()
     request_estimate(session, queue, camera_id)
@@ -175,5 +167,4 @@ def _check(from_at: datetime, to_at: datetime, now: datetime, settings: Settings
 
 
 def _refuse(name: str, problem: str, got: datetime) -> None:
-    reason = f"{problem}, got {got.isoformat()}"
-    raise MalformedError(f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),))
+    raise MalformedError.of_field(name, f"{problem}, got {got.isoformat()}")

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
@@ -48,24 +48,9 @@ class PoseView:
     etag: str
 
     @property
-    def state(self) -> PoseState:
-        """The camera's state."""
-        return self.status.state
-
-    @property
     def reason(self) -> str:
         """The reasons in words."""
         return in_words(self.reasons)
-
-    @property
-    def estimate(self) -> EstimateRecord | None:
-        """The estimate behind the pose; it may tell nothing yet."""
-        return self.status.estimate
-
-    @property
-    def identifiable(self) -> tuple[str, ...]:
-        """Those of tilt, roll, height, heading that are estimated."""
-        return self.status.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -89,13 +74,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     pose = pose_of_prior(prior)
     estimate = status.estimate
     if estimate is not None:
-        pose = replace(
-            pose,
-            height_m=estimate.pose.height_m,
-            tilt_rad=estimate.pose.tilt_rad,
-            roll_rad=estimate.pose.roll_rad,
-            heading_rad=estimate.pose.heading_rad,
-        )
+        pose = replace(pose, **asdict(estimate.pose))
     reference = ReferenceView(
         ready=record.ready_at is not None,
         tracks=so_far,
@@ -119,27 +98,25 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
 
 
 def pose_history(
-    session: Session, camera_id: str, start: datetime | None, end: datetime | None, limit: int
+    session: Session,
+    camera_id: str,
+    start: datetime | None,
+    end: datetime | None,
+    *,
+    newest: int,
+    thinned: int | None,
 ) -> Sequence[EstimateRecord]:
-    """The estimates between two times, oldest first; the newest so many of them.
+    """The estimates between two times, oldest first: the newest so many of them.
+
+    Or at most so many of all of them, evenly thinned out.
 
     Raises:
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    return estimates.between(session, camera_id, start, end, limit)
-
-
-def thinned_history(
-    session: Session, camera_id: str, start: datetime | None, end: datetime | None, most: int
-) -> Sequence[EstimateRecord]:
-    """At most so many of the estimates between two times, evenly thinned out, oldest first.
-
-    Raises:
-        NotFoundError: there is no such camera.
-    """
-    require_camera(session, camera_id)
-    return estimates.thinned(session, camera_id, start, end, most)
+    if thinned is None:
+        return estimates.between(session, camera_id, start, end, newest)
+    return estimates.thinned(session, camera_id, start, end, thinned)
 
 
 def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_far: int) -> Reasons:

@@ -86,8 +86,3 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     if not snapshots.remove(session, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
-
-
-def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:
-    """Size and time of a camera's still image; None where none may be shown."""
-    return snapshots.facts(session, camera_id) if settings.snapshots else None

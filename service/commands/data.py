@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from service.commands.settings_given import settings_given
+from service.commands.settings_given import begin
 from service.data_dir import StartError
-from service.logs import configure_logs
-from service.workers.processes.signals import be_private, end_like_ctrl_c
+from service.workers.processes.signals import end_like_ctrl_c
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -23,7 +22,7 @@ def migrate(data_dir: DataDir = None) -> None:
     """Bring the database to the newest revision."""
     from service.commands.migrate import migrate as run_migrations
 
-    settings = _begin(data_dir)
+    settings = begin(data_dir=data_dir)
     run_migrations(settings)
     what = settings.database_path if settings.database_url is None else "the database"
     _say(f"{what} is at the newest revision")
@@ -103,19 +102,13 @@ def rotate_key(
     """Seal the stored secrets with a new key file, or with SUREFOOT_SECRET_KEY if that is set."""
     from service.commands.key_rotation import rotate_key as rotate
 
-    count = rotate(_begin(data_dir), old_key_file, lost=lost)
+    count = rotate(begin(data_dir=data_dir), old_key_file, lost=lost)
     _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
-
-
-def _begin(data_dir: Path | None, database_url: str | None = None) -> "Settings":
-    configure_logs()
-    be_private()
-    return settings_given(data_dir=data_dir, database_url=database_url)
 
 
 def _begin_on_file(data_dir: Path | None, command: str) -> "Settings":
     """Settings for a command that a server has better ones for."""
-    settings = _begin(data_dir)
+    settings = begin(data_dir=data_dir)
     if settings.database_url is not None:
         raise StartError(
             f"{command}: it is for SQLite files, and SUREFOOT_DATABASE_URL names a server; use its "
@@ -156,7 +149,7 @@ def migrate_data(
         url = read_database_url(target)
     except ValueError as error:
         raise StartError(f"--to: {error}") from error
-    settings = _begin(data_dir or path.parent, url)
+    settings = begin(data_dir=data_dir or path.parent, database_url=url)
     with _progress() as tell:
         moved = move(path, settings, tell)
     _say(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")

@@ -2,6 +2,7 @@
 
 import contextlib
 import fcntl
+import math
 import shutil
 import socket
 import subprocess
@@ -39,7 +40,6 @@ from service.commands.replay import post_tracks
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError, running_in
 from service.enums import AlertState, ReferenceState
-from service.formats.degrees import degrees
 from service.settings import Settings
 from service.workers.processes.signals import end_like_ctrl_c
 
@@ -54,9 +54,8 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
-    port = port or _free_port()
     _remove_left_over()
-    _require_free(port)
+    port = _free_port(port)
     end_like_ctrl_c()
     console.print("A street camera, people walking by; later somebody knocks the camera.")
     with _folder() as folder:
@@ -78,7 +77,8 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
                 save_picture(screen.table(progress), picture)
             if won and stay:
                 console.print("Ctrl-C stops the service.")
-                _wait_for_interrupt()
+                with contextlib.suppress(KeyboardInterrupt):
+                    service.wait()
     return 0 if won else 1
 
 
@@ -157,7 +157,7 @@ def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
         return False
     served = np.array(screen.pose["pose"]["quaternion_wxyz"])
     to_knocked, to_prior = (
-        degrees(float(angle_between(served, pose.quaternion_wxyz)))
+        math.degrees(float(angle_between(served, pose.quaternion_wxyz)))
         for pose in (KNOCK.apply(PRIOR), PRIOR)
     )
     console.print(
@@ -210,14 +210,6 @@ def _check_time(started: float) -> None:
         raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
 
 
-def _wait_for_interrupt() -> None:
-    try:
-        while True:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        return
-
-
 @contextlib.contextmanager
 def _folder() -> Iterator[Path]:
     """A folder that is removed at the end; by its lock others see that a demo is in it."""
@@ -238,8 +230,8 @@ def _remove_left_over() -> None:
                 shutil.rmtree(folder)
 
 
-def _require_free(port: int) -> None:
-    """Check that nobody listens on a port of this machine.
+def _free_port(port: int) -> int:
+    """A port of this machine that nobody listens on: the one that is named, any of 0.
 
     Raises:
         StartError: somebody does; the demo would register its street there.
@@ -253,11 +245,5 @@ def _require_free(port: int) -> None:
                 f"port: {_HOST}, port {port} cannot be had ({error.strerror}); another service "
                 "runs there: name another port by --port, or none"
             ) from error
-
-
-def _free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind((_HOST, 0))
-        port: int = probe.getsockname()[1]
-        return port
+        free: int = probe.getsockname()[1]
+        return free

@@ -8,16 +8,17 @@ import socket
 import sys
 import threading
 import time
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import uvicorn
 
-from service.access.tokens import count_tokens
 from service.api.middleware.connections import ConnectionGuard, protocol_factory
 from service.api.middleware.hosts import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
+from service.store import access
 from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
@@ -98,7 +99,7 @@ def _require_way_in(settings: Settings) -> None:
     if settings.proxy_from:
         return
     with contextlib.closing(Store(settings)) as store, store.read() as session:
-        count = count_tokens(session)
+        count = access.count_valid(session, datetime.now(UTC))
     if not count:
         raise StartError(
             "auth: tokens are needed here, and nobody has one; make one by `surefoot token add "

@@ -65,11 +65,16 @@ def run_worker(
     settle_allocator()
     yield_to_others(settings.worker_nice)
     store = Store(settings)
+    limits_s = {  # of a task of each kind; trainings mind theirs themselves
+        ESTIMATE_JOB: settings.estimate_limit_s,
+        DELIVER_JOB: settings.delivery_limit_s,
+        UPKEEP: settings.upkeep_limit_s,
+    }
     context = JobContext(
         settings=settings,
         store=store,
         queue=JobQueue(store.engine),
-        running=RunningJobs(limits_s=_limits_s(settings)),
+        running=RunningJobs(limits_s=limits_s),
     )
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: context.stopping.set())
@@ -135,15 +140,6 @@ def _is_full(context: JobContext) -> bool:
         return False
     give_back()
     return resident_mb() > limit_mb
-
-
-def _limits_s(settings: Settings) -> dict[str, float]:
-    """The longest time of a task of each kind; trainings mind theirs themselves."""
-    return {
-        ESTIMATE_JOB: settings.estimate_limit_s,
-        DELIVER_JOB: settings.delivery_limit_s,
-        UPKEEP: settings.upkeep_limit_s,
-    }
 
 
 def _stop_at_end_of_stdin(context: JobContext) -> None:

@@ -23,11 +23,11 @@ from models.monitoring.verdict import (
 from models.pose import drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
+from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
 from service.estimation.last_poses import save_last_pose
-from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of

@@ -32,7 +32,7 @@ def draw_camera(page: CameraPage) -> CameraDrawings:
     """
     lens, prior = page.camera.intrinsics, page.camera.prior_pose
     overlays = [Overlay(pose=prior, kind="prior")]
-    if page.pose.identifiable:
+    if page.pose.status.identifiable:
         overlays.append(Overlay(pose=page.pose.pose, kind="served"))
     # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
     ground = ground_of(lens, overlays[-1].pose)

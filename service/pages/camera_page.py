@@ -12,11 +12,19 @@ from service.alerts.alerts import list_alerts
 from service.alerts.data_gaps import DataGap, data_gap_of
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
-from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.settings import Settings
-from service.store import activity, alerts, cameras, events, maintenance, tracks, trainings
+from service.store import (
+    activity,
+    alerts,
+    cameras,
+    events,
+    maintenance,
+    snapshots,
+    tracks,
+    trainings,
+)
 from service.store.activity import ActivityRecord
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.cameras import PriorPoseRecord
@@ -115,7 +123,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     newest_event_id = events.newest_id(session)
     camera = view_camera(session, camera_id)
     pose = view_pose(session, settings, camera_id)
-    estimate = pose.estimate
+    estimate = pose.status.estimate
     ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
     found = [*pose.status.alerts, *list_alerts(session, ended, _ALERTS)]
     windows = maintenance.of_camera(session, camera_id)
@@ -146,7 +154,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
         activity=tuple(activity.newest(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
-        snapshot=snapshot_facts(session, settings, camera_id),
+        snapshot=snapshots.facts(session, camera_id) if settings.snapshots else None,
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,
     )

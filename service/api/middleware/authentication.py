@@ -4,6 +4,7 @@ import hmac
 import logging
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from ipaddress import ip_address
 from urllib.parse import quote
 
@@ -16,7 +17,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
-from service.access.callers import Caller
+from service.access.tokens import Caller
 from service.api.middleware.concurrency import LOOKUPS
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import STATIC_URL
@@ -30,6 +31,7 @@ from service.errors import (
     UnauthorizedError,
 )
 from service.settings import Settings
+from service.store import access
 from service.store.engines.store import Store
 
 log = logging.getLogger("surefoot.access")
@@ -135,7 +137,7 @@ class GuardMiddleware:
 
         def keep() -> None:
             with store.write(f"token/{token_id}") as session:
-                tokens.note_use(session, token_id)
+                access.note_use(session, token_id, datetime.now(UTC))
 
         try:
             await run_sync(keep, limiter=self._keeping)

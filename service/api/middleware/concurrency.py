@@ -6,7 +6,6 @@ Kinds of requests have lanes of their own, so that none starves another; `/healt
 import asyncio
 import math
 import threading
-from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
@@ -14,7 +13,7 @@ from functools import partial
 import anyio
 import anyio.to_thread
 from anyio._backends import _asyncio
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Scope
 
 from service.errors import OverloadedError
 from service.settings import Settings
@@ -31,10 +30,10 @@ class Lane:
 
     def __init__(self, name: str, *, at_once: int, waiting: int, patience_s: float) -> None:
         self._name = name
-        self._free = at_once
+        self._free = asyncio.Semaphore(at_once)
         self._most_waiting = waiting
         self._patience_s = patience_s
-        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._waiting = 0
 
     def check(self) -> None:
         """Refuse before anything is read.
@@ -42,7 +41,7 @@ class Lane:
         Raises:
             OverloadedError: as many wait already as may.
         """
-        if self._free <= 0 and len(self._waiting) >= self._most_waiting:
+        if self._free.locked() and self._waiting >= self._most_waiting:
             raise OverloadedError(
                 f"{self._name}: every place is taken, and {self._most_waiting} requests wait",
                 retry_after_s=_COME_BACK_S,
@@ -56,40 +55,21 @@ class Lane:
             OverloadedError: too many wait already, or the turn did not come in time.
         """
         self.check()
-        if self._free > 0:
-            self._free -= 1
-        else:
-            await self._wait()
+        self._waiting += 1
+        try:
+            async with asyncio.timeout(self._patience_s):
+                await self._free.acquire()
+        except TimeoutError as error:
+            raise OverloadedError(
+                f"{self._name}: no turn came within {self._patience_s:g} s",
+                retry_after_s=_COME_BACK_S,
+            ) from error
+        finally:
+            self._waiting -= 1
         try:
             yield
         finally:
-            self._pass_on()
-
-    async def _wait(self) -> None:
-        called = asyncio.get_running_loop().create_future()
-        self._waiting.append(called)
-        try:
-            async with asyncio.timeout(self._patience_s):
-                await called
-        except BaseException as error:
-            if called.done() and not called.cancelled():
-                self._pass_on()  # it came in the very moment of giving up
-            elif called in self._waiting:
-                self._waiting.remove(called)
-            if isinstance(error, TimeoutError):
-                raise OverloadedError(
-                    f"{self._name}: no turn came within {self._patience_s:g} s",
-                    retry_after_s=_COME_BACK_S,
-                ) from error
-            raise
-
-    def _pass_on(self) -> None:
-        while self._waiting:
-            called = self._waiting.popleft()
-            if not called.cancelled():
-                called.set_result(None)
-                return
-        self._free += 1
+            self._free.release()
 
 
 class Lanes:
@@ -114,23 +94,6 @@ class Lanes:
         if path == "/events":
             return self._streams
         return self._reads if scope["method"] in ("GET", "HEAD") else self._writes
-
-
-class LaneMiddleware:
-    """Lets a request, whose body has come, wait for its turn."""
-
-    def __init__(self, app: ASGIApp, lanes: Lanes) -> None:
-        self._app = app
-        self._lanes = lanes
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on when its turn comes."""
-        lane = self._lanes.of(scope) if scope["type"] == "http" else None
-        if lane is None:
-            await self._app(scope, receive, send)
-            return
-        async with lane.turn():
-            await self._app(scope, receive, send)
 
 
 def sessions_at_once(settings: Settings) -> int:

@@ -1,17 +1,16 @@
-"""`/ui/cameras/{id}`: the page of a camera, and the script that draws its charts."""
+"""`/ui/cameras/{id}`: the page of a camera."""
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Header, Request
-from fastapi.responses import HTMLResponse, Response
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
 
 from service.api.middleware.dependencies import ReadDep, StateDep
-from service.api.middleware.pages import CHARTS, CHARTS_URL, packaged_file, render
+from service.api.middleware.pages import CHARTS_URL, render
 from service.enums import AlertState
 from service.pages.camera_drawings import draw_camera
 from service.pages.camera_page import CameraPage, view_camera_page
 from service.wording import alerts, camera, moves
-from service.wording.activity import entry_words
 from service.wording.reasons import in_words
 from service.wording.times import Clock, next_morning
 
@@ -36,10 +35,12 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         zone_name=state.settings.timezone,
         headline=camera.headline(page.facts, clock),
         drawings=draw_camera(page),
-        parameters=moves.parameter_rows(page.camera.prior_pose, page.pose.pose, page.pose.estimate),
+        parameters=moves.parameter_rows(
+            page.camera.prior_pose, page.pose.pose, page.pose.status.estimate
+        ),
         misplaced=moves.misplaced_words(page.misplaced),
         flags=_flags(page, clock),
-        activity=[(entry, entry_words(entry, clock)) for entry in page.activity],
+        activity=[(entry, alerts.entry_words(entry, clock)) for entry in page.activity],
         words=alerts,
         in_words=in_words,
         states=camera.STATES,
@@ -50,12 +51,6 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     )
     answer.headers["Content-Security-Policy"] += f"; style-src 'self' {_CHARTS_STYLE}"
     return answer
-
-
-@router.get(CHARTS_URL)
-def charts(accept_encoding: Annotated[str, Header()] = "") -> Response:
-    """The chart library's script, out of its installed package."""
-    return packaged_file("plotly", CHARTS, accept_encoding)
 
 
 def _flags(page: CameraPage, clock: Clock) -> list[str]:

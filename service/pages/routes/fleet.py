@@ -6,9 +6,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from service.api.fields import Text
 from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import render
+from service.api.schemas import Text
 from service.enums import PoseState
 from service.pages.fleet import counts_of, list_fleet, list_groups
 from service.store import events

@@ -5,6 +5,7 @@ from urllib.parse import parse_qs
 
 from fastapi import Depends, Request
 
+from service.api.middleware.dependencies import media_type_of
 from service.errors import MalformedError, TooLargeError, UnsupportedMediaTypeError
 
 _MOST_BYTES = 16 * 1024
@@ -28,7 +29,7 @@ async def read_form(request: Request) -> Form:
         TooLargeError: more than a form of ours has.
         MalformedError: it cannot be read, or has NUL characters in it.
     """
-    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    media_type = media_type_of(request)
     if media_type != _TYPE:
         raise UnsupportedMediaTypeError(f"Content-Type: {_TYPE} is needed, got {media_type!r:.80}")
     body = b""

@@ -1,74 +1,48 @@
-"""`/tokens`, and the page of them: make, list, revoke."""
+"""`/ui/tokens`: the page of tokens, to make, list and revoke them without a script."""
 
 from datetime import UTC, datetime, timedelta
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from sqlalchemy.orm import Session
 
 from service.access import tokens
 from service.access.tokens import MadeToken, TokenSpec
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import render
-from service.api.tokens_schemas import TokenBody, TokenList, TokenMade, TokenOut
+from service.api.tokens import list_all
 from service.errors import FieldError, MalformedError
 from service.pages.routes.forms import Form, FormDep
+from service.store.access import name_in
 
-router = APIRouter(tags=["access"])
+router = APIRouter(include_in_schema=False)
 
 _MOST_DAYS = 36_500
 
 
-@router.post("/tokens", status_code=201)
-def create(body: TokenBody, session: WriteDep, actor: ActorDep, response: Response) -> TokenMade:
-    """Make a token. It is in this answer and in no other."""
-    made = tokens.make_token(session, body.to_spec(), name_of(actor))
-    response.headers["Location"] = "/tokens"
-    response.headers["Cache-Control"] = "no-store"
-    return TokenMade.from_value(made)
-
-
-@router.get("/tokens")
-def list_all(session: ReadDep) -> TokenList:
-    """Tokens, oldest first; those that were revoked, too."""
-    return TokenList(items=_every(session))
-
-
-@router.delete("/tokens/{token_id}", status_code=204)
-def revoke(token_id: str, session: WriteDep, actor: ActorDep) -> None:
-    """Let a token in no more; pages that logged in with it are logged out."""
-    tokens.revoke_token(session, token_id, name_of(actor))
-
-
-@router.get("/ui/tokens", include_in_schema=False)
+@router.get("/ui/tokens")
 def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Tokens, and a form for another one."""
     return _page(request, auth_on(state.settings), session)
 
 
-@router.post("/ui/tokens", include_in_schema=False)
-def create_by_form(
-    request: Request, form: FormDep, state: StateDep, session: WriteDep, actor: ActorDep
-) -> HTMLResponse:
+@router.post("/ui/tokens")
+def create(request: Request, form: FormDep, state: StateDep, session: WriteDep) -> HTMLResponse:
     """Make a token by the form, and show it this once."""
     try:
-        made = tokens.make_token(session, _spec(form), name_of(actor))
+        made = tokens.make_token(session, _spec(form), name_in(session, None))
     except MalformedError as error:
         session.rollback()
         return _page(request, auth_on(state.settings), session, typed=form, wrong=error.errors)
     return _page(request, auth_on(state.settings), session, made=made)
 
 
-@router.post("/ui/tokens/{token_id}/revoke", include_in_schema=False)
-def revoke_by_form(token_id: str, session: WriteDep, actor: ActorDep) -> RedirectResponse:
+@router.post("/ui/tokens/{token_id}/revoke")
+def revoke(token_id: str, session: WriteDep) -> RedirectResponse:
     """Revoke a token by its button."""
-    tokens.revoke_token(session, token_id, name_of(actor))
+    tokens.revoke_token(session, token_id, name_in(session, None))
     return RedirectResponse("/ui/tokens", status_code=303)
-
-
-def _every(session: Session) -> list[TokenOut]:
-    return [TokenOut.from_record(record) for record in tokens.list_tokens(session)]
 
 
 def _page(
@@ -84,7 +58,7 @@ def _page(
         request,
         "tokens.html",
         422 if wrong else 200,
-        tokens=_every(session),
+        tokens=list_all(session).items,
         made=made,
         typed=typed or Form(),
         wrong={error.pointer[1:]: error.reason for error in wrong},
@@ -104,8 +78,7 @@ def _spec(form: Form) -> TokenSpec:
     if days:
         if not days.isascii() or not days.isdigit() or not 0 < int(days) <= _MOST_DAYS:
             reason = f"a number of days from 1 to {_MOST_DAYS} is needed, got {days!r:.20}"
-            field = FieldError(pointer="/expires_at", reason=reason)
-            raise MalformedError(f"expires_at: {reason}", (field,))
+            raise MalformedError.of_field("expires_at", reason)
         expires_at = datetime.now(UTC) + timedelta(days=int(days))
     return TokenSpec(
         name=form.one("name"),

@@ -1,11 +1,12 @@
-"""Limits of bodies: each is read whole before anything is done with it, and so many at once."""
+"""Admission of requests: a body is read whole, then it waits for its turn; so many at once."""
 
+import contextlib
 import re
 
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.middleware.concurrency import Lanes
+from service.api.middleware.concurrency import Lane, Lanes
 from service.errors import OverloadedError, TooLargeError
 from service.settings import Settings
 
@@ -14,25 +15,25 @@ _TRACKS = re.compile(r"/cameras/[^/]+/tracks|/ui/tracks")
 _SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot")
 
 
-class BodyMiddleware:
-    """Counts bytes as they come, and hands the body on when all of it is there.
+class AdmissionMiddleware:
+    """Counts bytes as they come, and hands a body on when all of it is there and its turn comes.
 
     Slow senders therefore hold nothing but their own bytes. A request for whose kind there is no
     room is refused before its body is read.
     """
 
-    def __init__(self, app: ASGIApp, settings: Settings, lanes: Lanes) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
         self._settings = settings
-        self._lanes = lanes
+        self._lanes = Lanes(settings)
         self._held = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on with its body.
+        """Pass a request on with its body, when its turn comes.
 
         Raises:
             TooLargeError: the body is, or says it is, larger than its kind may be.
-            OverloadedError: there is no room for it now.
+            OverloadedError: there is no room for it now, or no turn came in time.
         """
         if scope["type"] != "http":
             await self._app(scope, receive, send)
@@ -42,7 +43,7 @@ class BodyMiddleware:
             lane.check()
         headers = {name: value for name, value in scope["headers"] if name in _LENGTHS}
         if not headers:
-            await self._app(scope, receive, send)
+            await self._admit(lane, scope, receive, send)
             return
         limit = round(self._limit_mb(scope["path"]) * _MB)
         declared = headers.get(b"content-length", b"0")
@@ -67,9 +68,13 @@ class BodyMiddleware:
                         retry_after_s=2,
                     )
                 body.append(chunk)
-            await self._app(scope, _replay(body, receive), send)
+            await self._admit(lane, scope, _replay(body, receive), send)
         finally:
             self._held -= held
+
+    async def _admit(self, lane: Lane | None, scope: Scope, receive: Receive, send: Send) -> None:
+        async with contextlib.nullcontext() if lane is None else lane.turn():
+            await self._app(scope, receive, send)
 
     def _limit_mb(self, path: str) -> float:
         if _TRACKS.fullmatch(path):
