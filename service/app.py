@@ -23,22 +23,21 @@ from service.api import (
     webhooks,
 )
 from service.api.middleware import pages
-from service.api.middleware.admission import AdmissionMiddleware
-from service.api.middleware.authentication import GuardMiddleware
-from service.api.middleware.concurrency import (
+from service.api.middleware.admission import (
+    AdmissionMiddleware,
     sessions_at_once,
     start_threads,
 )
+from service.api.middleware.authentication import GuardMiddleware
 from service.api.middleware.dependencies import AppState
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
 from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
 from service.api.middleware.rate_limits import RateMiddleware
-from service.cameras.posts import Quota
+from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
-from service.pages.routes import api_docs, camera_page, fleet, login, registration
-from service.pages.routes import tokens as tokens_page
+from service.pages import access, api_docs, camera_page, fleet, registration
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -98,11 +97,10 @@ def create_app(settings: Settings) -> FastAPI:
         operation,
         api_docs,
         fleet,
-        login,
         camera_page,
         registration,
         tokens,
-        tokens_page,
+        access,
     ):
         app.include_router(module.router)
     documented.document_errors(app)

@@ -104,7 +104,7 @@ def test_only_routes_and_the_application_see_schemas():
     for path in sources("service"):
         api = {name for name in imports(path) if name.startswith("service.api.")}
         if any(not name.startswith("service.api.middleware") for name in api):
-            assert {"api", "routes", "app.py"} & set(path.parts), path
+            assert {"api", "pages", "app.py"} & set(path.parts), path
         if "middleware" in path.parts:
             assert all(name.startswith("service.api.middleware") for name in api), path
 

@@ -115,7 +115,7 @@ class ServedPoseOut(BaseModel):
         """The body of a served pose."""
         status, estimate = view.status, view.status.estimate
         return cls(
-            camera_id=view.camera_id,
+            camera_id=status.camera_id,
             state=status.state,
             pose=PoseOut.from_value(view.pose),
             estimated=[

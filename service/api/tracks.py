@@ -14,7 +14,6 @@ from pydantic import Field
 from service.api.middleware.dependencies import AppState, BodyDep, StateDep, media_type_of
 from service.api.schemas import Out
 from service.cameras import tracks
-from service.cameras.posts import StalePictureError
 from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
@@ -165,7 +164,7 @@ def _take(state: AppState, camera_id: str, came: Posted) -> Response:
         try:
             receipt = _store(state, camera_id, camera, came)
             break
-        except (MalformedError, StalePictureError) as error:
+        except (MalformedError, tracks.StalePictureError) as error:
             # It may be that the picture is another than when it was last asked for.
             now = state.pictures.again(state.store, camera_id)
             if now == camera and isinstance(error, MalformedError):

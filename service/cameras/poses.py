@@ -39,7 +39,6 @@ class ReferenceView:
 class PoseView:
     """The served pose of a camera, and its status."""
 
-    camera_id: str
     status: CameraStatus
     reasons: Reasons
     pose: CameraPose
@@ -87,7 +86,6 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
     served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
-        camera_id=camera_id,
         status=status,
         reasons=reasons,
         pose=pose,

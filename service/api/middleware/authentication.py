@@ -18,7 +18,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.access import sessions, tokens
 from service.access.attempts import Attempts
 from service.access.tokens import Caller
-from service.api.middleware.concurrency import LOOKUPS
+from service.api.middleware.admission import LOOKUPS
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import STATIC_URL
 from service.api.middleware.scopes import need_of

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from service.access.tokens import Caller
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
-from service.cameras.posts import Pictures, Quota, Watched
+from service.cameras.tracks import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings

@@ -15,7 +15,7 @@ import anyio
 import anyio.to_thread
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.api.middleware.concurrency import STREAM_POLLS
+from service.api.middleware.admission import STREAM_POLLS
 from service.store import events
 from service.store.engines.store import Store
 from service.store.events import EventRecord

@@ -11,7 +11,7 @@ import httpx
 import pytest
 from fastapi.testclient import TestClient
 
-from service.api.middleware.concurrency import Lane
+from service.api.middleware.admission import Lane
 from service.app import create_app
 from service.errors import OverloadedError
 from service.store.engines.store import Store

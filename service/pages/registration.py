@@ -18,7 +18,7 @@ from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
-from service.pages.routes.registration_form import RegistrationForm
+from service.pages.registration_form import RegistrationForm
 from service.wording.typed_pose import Saying, judge_pose, judge_tracks, worst_first
 
 router = APIRouter(include_in_schema=False)
