@@ -14,6 +14,7 @@ from service.api.schemas import (
     CameraId,
     Finite,
     IntrinsicsBody,
+    Out,
     PoseOut,
     PriorPoseBody,
     Text,
@@ -69,7 +70,7 @@ class CameraPatch(Body):
     reference_tracks: ReferenceTracks | None = None
 
 
-class CameraOut(BaseModel):
+class CameraOut(Out):
     """A registered camera."""
 
     id: str
@@ -88,20 +89,15 @@ class CameraOut(BaseModel):
     def from_value(cls, view: CameraView) -> Self:
         """The body of a camera."""
         record = view.record
-        return cls(
-            id=record.id,
-            name=record.name,
+        return cls.of(
+            record,
             intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose),
-            frame_rate_hz=record.frame_rate_hz,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
-            reference_tracks=record.reference_tracks,
             tracks=view.tracks,
             model_id=view.model_id,
-            created_at=record.created_at,
-            updated_at=record.updated_at,
         )
 
 

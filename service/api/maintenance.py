@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
-from service.api.schemas import Body, Moment, Who
+from service.api.schemas import Body, Moment, Out, Who
 from service.cameras import maintenance
 from service.enums import WindowState
 from service.store.access import name_in
@@ -31,7 +31,7 @@ class WindowPatch(Body):
     reason: str | None = Field(None, max_length=2000)
 
 
-class WindowOut(BaseModel):
+class WindowOut(Out):
     """A maintenance window: `to` as planned, `ended_at` when it really ended."""
 
     model_config = ConfigDict(serialize_by_alias=True)
@@ -55,8 +55,7 @@ class WindowOut(BaseModel):
         if record.until <= now:
             state = WindowState.OVER
         ends = {"from_": record.from_at, "to": record.to_at, "by": record.requested_by}
-        same = {name: getattr(record, name) for name in cls.model_fields.keys() - {*ends, "state"}}
-        return cls(**same, **ends, state=state)
+        return cls.of(record, **ends, state=state)
 
 
 class WindowList(BaseModel):

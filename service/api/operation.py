@@ -6,10 +6,9 @@ a lie. `surefoot_events_total` counts by ids that are never given twice.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from importlib.metadata import version
 from itertools import product
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
 from prometheus_client import Metric
@@ -21,6 +20,7 @@ from pydantic import BaseModel
 from models.geometry.pose import ANGLES
 from service.api.middleware.dependencies import CallerDep, ReadDep, StateDep
 from service.api.middleware.hosts import auth_on
+from service.api.schemas import Out
 from service.enums import AlertKind, Health, PoseState, Readiness, Severity, TrainingState
 from service.operations import health as checks
 from service.operations.metrics import Metrics, load_metrics
@@ -32,7 +32,7 @@ class HealthOut(BaseModel):
     status: Health
 
 
-class ReadyOut(BaseModel):
+class ReadyOut(Out):
     """Whether the service can do its work; some problems are named while it can."""
 
     status: Readiness
@@ -42,12 +42,6 @@ class ReadyOut(BaseModel):
     queue_lag_s: float
     failing_cameras: int
     problems: list[str]
-
-    @classmethod
-    def from_value(cls, value: checks.Readiness) -> Self:
-        """The body of a readiness check."""
-        status = Readiness.READY if value.ready else Readiness.NOT_READY
-        return cls.model_validate({**asdict(value), "status": status})
 
 
 class MetricsCollector(Collector):
@@ -205,7 +199,8 @@ def ready(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
     readiness = checks.check_readiness(state.store, state.settings)
     if not readiness.ready:
         response.status_code = 503
-    body = ReadyOut.from_value(readiness)
+    status = Readiness.READY if readiness.ready else Readiness.NOT_READY
+    body = ReadyOut.of(readiness, status=status)
     if auth_on(state.settings) and caller is None:
         body.problems = []  # they name cameras and files
     return body

@@ -17,7 +17,7 @@ from service.api.middleware.dependencies import (
     StateDep,
     WriteDep,
 )
-from service.api.schemas import Body, Moment, PoseOut, ReasonCode, ReasonValues, Who
+from service.api.schemas import Body, Moment, Out, PoseOut, ReasonCode, ReasonValues, Who
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
 from service.degrees import in_degrees
@@ -79,7 +79,7 @@ class DriftOut(SdOut):
         return cls(**in_degrees(identifiable_drift(drift))) if drift.identifiable else None
 
 
-class ReferenceOut(BaseModel):
+class ReferenceOut(Out):
     """How much of the reference period has been seen."""
 
     state: ReferenceState
@@ -114,22 +114,16 @@ class ServedPoseOut(BaseModel):
     def from_value(cls, view: PoseView) -> Self:
         """The body of a served pose."""
         status, estimate = view.status, view.status.estimate
+        learned = ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING
         return cls(
             camera_id=status.camera_id,
             state=status.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[
-                field for name, field in _FIELDS.items() if name in view.status.identifiable
-            ],
+            estimated=[field for name, field in _FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             estimates={} if estimate is None else in_degrees(estimate.raw),
-            reference=ReferenceOut(
-                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
-                tracks=view.reference.tracks,
-                wanted=view.reference.wanted,
-                walking_speed_mps=view.reference.walking_speed_mps,
-            ),
+            reference=ReferenceOut.of(view.reference, state=learned),
             tracks=0 if estimate is None else estimate.tracks,
             from_=None if estimate is None else moment(estimate.from_s),
             to=None if estimate is None else moment(estimate.to_s),
@@ -141,7 +135,7 @@ class ServedPoseOut(BaseModel):
         )
 
 
-class HistoryPoint(BaseModel):
+class HistoryPoint(Out):
     """One estimate of the history."""
 
     at: datetime
@@ -158,13 +152,12 @@ class HistoryPoint(BaseModel):
     @classmethod
     def from_record(cls, record: EstimateRecord) -> Self:
         """The body of a stored estimate."""
-        return cls(
+        return cls.of(
+            record,
             at=record.created_at,
-            state=record.state,
             **in_degrees(asdict(record.pose)),
             sd=SdOut.from_value(record.drift),
             drift=DriftOut.from_value(record.drift),
-            tracks=record.tracks,
             to=moment(record.to_s),
         )
 

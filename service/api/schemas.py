@@ -82,6 +82,12 @@ class Out(BaseModel):
 
     model_config = ConfigDict(from_attributes=True)
 
+    @classmethod
+    def of(cls, value: object, **others: Any) -> Self:
+        """The body of what has its fields as attributes, all but the others."""
+        own = {name: getattr(value, name) for name in cls.model_fields.keys() - others}
+        return cls.model_validate({**own, **others})
+
 
 class IntrinsicsBody(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3."""

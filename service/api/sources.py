@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from fastapi import APIRouter
-from pydantic import AliasPath, BaseModel, Field
+from pydantic import BaseModel
 
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Out, Text, Who
@@ -20,13 +20,13 @@ class UseBody(Body):
 class SourceOut(Out):
     """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it."""
 
-    name: str = Field(validation_alias=AliasPath("record", "name"))
+    name: str
     counts: bool
-    tracks: int = Field(validation_alias=AliasPath("record", "tracks"))
-    usable_tracks: int = Field(validation_alias="usable")
-    wanted_tracks: int = Field(validation_alias="wanted")
-    first_seen_at: datetime = Field(validation_alias=AliasPath("record", "first_seen_at"))
-    last_seen_at: datetime = Field(validation_alias=AliasPath("record", "last_seen_at"))
+    tracks: int
+    usable_tracks: int
+    wanted_tracks: int
+    first_seen_at: datetime
+    last_seen_at: datetime
 
 
 class SourceList(BaseModel):
@@ -42,7 +42,13 @@ router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
 def list_all(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
     """Who has posted tracks of a camera, and whose count."""
     found = sources.list_sources(session, state.settings, camera_id)
-    return SourceList.model_validate({"items": found})
+    items = [
+        SourceOut.of(
+            each.record, counts=each.counts, usable_tracks=each.usable, wanted_tracks=each.wanted
+        )
+        for each in found
+    ]
+    return SourceList(items=items)
 
 
 @router.post("/{source:path}/use")

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 from service.access import tokens
 from service.access.tokens import MAX_NAME, TokenSpec
 from service.api.middleware.dependencies import ReadDep, WriteDep
-from service.api.schemas import Body, CameraId, Moment
+from service.api.schemas import Body, CameraId, Moment, Out
 from service.enums import TokenScope, TokenState
 from service.store import access
 from service.store.access import TokenRecord, name_in
@@ -24,7 +24,7 @@ class TokenBody(Body):
     expires_at: Moment | None = None
 
 
-class TokenOut(BaseModel):
+class TokenOut(Out):
     """A token, without its secret; `used_at` is to the minute."""
 
     id: str
@@ -45,8 +45,7 @@ class TokenOut(BaseModel):
         state = TokenState.EXPIRED if over else TokenState.VALID
         if record.revoked_at:
             state = TokenState.REVOKED
-        own = {name: getattr(record, name) for name in TokenOut.model_fields if name != "state"}
-        return cls.model_validate({**own, "state": state, **made})
+        return cls.of(record, state=state, **made)
 
 
 class TokenMade(TokenOut):

@@ -40,7 +40,7 @@ class CentreOut(BaseModel):
     roll_deg: float
 
 
-class TrainingOut(BaseModel):
+class TrainingOut(Out):
     """A training."""
 
     id: str
@@ -59,9 +59,8 @@ class TrainingOut(BaseModel):
     @classmethod
     def from_record(cls, record: TrainingRecord) -> Self:
         """The body of a stored training."""
-        own = {name: getattr(record, name) for name in cls.model_fields if name != "progress"}
         around = record.around and CentreOut(**in_degrees(record.around))
-        return cls.model_validate({**own, "around": around, "progress": record})
+        return cls.of(record, around=around, progress=record)
 
 
 class TrainingList(BaseModel):

@@ -44,7 +44,7 @@ class WebhookPatch(Body):
         return value
 
 
-class WebhookOut(BaseModel):
+class WebhookOut(Out):
     """A webhook, without its secret."""
 
     id: str
@@ -68,9 +68,8 @@ class WebhookOut(BaseModel):
     def from_record(cls, record: WebhookRecord, **more: Any) -> Self:
         """The body of a webhook, with how many messages are pending, and a secret just made."""
         why = record.disabled_reasons
-        more |= {"disabled_reason": in_words(why) or None, "disabled_reason_code": code_of(why)}
-        own = {name: getattr(record, name) for name in cls.model_fields.keys() - more}
-        return cls.model_validate({**own, **more})
+        words, code = in_words(why) or None, code_of(why)
+        return cls.of(record, disabled_reason=words, disabled_reason_code=code, **more)
 
 
 class WebhookMade(WebhookOut):
@@ -79,7 +78,7 @@ class WebhookMade(WebhookOut):
     secret: str | None
 
 
-class SecretOut(BaseModel):
+class SecretOut(Out):
     """A new secret; until `old_secret_until` messages are signed with the old one, too."""
 
     secret: str
@@ -101,7 +100,7 @@ class AttemptOut(Out):
     error: str | None
 
 
-class DeliveryOut(BaseModel):
+class DeliveryOut(Out):
     """A delivery; `id` is the `webhook-id` that the receiver sees, at every attempt."""
 
     id: str
@@ -118,8 +117,7 @@ class DeliveryOut(BaseModel):
     @classmethod
     def from_value(cls, view: DeliveryView) -> Self:
         """The body of a delivery."""
-        own = {name: getattr(view.record, name) for name in cls.model_fields if name != "attempts"}
-        return cls.model_validate({**own, "attempts": view.attempts})
+        return cls.of(view.record, attempts=view.attempts)
 
 
 class DeliveryList(BaseModel):
@@ -197,9 +195,7 @@ def remove(webhook_id: str, session: WriteDep) -> None:
 def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
     """Give a webhook a new secret; for a day, messages are signed with the old one, too."""
     made = webhooks.rotate_secret(session, state.settings, webhook_id)
-    return SecretOut.model_validate(
-        {"secret": made.secret, "old_secret_until": made.record.old_secret_until}
-    )
+    return SecretOut.of(made.record, secret=made.secret)
 
 
 @router.post("/webhooks/{webhook_id}/test", status_code=202)
