@@ -33,7 +33,7 @@ from service.api.middleware.dependencies import AppState
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
-from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
+from service.api.middleware.problems import FORESEEN, ProblemMiddleware, answer_of
 from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
@@ -80,6 +80,7 @@ def create_app(settings: Settings) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # FastAPI's own fetch their viewers from a public host
         redoc_url=None,
+        exception_handlers=dict.fromkeys(FORESEEN, answer_of),
     )
     # A path is looked for in one after another: what is asked for most comes first.
     for module in (
@@ -113,5 +114,4 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(ProblemMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.state.instruments = instruments
-    add_problem_handlers(app)
     return app

@@ -76,7 +76,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     record = TokenRecord(
         id=token_id,
         name=spec.name.strip(),
-        secret_sha256=_hash(secret),
+        secret_sha256=hash_of(secret),
         scopes=[scope for scope in TokenScope if scope in spec.scopes],
         cameras=None if spec.cameras is None else sorted(set(spec.cameras)),
         created_at=now,
@@ -116,7 +116,7 @@ def caller_of_token(session: Session, text: str) -> Caller | None:
     record = access.find(session, token_id) if prefix == _PREFIX else None
     # The same work for a token that is unknown: its id is no secret, but need not be told.
     kept = _NO_SECRET if record is None else record.secret_sha256
-    matches = hmac.compare_digest(kept, _hash(secret))
+    matches = hmac.compare_digest(kept, hash_of(secret))
     if record is None or not matches or not is_valid(record, datetime.now(UTC)):
         return None
     return caller_of(record)
@@ -137,7 +137,8 @@ def is_valid(record: TokenRecord, now: datetime) -> bool:
     return record.revoked_at is None and (record.expires_at is None or now < record.expires_at)
 
 
-def _hash(secret: str) -> str:
+def hash_of(secret: str) -> str:
+    """The SHA-256 that stands for a secret of ours."""
     # 32 random bytes need no slow hash: nobody guesses them.
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 

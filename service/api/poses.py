@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Self
 
 from fastapi import APIRouter, Header, Query, Response
@@ -30,6 +30,7 @@ from service.settings import Settings
 from service.store.access import name_in
 from service.store.estimates import EstimateRecord
 from service.store.serialization import identifiable_drift, identifiable_sd
+from service.wording.times import from_seconds
 
 _FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 
@@ -125,8 +126,8 @@ class ServedPoseOut(BaseModel):
             estimates={} if estimate is None else in_degrees(estimate.raw),
             reference=ReferenceOut.of(view.reference, state=learned),
             tracks=0 if estimate is None else estimate.tracks,
-            from_=None if estimate is None else moment(estimate.from_s),
-            to=None if estimate is None else moment(estimate.to_s),
+            from_=None if estimate is None else from_seconds(estimate.from_s),
+            to=None if estimate is None else from_seconds(estimate.to_s),
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
             reason=view.reason,
@@ -158,7 +159,7 @@ class HistoryPoint(Out):
             **in_degrees(asdict(record.pose)),
             sd=SdOut.from_value(record.drift),
             drift=DriftOut.from_value(record.drift),
-            to=moment(record.to_s),
+            to=from_seconds(record.to_s),
         )
 
 
@@ -166,11 +167,6 @@ class History(BaseModel):
     """Estimates, oldest first."""
 
     items: list[HistoryPoint]
-
-
-def moment(seconds: float) -> datetime:
-    """The aware UTC time of seconds since the epoch."""
-    return datetime.fromtimestamp(seconds, UTC)
 
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])

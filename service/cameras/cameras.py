@@ -158,15 +158,17 @@ def change_camera(
             setattr(record, name, value)
     record.version += 1
     record.updated_at = datetime.now(UTC)
-    if change.reference_tracks is not None:
-        _change_wanted(session, queue, camera_id, change.reference_tracks)
+    reference = references.newest(session, camera_id)
+    if change.reference_tracks is not None and reference.ready_at is None:
+        reference.wanted = change.reference_tracks
+        request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, None))
         # Tracks seen so far may be of another pose or lens, but not of other people.
-        from_s = references.newest(session, camera_id).from_s
+        from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
         pose = change.prior_pose or view.prior_pose
@@ -250,14 +252,6 @@ def add_prior_pose(
         )
     )
     session.flush()
-
-
-def _change_wanted(session: Session, queue: JobQueue, camera_id: str, wanted: int) -> None:
-    """Let a reference that is being learned wait for another number of tracks."""
-    reference = references.newest(session, camera_id)
-    if reference.ready_at is None:
-        reference.wanted = wanted
-        request_estimate(session, queue, camera_id)
 
 
 def _view(session: Session, record: CameraRecord) -> CameraView:

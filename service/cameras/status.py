@@ -75,7 +75,10 @@ def camera_statuses(
     without = [
         camera_id
         for camera_id, alerts in firing.items()
-        if _holds(alerts) and camera_id in newest and not _identifies(newest[camera_id].estimate)
+        if _holds(alerts)
+        and camera_id in newest
+        and (estimate := newest[camera_id].estimate) is not None
+        and not estimate.identifiable
     ]
     before = metrics.newest_identifiable_estimates(session, without) if without else {}
     found = {}
@@ -131,11 +134,6 @@ def _status_of(
         silent=silent,
         last_track_s=newest.last_track_s,
     )
-
-
-def _identifies(estimate: EstimateRecord | None) -> bool:
-    """True if the newest estimate is the last that tells something; none is the last, too."""
-    return estimate is None or bool(estimate.identifiable)
 
 
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:

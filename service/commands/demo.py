@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -126,9 +126,7 @@ def _show(
     assert not receipt["rejected"], receipt
     screen.tracks += len(people)
     newest_s = clock_s + float(people[-1].trajectory.time_s[-1])
-    while not _looked_at(http, screen, newest_s):
-        _check_time(started)
-        time.sleep(0.2)
+    _wait(lambda: _looked_at(http, screen, newest_s), started)
 
 
 def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
@@ -171,16 +169,14 @@ def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
 
 
 def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: float) -> None:
-    while True:
+    def is_ready() -> bool:
         if service.poll() is not None:
             raise StartError(f"demo: its service ended with {service.returncode}, see above")
-        try:
-            if http.get("/readyz").status_code == 200:
-                return
-        except httpx.TransportError:
-            pass  # not listening yet
-        _check_time(started)
-        time.sleep(0.2)
+        with contextlib.suppress(httpx.TransportError):  # not listening yet
+            return http.get("/readyz").status_code == 200
+        return False
+
+    _wait(is_ready, started)
 
 
 @contextlib.contextmanager
@@ -205,9 +201,11 @@ def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
             process.wait(20)
 
 
-def _check_time(started: float) -> None:
-    if time.monotonic() - started > _LONGEST_S:
-        raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
+def _wait(until: Callable[[], bool], started: float) -> None:
+    while not until():
+        if time.monotonic() - started > _LONGEST_S:
+            raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
+        time.sleep(0.2)
 
 
 @contextlib.contextmanager

@@ -9,11 +9,11 @@ import sys
 import threading
 import time
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from functools import partial
 
 import uvicorn
 
-from service.api.middleware.connections import ConnectionGuard, protocol_factory
+from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.api.middleware.hosts import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
@@ -24,9 +24,6 @@ from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
 from service.workers.processes.local_workers import local_workers
 from service.workers.processes.resources import settle_allocator
-
-if TYPE_CHECKING:
-    from fastapi import FastAPI
 
 log = logging.getLogger("surefoot.serve")
 
@@ -49,12 +46,15 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     with held_alone(settings.data_dir), contextlib.closing(listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
-        app = _app(settings)
+        with importing():  # half of what is imported, and who is refused is told without it
+            from service.app import create_app
+
+        app = create_app(settings)
         guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
             app,
             loop="asyncio",
-            http=protocol_factory(guard),  # type: ignore[arg-type]
+            http=partial(GuardedProtocol, guard=guard),  # type: ignore[arg-type]
             ws="none",
             backlog=_BACKLOG,
             log_level="warning",
@@ -80,14 +80,6 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     log.info("stopped")
     if workers.refused:
         raise SystemExit(exits.REFUSED)
-
-
-def _app(settings: Settings) -> "FastAPI":
-    # Half of what is imported, and who is refused is told without it.
-    with importing():
-        from service.app import create_app
-
-    return create_app(settings)
 
 
 def _require_way_in(settings: Settings) -> None:

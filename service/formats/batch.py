@@ -144,19 +144,16 @@ def collect(
         except TrackRejectedError as refused:
             name = raw.get("id") if isinstance(raw, dict) else None
             known = isinstance(name, str | int) and not isinstance(name, bool)
+            text = str(name)[:MAX_ID_LENGTH].encode(errors="replace").decode()
             rejections.append(
                 Rejection(
                     index=index,
-                    track_id=_sendable(str(name)[:MAX_ID_LENGTH]) if known else None,
+                    track_id=text if known else None,
                     code=refused.code,
                     detail=refused.detail,
                 )
             )
     return Batch(tracks=tuple(tracks), rejections=tuple(rejections), left_out=left_out)
-
-
-def _sendable(text: str) -> str:
-    return text.encode("utf-8", errors="replace").decode()
 
 
 def check_count(count: int) -> None:

@@ -8,8 +8,7 @@ import json
 import math
 import resource
 from collections import Counter
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any
 
@@ -54,11 +53,6 @@ class ConnectionGuard:
         self.of_address: Counter[str] = Counter()
         self.open = 0
         self.silent: dict[GuardedProtocol, None] = {}  # no request has come yet; oldest first
-
-
-def protocol_factory(guard: ConnectionGuard) -> Callable[..., asyncio.Protocol]:
-    """The factory of uvicorn's connections."""
-    return partial(GuardedProtocol, guard=guard)
 
 
 def allow_descriptors() -> int:

@@ -6,7 +6,7 @@ import reprlib
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from sqlalchemy.exc import SQLAlchemyError
@@ -21,7 +21,7 @@ from service.store.engines.failures import failure_of
 
 log = logging.getLogger("surefoot.http")
 
-_FORESEEN = (
+FORESEEN = (
     ServiceError,
     SQLAlchemyError,
     CalibrationError,
@@ -31,15 +31,6 @@ _FORESEEN = (
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = 80
-
-
-def add_problem_handlers(app: FastAPI) -> None:
-    """Answer what routes raise with problem documents.
-
-    The handlers are coroutines: plain ones would need a thread, of which there may be none.
-    """
-    for kind in _FORESEEN:
-        app.add_exception_handler(kind, _answer)
 
 
 class ProblemMiddleware:
@@ -67,7 +58,7 @@ class ProblemMiddleware:
         except Exception as error:
             if begun:
                 raise
-            answer = await _answer(Request(scope, receive), error)
+            answer = await answer_of(Request(scope, receive), error)
             await answer(scope, receive, send)
 
 
@@ -98,7 +89,11 @@ def problem(request: Request, error: ServiceError) -> Response:
     return Response(text, status, headers, media_type="application/problem+json")
 
 
-async def _answer(request: Request, error: Exception) -> Response:
+async def answer_of(request: Request, error: Exception) -> Response:
+    """The answer that tells of what was raised.
+
+    A coroutine: a plain handler would need a thread, of which there may be none.
+    """
     answer = problem(request, _told(request, error))
     if isinstance(error, HTTPException):
         answer.headers.update(error.headers or {})
