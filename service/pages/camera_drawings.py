@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from models.geometry.misplacement import Misplacement
+from models.geometry.ground import Misplacement
 from models.geometry.rotation import Array
 from models.tracks.trajectory import Trajectory
 from service.cameras.cameras import CameraView
