@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
-from models.monitoring.chart import CLOCK
 from models.monitoring.verdict import (
     Drift,
     DriftVerdict,
@@ -20,7 +19,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import drift_of
+from models.pose import CLOCK, drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees

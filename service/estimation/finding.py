@@ -6,21 +6,24 @@ from functools import partial
 
 import numpy as np
 
-from models.monitoring.chart import ChartResult, chart_from_bytes
-from models.monitoring.config import CREEP_SHARE
-from models.paths.reference import paths_from_bytes
 from models.pose import (
+    CREEP_SHARE,
     AlarmRate,
     CameraSite,
+    ChartResult,
     Creep,
     FusedEstimate,
+    JointEstimate,
     Observations,
     SecondLook,
     alarm_chart_result,
     assume_site,
+    chart_from_bytes,
     count_walks,
     estimate_pose,
     observe_walks,
+    paths_from_bytes,
+    reference_from_bytes,
 )
 from models.reasons import Reason
 from models.regression.averaging import (
@@ -30,8 +33,6 @@ from models.regression.averaging import (
     averaged_estimate,
 )
 from models.walking.config import FEWEST_WALKERS
-from models.walking.estimate import JointEstimate
-from models.walking.speed_reference import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import Evidence, KeptPose, SeenTrack
 from service.estimation.last_poses import basis_of, begin_of, kept_of

@@ -15,12 +15,16 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.creep import creep_log_from_bytes
-from models.paths.reference import paths_from_bytes
-from models.pose import learn_site, observe, without_creep
-from models.pose.config import FEWEST_BESIDE
+from models.pose import (
+    FEWEST_BESIDE,
+    creep_log_from_bytes,
+    learn_site,
+    observe,
+    paths_from_bytes,
+    reference_from_bytes,
+    without_creep,
+)
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import reference_from_bytes
 from service.alerts.suspected_moves import SuspectedMove, suspected_moves
 from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
 from service.estimation.people import Unpacked

@@ -9,11 +9,10 @@ from sqlalchemy.orm import Session
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.pose import learn_site, observe
+from models.pose import SpeedReference, learn_site, observe, reference_to_bytes
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import SpeedReference, reference_to_bytes
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
