@@ -22,10 +22,7 @@ from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
 
-# As the service has them unless its settings say otherwise.
-_LIMITS = DriftLimits(
-    sigmas=5.0, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
-)
+_LIMITS = DriftLimits()
 _YEAR_S = 365.25 * DAY_S
 _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 

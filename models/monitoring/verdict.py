@@ -44,14 +44,15 @@ class Drift:
 class DriftLimits:
     """Limits of a drift: so many standard deviations, and a floor.
 
-    And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise.
+    And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise. The
+    defaults are those of the service's settings.
     """
 
-    sigmas: float
-    floor_rad: float
-    floor_m: float
-    people: int
-    clear_ratio: float
+    sigmas: float = 5.0
+    floor_rad: float = math.radians(1.0)
+    floor_m: float = 0.3
+    people: int = 12
+    clear_ratio: float = 0.7
 
     def of(self, name: str, sd: float) -> float:
         """Limit of a parameter's drift, given its standard deviation."""
