@@ -7,17 +7,9 @@ from statistics import NormalDist
 
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
+from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import (
-    CLOCK,
-    AlarmRate,
-    ChartResult,
-    SecondLook,
-    alarm_chart_result,
-    drift_of,
-    estimate_pose,
-    observe,
-)
+from models.pose import AlarmRate, SecondLook, alarm_chart_result, drift_of, estimate_pose, observe
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order

@@ -16,6 +16,7 @@ from service.access import sessions, tokens
 from service.access.tokens import MadeToken, TokenSpec
 from service.api.middleware.authentication import COOKIE, is_proxy, refuse
 from service.api.middleware.dependencies import (
+    AppState,
     CallerDep,
     ReadDep,
     StateDep,
@@ -40,6 +41,7 @@ from service.store.access import name_in
 
 _MOST_BYTES = 16 * 1024
 _MOST_FIELDS = 100
+_MOST_DAYS = 36_500
 _TYPE = "application/x-www-form-urlencoded"
 
 
@@ -154,13 +156,10 @@ def _ours(wanted: str) -> str:
     return wanted if plain and wanted.startswith("/") and not wanted.startswith("//") else ""
 
 
-_MOST_DAYS = 36_500
-
-
 @router.get("/ui/tokens")
 def show_tokens(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Tokens, and a form for another one."""
-    return _tokens_page(request, auth_on(state.settings), session)
+    return _tokens_page(request, state, session)
 
 
 @router.post("/ui/tokens")
@@ -170,10 +169,8 @@ def create(request: Request, form: FormDep, state: StateDep, session: WriteDep) 
         made = tokens.make_token(session, _spec(form), name_in(session, None))
     except MalformedError as error:
         session.rollback()
-        return _tokens_page(
-            request, auth_on(state.settings), session, typed=form, wrong=error.errors
-        )
-    return _tokens_page(request, auth_on(state.settings), session, made=made)
+        return _tokens_page(request, state, session, typed=form, wrong=error.errors)
+    return _tokens_page(request, state, session, made=made)
 
 
 @router.post("/ui/tokens/{token_id}/revoke")
@@ -185,7 +182,7 @@ def revoke(token_id: str, session: WriteDep) -> RedirectResponse:
 
 def _tokens_page(
     request: Request,
-    access_on: bool,
+    state: AppState,
     session: Session,
     *,
     made: MadeToken | None = None,
@@ -200,7 +197,7 @@ def _tokens_page(
         made=made,
         typed=typed or Form(),
         wrong={error.pointer[1:]: error.reason for error in wrong},
-        access_on=access_on,
+        access_on=auth_on(state.settings),
     )
 
 
