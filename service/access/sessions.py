@@ -58,11 +58,6 @@ def log_out(session: Session, caller: Caller) -> None:
     _note(session, Activity.SESSION_ENDED, caller)
 
 
-def note_refused(session: Session, address: str) -> None:
-    """Keep that somebody was not let in; never with what."""
-    note(session, Activity.LOGIN_REFUSED, by=None, details={"address": address})
-
-
 def caller_of_session(session: Session, cookie: str) -> Caller | None:
     """The caller whose page asks; None where its session, or the token behind it, is over."""
     id_sha256 = hash_of(cookie)

@@ -73,15 +73,15 @@ class AlertOut(BaseModel):
     group_id: str | None
 
 
-def _act(what: str) -> str:
-    return what.partition(".")[2]
+# Of an activity, `alert.silenced` say, the act alone.
+Act = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
 
 
 class ActOut(Out):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: Annotated[AlertActivity, BeforeValidator(_act)] = Field(validation_alias="what")
+    act: Act = Field(validation_alias="what")
     by: str | None
     until: datetime | None
     outcome: Outcome | None

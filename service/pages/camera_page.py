@@ -1,6 +1,5 @@
 """`/ui/cameras/{id}`: the page of a camera, and all that it shows, read in one go."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -159,7 +158,13 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         newest_track_s=tracks.newest_end_s(session, camera_id),
         tracks=tuple(trajectory_of(record) for record in shown),
         misplaced=misplaced,
-        alerts=_stories(session, found),
+        alerts=tuple(
+            AlertStory(
+                record=record,
+                group=None if record.group_id is None else alerts.find(session, record.group_id),
+            )
+            for record in found
+        ),
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
@@ -168,16 +173,6 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         snapshot=snapshots.facts(session, camera_id) if settings.snapshots else None,
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,
-    )
-
-
-def _stories(session: Session, found: Sequence[AlertRecord]) -> tuple[AlertStory, ...]:
-    return tuple(
-        AlertStory(
-            record=record,
-            group=None if record.group_id is None else alerts.find(session, record.group_id),
-        )
-        for record in found
     )
 
 

@@ -1,7 +1,7 @@
 """`/`: the fleet page, every camera in a line, those that need a person first; and its parts."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Annotated, Any
@@ -196,12 +196,6 @@ def list_groups(session: Session) -> list[FleetGroup]:
     ]
 
 
-def counts_of(rows: Sequence[FleetRow]) -> list[tuple[PoseState, str, int]]:
-    """Each state with its word and how many cameras are in it."""
-    count = Counter(row.state for row in rows)
-    return [(state, word, count[state]) for state, word in STATES.items()]
-
-
 def _sure_drift(estimate: EstimateRecord | None) -> Drift | None:
     """The drift with what is sure enough to be said: beyond 2 sd, or found to drift."""
     if estimate is None or not estimate.identifiable:
@@ -221,12 +215,13 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     # What happens from here on is an event that the page asks for, even if it is in here too.
     newest = events.newest_id(session)
     cameras = list_fleet(session, state.settings)
+    count = Counter(camera.state for camera in cameras)
     return render(
         request,
         "fleet.html",
         newest_event=newest,
-        counts=counts_of(cameras),
-        urgent=sum(camera.state == PoseState.DRIFTING for camera in cameras),
+        counts=[(each, word, count[each]) for each, word in STATES.items()],
+        urgent=count[PoseState.DRIFTING],
         rows=cameras,
         groups=list_groups(session),
         **_words(state),
