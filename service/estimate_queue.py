@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
 from service.reasons import Reasons
-from service.store import cameras, tracks
+from service.store import tracks
 from service.store.cameras import CameraRecord
 
 LONGEST_COOLDOWN_S = 600.0
@@ -24,7 +24,7 @@ def request_estimate(
     Before others where somebody has `watched` it, or it may have moved. One that cools down, or is
     being looked at, is queued by the upkeep when its time has come.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None and camera.estimate_due_at is None:
         now = _now()
         camera.estimate_due_at = now
@@ -48,7 +48,7 @@ def overlooked(session: Session, queue: JobQueue) -> list[str]:
 def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
     """Queue a look at each of some cameras; those first that have been due for longest."""
     for camera_id in camera_ids:
-        camera = cameras.find(session, camera_id)
+        camera = session.get(CameraRecord, camera_id)
         if camera is not None and camera.estimate_due_at is not None:
             queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
 
@@ -73,7 +73,7 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
 
     The engine runs the job of a dead worker again at once, whatever it died of.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is None or camera.estimate_tries < 2 or not is_cooling(camera.estimate_after, _now()):
         return False
     camera.estimate_due_at = camera.estimate_due_at or _now()
@@ -84,7 +84,7 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
 
 def begin_look(session: Session, camera_id: str) -> int | None:
     """Take the mark "due" off a camera; returns the track that was stored last."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         now = _now()
         if camera.estimate_tries and camera.estimate_error is None:
@@ -109,7 +109,7 @@ def end_look(
     The camera cools down for `rest_s`, so that others have their turn. `failures` are of what
     stands beside the served estimate.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         camera.looked_at_pk = newest_pk
         camera.estimate_tries = 0
@@ -120,14 +120,14 @@ def end_look(
 
 def note_partial_failures(session: Session, camera_id: str, failures: Reasons) -> None:
     """Note what failed beside an estimate after that was stored."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         camera.lacks = (*camera.lacks, *failures)
 
 
 def fail_look(session: Session, camera_id: str, error: str) -> None:
     """Note that a look failed: the camera stays due, and cools down longer each time."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         now = _now()
         _note_failure(camera, error, now)

@@ -16,7 +16,7 @@ from sqlalchemy import Engine
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store import engine_jobs
+from service.store import workers
 from service.store.engines.store import savepoint
 
 APPLICATION = "surefoot"
@@ -47,7 +47,7 @@ class JobQueue:
     def requeue_training(self, session: Session, camera_id: str, training_id: str) -> bool:
         """Queue a training again whose job has failed or is gone; False where it is under way."""
         job_id = f"train-{training_id}"
-        if any(status in _UNDER_WAY for status in engine_jobs.statuses(session, job_id)):
+        if any(status in _UNDER_WAY for status in workers.statuses(session, job_id)):
             return False
         again_id = f"{job_id}-again-{secrets.token_hex(4)}"
         self._enqueue_training(session, camera_id, training_id, again_id)
@@ -72,18 +72,18 @@ class JobQueue:
 
     def due_without_job(self, session: Session) -> Sequence[tuple[str, datetime | None]]:
         """Cameras due without an estimate job, longest due first; until when they cool down."""
-        return engine_jobs.due_without(session, ESTIMATE_JOB)
+        return workers.due_without(session, ESTIMATE_JOB)
 
     def estimates_wait(self, session: Session, besides: str = "") -> bool:
         """True where an estimate job of another camera waits for a free worker."""
-        return engine_jobs.any_waits(session, ESTIMATE_JOB, besides)
+        return workers.any_waits(session, ESTIMATE_JOB, besides)
 
     def enqueue_deliver(self, session: Session, webhook_id: str) -> None:
         """Queue the sending of what a webhook is due, unless a job waits to start that does.
 
         At most one of a webhook runs at once.
         """
-        if not engine_jobs.waits(session, DELIVER_JOB, webhook_id):
+        if not workers.waits(session, DELIVER_JOB, webhook_id):
             self._enqueue(session, DELIVER_JOB, webhook_id, queue_partition_key=webhook_id)
 
     def close(self) -> None:

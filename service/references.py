@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from service.enums import Answer, Origin
 from service.settings import Settings
 from service.store import cameras, estimates, maintenance, references, tracks
+from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.maintenance import MaintenanceRecord
 from service.store.references import SiteReferenceRecord
@@ -78,7 +79,7 @@ def begin_reference(
 
     Those of a source; of the one that has counted so far, if none is said.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     assert camera is not None
     last = references.newest_if_any(session, camera_id)
     if source is None and last is not None:

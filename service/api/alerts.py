@@ -14,8 +14,8 @@ from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, Wri
 from service.cameras import decisions
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.notifications.outbox import alert_body
-from service.store.activity import ActivityRecord
 from service.store.alerts import AlertFilter, AlertRecord
+from service.store.journal import ActivityRecord
 
 
 class AcknowledgeBody(Body):

@@ -16,9 +16,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.api.middleware.authentication import still_let_in
 from service.api.middleware.dependencies import AppState, StateDep
 from service.api.middleware.event_feed import Feed, wait
-from service.store import events as stored
+from service.store import journal
 from service.store.engines.store import Store
-from service.store.events import EventRecord
+from service.store.journal import EventRecord
 
 router = APIRouter(tags=["events"])
 _HEARTBEAT_S = 10.0
@@ -98,9 +98,9 @@ async def _ask(state: AppState, what: Callable[..., Answer], *args: Any) -> Answ
 
 def _newest(store: Store) -> int:
     with store.read() as session:
-        return stored.newest_id(session)
+        return journal.newest_event_id(session)
 
 
 def _after(store: Store, seen: int) -> Sequence[EventRecord]:
     with store.read() as session:
-        return stored.after(session, seen, _BATCH)
+        return journal.events_after(session, seen, _BATCH)

@@ -26,8 +26,7 @@ from service.formats.degrees import in_degrees
 from service.formats.opencv_yaml import opencv_yaml
 from service.reasons import code_of, values_of
 from service.store.access import Actor
-from service.store.estimates import EstimateRecord
-from service.store.serialization import identifiable_drift, identifiable_sd
+from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
 
 _FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 

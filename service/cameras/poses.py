@@ -21,7 +21,6 @@ from service.settings import Settings
 from service.store import cameras, estimates, fleet, maintenance, windows
 from service.store.estimates import EstimateRecord
 from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
 from service.wording.reasons import in_words
 
 
@@ -86,7 +85,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         counts = fleet.learning_counts(session, (camera_id,), attended)
     so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
     reasons = _reasons_of(session, settings, status, so_far)
-    pose = pose_of_prior(prior)
+    pose = prior.pose
     estimate = status.estimate
     if estimate is not None:
         pose = replace(
@@ -105,7 +104,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
-    why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
+    why, lens = (reasons, in_words(reasons)), camera.intrinsics
     served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         camera_id=camera_id,

@@ -31,7 +31,8 @@ from service.references import (
     window_of,
 )
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, references, sources
+from service.store import alerts, estimates, references, sources
+from service.store.cameras import CameraRecord
 from service.store.engines.store import joined
 from service.store.references import SiteReferenceRecord
 from service.store.sources import SourceRecord
@@ -241,7 +242,7 @@ def _is_ready(
         return True  # nobody has judged the camera by now
     if not _is_well(session, settings, reference):
         return False
-    camera = cameras.find(session, reference.camera_id)
+    camera = session.get(CameraRecord, reference.camera_id)
     assert camera is not None
     wanted = min(camera.reference_tracks, settings.keep_tracks)
     return _usable(session, settings, reference, name) >= wanted

@@ -18,7 +18,7 @@ from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
-from service.store import fleet, metrics
+from service.store import fleet
 from service.store.alerts import POSE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.maintenance import MaintenanceRecord
@@ -81,7 +81,7 @@ def camera_statuses(
 ) -> dict[str, CameraStatus]:
     """The status of all cameras, or some, in order of their ids, by a handful of statements."""
     now = datetime.now(UTC)
-    newest = metrics.newest(session, ids)
+    newest = fleet.newest(session, ids)
     windows: dict[str, list[MaintenanceRecord]] = {}
     if any(each.attended for each in newest.values()):
         windows = fleet.maintenance_windows(session, ids)
@@ -94,7 +94,7 @@ def camera_statuses(
         for camera_id, alerts in firing.items()
         if _holds(alerts) and camera_id in newest and not _identifies(newest[camera_id].estimate)
     ]
-    before = metrics.newest_identifiable_estimates(session, without) if without else {}
+    before = fleet.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, each in newest.items():
         arrivals = None if each.rhythm is None else unpacked(each.rhythm)

@@ -14,7 +14,7 @@ from service.job_queue import JobQueue
 from service.store import references, tracks
 from service.store.cameras import Picture
 from service.store.engines.store import joined
-from service.store.serialization import pack
+from service.store.tracks import pack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

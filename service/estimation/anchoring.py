@@ -17,23 +17,15 @@ from models.monitoring.serialization import (
     creep_log_to_bytes,
 )
 from models.paths.serialization import paths_from_bytes, paths_to_bytes
-from models.pose import (
-    CameraSite,
-    Creep,
-    begin_creep_log,
-    creep_result,
-    log_creep,
-    observe,
-)
+from models.pose import CameraSite, Creep, begin_creep_log, creep_result, log_creep, observe
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.estimation.people import Unpacked
 from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, flow_maps, references, windows
-from service.store.flow_maps import AnchorRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store import cameras, references, windows
+from service.store.cameras import CameraRecord
+from service.store.references import AnchorRecord, SiteReferenceRecord
 from service.store.windows import WindowBounds
 
 _MOST_A_DAY = 100
@@ -94,7 +86,7 @@ def anchor_of(
     session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
 ) -> Anchor | None:
     """The anchor of a reference; None where there is none. `bounds` are those of its window."""
-    record = flow_maps.anchor(session, reference.id)
+    record = session.get(AnchorRecord, reference.id)
     return None if record is None else _anchor(record, bounds)
 
 
@@ -127,11 +119,11 @@ def load_anchor_days(
 ) -> AnchorDays | None:
     """The whole days that a camera's anchor has not seen; None where there is none."""
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.data is None:
         return None
-    record = flow_maps.anchor(session, reference.id)
+    record = session.get(AnchorRecord, reference.id)
     if record is None:
         return None
     bounds = window_of(session, reference, settings)
@@ -144,13 +136,13 @@ def load_anchor_days(
     if to_s <= after_s:
         return None
     found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY)
-    intrinsics = intrinsics_of(camera)
+    intrinsics = camera.intrinsics
     return AnchorDays(
         reference_id=reference.id,
         site=reference.data,
         anchor=_anchor(record, bounds),
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=cameras.prior_pose(session, camera_id).pose,
         trajectories=tuple(unpacked.seen(track, intrinsics) for track in found),
         anchored_to_s=record.to_s,
         learned_at=record.learned_at,
@@ -180,7 +172,7 @@ def compute_anchor_days(days: AnchorDays) -> bytes | None:
 
 def save_anchor_days(session: Session, days: AnchorDays, log: bytes | None) -> None:
     """Keep a log, unless its anchor or its days have become others meanwhile."""
-    record = flow_maps.anchor(session, days.reference_id)
+    record = session.get(AnchorRecord, days.reference_id)
     if record is None or record.learned_at != days.learned_at:
         return
     if record.logged_to_s == days.logged_to_s:

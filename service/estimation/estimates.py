@@ -10,12 +10,7 @@ from models.durations import DAY_S
 from models.geometry.plane_parameters import PLANE_PARAMETERS
 from models.geometry.pose_parameters import PoseParameters
 from models.monitoring.chart import CLOCK
-from models.monitoring.verdict import (
-    Drift,
-    DriftVerdict,
-    judge,
-    pose_after,
-)
+from models.monitoring.verdict import Drift, DriftVerdict, judge, pose_after
 from models.monitoring.verdict_reasons import (
     clock_fault,
     may_be_clock,
@@ -35,10 +30,10 @@ from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
-from service.store import cameras, estimates, events, references
-from service.store.estimates import EstimateRecord
+from service.store import estimates, journal, references
+from service.store.cameras import CameraRecord
+from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import SiteReferenceRecord
-from service.store.serialization import identifiable_drift
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
 
@@ -82,7 +77,7 @@ def save_estimate(
     what comes after a person has answered or was at the camera.
     """
     reference = _counting_reference(session, settings, evidence)
-    camera = cameras.find(session, evidence.camera_id)
+    camera = session.get(CameraRecord, evidence.camera_id)
     if reference is None or camera is None:
         return None
     drift = drift_of(finding.fused, evidence.prior)
@@ -110,7 +105,7 @@ def save_estimate(
         "tracks": record.tracks,
         "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
     }
-    events.add(session, EventType.POSE, payload, record.created_at)
+    journal.add_event(session, EventType.POSE, payload, record.created_at)
     return record
 
 

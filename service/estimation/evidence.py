@@ -20,23 +20,12 @@ from service.estimation.limits import drift_limits
 from service.estimation.people import Unpacked, until_so_many
 from service.references import made_against, window_of
 from service.settings import Settings
-from service.store import (
-    alerts,
-    cameras,
-    estimates,
-    flow_maps,
-    references,
-    tracks,
-    trainings,
-    windows,
-)
-from service.store import predictions as stored_predictions
+from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
-from service.store.predictions import PredictionRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
-from service.store.stored_tracks import StoredTrack
+from service.store.references import FlowMapRecord, LastPoseRecord, SiteReferenceRecord
+from service.store.tracks import StoredTrack
 from service.store.trainings import ModelRecord
+from service.store.windows import PredictionRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,12 +87,12 @@ def load_evidence(
     Tracks that were `unpacked` already are not unpacked again.
     """
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
         return None
-    intrinsics = intrinsics_of(camera)
-    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    intrinsics = camera.intrinsics
+    prior = cameras.prior_pose(session, camera_id).pose
     bounds = window_of(session, reference, settings)
     gathered = until_so_many(
         lambda limit: windows.window(session, replace(bounds, tracks=limit)),
@@ -116,8 +105,8 @@ def load_evidence(
     records, model = gathered.records, trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
-    kept = flow_maps.find(session, reference.id)
-    last = flow_maps.last_pose(session, reference.id)
+    kept = session.get(FlowMapRecord, reference.id)
+    last = session.get(LastPoseRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
     seen = [_seen(record, answered_at, intrinsics, unpacked) for record in records]
     return Evidence(
@@ -160,7 +149,7 @@ def _predictions(
     if model is None:
         return ()
     pks = [record.id for record in records]
-    return tuple(stored_predictions.predictions(session, model.id, pks))
+    return tuple(windows.predictions(session, model.id, pks))
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

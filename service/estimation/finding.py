@@ -39,7 +39,7 @@ from service.estimation.last_poses import basis_of, begin_of, kept_of
 from service.estimation.partial_failures import PartialFailures
 from service.estimation.people import MOST_PIECES
 from service.reasons import Reasons
-from service.store.predictions import PredictionRecord
+from service.store.windows import PredictionRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,11 +33,10 @@ from service.references import (
     window_of,
 )
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references, tracks, windows
-from service.store.flow_maps import FlowMapRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
-from service.store.stored_tracks import StoredTrack
+from service.store import alerts, cameras, estimates, references, tracks, windows
+from service.store.cameras import CameraRecord
+from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
+from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
 
 _FEWEST_NEW = 50
@@ -71,13 +70,13 @@ def load_growth(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> GrowthPeriod | None:
     """The tracks to learn a camera's map anew of; None where it is to stay as it is."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is None:
         return None
     assert reference.to_s is not None
     assert reference.data is not None
-    kept = flow_maps.find(session, reference.id)
+    kept = session.get(FlowMapRecord, reference.id)
     moves = suspected_moves(session, settings, reference)
     attended = attendance_of(session, camera_id, datetime.now(UTC))
     judged = window_beside(attended, reference, settings)
@@ -89,13 +88,13 @@ def load_growth(
     weights = _faded(to_s - np.array([record.ended_s for record in found]), settings)
     if kept is not None and not spoilt and weights.sum() < _still_counts(kept, to_s, settings):
         return None  # retention has deleted more than has come: the map knows more than they
-    intrinsics, unpacked = intrinsics_of(camera), unpacked or Unpacked()
+    intrinsics, unpacked = camera.intrinsics, unpacked or Unpacked()
     return GrowthPeriod(
         reference_id=reference.id,
         site=reference.data,
         anchor=anchor_of(session, reference, judged),
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=cameras.prior_pose(session, camera_id).pose,
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
         weights=weights,
         kept=None if kept is None or spoilt else kept.data,
@@ -177,7 +176,7 @@ def save_growth(
     reference = references.newest_if_any(session, camera_id)
     if reference is None or reference.id != period.reference_id:
         return False
-    kept = flow_maps.find(session, reference.id)
+    kept = session.get(FlowMapRecord, reference.id)
     if (None if kept is None else kept.learned_at) != period.replaces:
         return False
     if learned is None and kept is not None and kept.data is not None and not period.spoilt:
@@ -192,7 +191,7 @@ def save_growth(
         learned_at=period.taken_at,
     )
     session.merge(grown)
-    anchor = flow_maps.anchor(session, reference.id)
+    anchor = session.get(AnchorRecord, reference.id)
     # The first map is kept; or, where tracks of a move are in it, this one in its place.
     if anchor is None or (period.spoilt and anchor.to_s > (reference.to_s or 0.0)):
         keep_anchor(session, reference.id, learned, to_s=period.to_s, learned_at=period.taken_at)

@@ -10,8 +10,7 @@ from sqlalchemy.orm import Session
 from models.errors import CheckpointError
 from models.pose import WarmStart, warm_start_from_bytes, warm_start_to_bytes
 from service.estimation.evidence import Evidence, KeptPose
-from service.store import flow_maps
-from service.store.flow_maps import LastPoseRecord
+from service.store.references import LastPoseRecord
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
@@ -50,5 +49,5 @@ def save_last_pose(session: Session, reference_id: int, kept: KeptPose | None) -
     """Keep it in the place of the one before; what is None takes that away."""
     if kept is not None:
         session.merge(LastPoseRecord(reference_id=reference_id, basis=kept.basis, data=kept.data))
-    elif (record := flow_maps.last_pose(session, reference_id)) is not None:
+    elif (record := session.get(LastPoseRecord, reference_id)) is not None:
         session.delete(record)

@@ -25,8 +25,8 @@ from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
 from service.store import cameras, maintenance, references, windows
-from service.store.flow_maps import FlowMapRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.cameras import CameraRecord
+from service.store.references import FlowMapRecord
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -61,7 +61,7 @@ def load_reference_period(
 ) -> ReferencePeriod | None:
     """The tracks to learn a camera's reference of; None as long as there are not enough."""
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is not None:
         return None
@@ -70,8 +70,8 @@ def load_reference_period(
         return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
     attended = attendance_of(session, camera_id, now)
-    intrinsics = intrinsics_of(camera)
-    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    intrinsics = camera.intrinsics
+    prior = cameras.prior_pose(session, camera_id).pose
     gathered = until_so_many(
         lambda limit: windows.first(
             session, camera_id, reference.from_s, limit, without=attended.spans

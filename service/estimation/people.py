@@ -11,8 +11,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import link_pieces
 from models.tracks.trajectory import Trajectory
-from service.store.serialization import seen_of, trajectory_of
-from service.store.stored_tracks import StoredTrack
+from service.store.tracks import StoredTrack, seen_of, trajectory_of
 
 # The store may give a deleted track's number to a new one.
 _Track = tuple[int, datetime]

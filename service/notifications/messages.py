@@ -13,7 +13,8 @@ from service.notifications.keys import old_secret_of, secret_of
 from service.notifications.outbox import alert_body, json_time
 from service.notifications.signing import signed_headers
 from service.settings import Settings
-from service.store import alerts, webhooks
+from service.store import webhooks
+from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 
 
@@ -68,7 +69,7 @@ def _stands(
     """
     if delivery.alert_id is None:
         return [postable_test(delivery.payload, json_time(now))]
-    record = alerts.find(session, delivery.alert_id)
+    record = session.get(AlertRecord, delivery.alert_id)
     body = delivery.payload["data"] if record is None else alert_body(record)
     if record is None or record.is_silenced(now):
         body = ended(body, json_time(now))

@@ -20,7 +20,7 @@ from service.notifications.signing import new_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import Backlog, DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 OLD_SECRET_STAYS = timedelta(hours=24)
@@ -100,11 +100,8 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
 
 def list_webhooks(session: Session) -> Sequence[WebhookView]:
     """All webhooks, oldest first."""
-    pending = webhooks.pending(session)
-    return [
-        WebhookView(record=record, pending=pending.get(record.id, 0))
-        for record in webhooks.every(session)
-    ]
+    backlogs = webhooks.backlogs(session)
+    return [_view(record, backlogs) for record in webhooks.every(session)]
 
 
 def show_webhook(session: Session, webhook_id: str) -> WebhookView:
@@ -113,8 +110,7 @@ def show_webhook(session: Session, webhook_id: str) -> WebhookView:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = _require(session, webhook_id)
-    return WebhookView(record=record, pending=webhooks.pending(session).get(webhook_id, 0))
+    return _view(_require(session, webhook_id), webhooks.backlogs(session))
 
 
 def change_webhook(
@@ -244,8 +240,13 @@ def _note(
     note(session, what, by=None, subject_id=record.id, details=details)
 
 
+def _view(record: WebhookRecord, backlogs: dict[str, Backlog]) -> WebhookView:
+    backlog = backlogs.get(record.id)
+    return WebhookView(record=record, pending=0 if backlog is None else backlog.count)
+
+
 def _require(session: Session, webhook_id: str) -> WebhookRecord:
-    record = webhooks.find(session, webhook_id)
+    record = session.get(WebhookRecord, webhook_id)
     if record is None:
         raise NotFoundError(f"webhook_id: there is no webhook {webhook_id!r}")
     return record

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import TrainingState
 from service.settings import Settings
-from service.store import cameras, events, metrics, tracks, webhooks
+from service.store import cameras, fleet, journal, tracks, trainings, webhooks, workers
 from service.store.alerts import AlertRecord
 
 
@@ -54,24 +54,24 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
         camera_id: max((now - at).total_seconds(), 0.0)
         for camera_id, (_, at) in tracks.unseen_since(session).items()
     }
-    workers = metrics.workers(session)
+    known = workers.every(session)
     return Metrics(
         at=now,
         cameras=camera_statuses(session, settings).values(),
-        alerts=metrics.firing(session),
+        alerts=[*fleet.firing(session, None), *fleet.firing_groups(session)],
         webhooks=_webhooks(session, now),
-        trainings=metrics.trainings_by_state(session),
-        heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in workers},
-        worker_starts={worker.name: worker.starts for worker in workers},
+        trainings=trainings.count_by_state(session),
+        heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in known},
+        worker_starts={worker.name: worker.starts for worker in known},
         unseen_s=unseen_s,
         failing=tuple(camera.id for camera in cameras.failing(session)),
         queue_lag_s=max(unseen_s.values(), default=0.0),
-        events=events.newest_id(session),
+        events=journal.newest_event_id(session),
     )
 
 
 def _webhooks(session: Session, now: datetime) -> tuple[WebhookMetrics, ...]:
-    backlogs = metrics.backlogs(session)
+    backlogs = webhooks.backlogs(session)
     found = []
     for record in webhooks.every(session):
         backlog = backlogs.get(record.id)

@@ -16,13 +16,12 @@ from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.settings import Settings
-from service.store import activity, alerts, cameras, events, maintenance, tracks, trainings
-from service.store.activity import ActivityRecord
+from service.store import cameras, journal, maintenance, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
-from service.store.cameras import PriorPoseRecord
+from service.store.cameras import PriorPoseRecord, SnapshotFacts
+from service.store.journal import ActivityRecord
 from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import trajectory_of
-from service.store.snapshots import SnapshotFacts
+from service.store.tracks import trajectory_of
 from service.store.trainings import TrainingRecord
 from service.wording.camera import CameraFacts
 
@@ -112,7 +111,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     """
     now = datetime.now(UTC)
     # Taken first: what happens while the rest is read is told again, and not missed.
-    newest_event_id = events.newest_id(session)
+    newest_event_id = journal.newest_event_id(session)
     camera = view_camera(session, camera_id)
     pose = view_pose(session, settings, camera_id)
     estimate = pose.estimate
@@ -144,7 +143,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
-        activity=tuple(activity.newest(session, camera_id, _ACTIVITY)),
+        activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,
@@ -156,7 +155,7 @@ def _stories(session: Session, found: Sequence[AlertRecord]) -> tuple[AlertStory
     return tuple(
         AlertStory(
             record=record,
-            group=None if record.group_id is None else alerts.find(session, record.group_id),
+            group=None if record.group_id is None else session.get(AlertRecord, record.group_id),
         )
         for record in found
     )

@@ -5,20 +5,16 @@ All tables are known as soon as one is, for a key may name any of them.
 
 from service.store import (  # noqa: F401
     access,
-    activity,
     alerts,
     cameras,
     estimates,
-    events,
-    flow_maps,
+    journal,
     maintenance,
-    predictions,
     references,
-    rhythms,
-    snapshots,
     sources,
-    stored_tracks,
+    tracks,
     trainings,
     webhooks,
+    windows,
     workers,
 )

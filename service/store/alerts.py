@@ -20,13 +20,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
-from service.enums import (
-    AlertKind,
-    AlertSource,
-    AlertState,
-    Outcome,
-    Severity,
-)
+from service.enums import AlertKind, AlertSource, AlertState, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
@@ -125,11 +119,6 @@ class AlertFilter:
     group_id: str | None = None
     acknowledged: bool | None = None
     silenced: bool | None = None
-
-
-def find(session: Session, alert_id: str) -> AlertRecord | None:
-    """The alert, or None."""
-    return session.get(AlertRecord, alert_id)
 
 
 def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:

@@ -1,4 +1,4 @@
-"""Cameras and their prior poses."""
+"""Cameras, their prior poses, arrival models and still images."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -6,12 +6,16 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import (
+    JSON,
     ColumnElement,
     Connection,
+    ForeignKey,
     Index,
     Integer,
+    LargeBinary,
     String,
     bindparam,
+    delete,
     false,
     func,
     select,
@@ -19,9 +23,9 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
-from service.enums import (
-    Origin,
-)
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from service.enums import Origin
 from service.reasons import Reasons
 from service.store.engines.prepared import Prepared
 from service.store.estimates import EstimateRecord
@@ -75,6 +79,20 @@ class CameraRecord(Record):
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The lens."""
+        k1, k2, p1, p2, k3 = self.distortion
+        return Intrinsics(
+            width=self.width,
+            height=self.height,
+            fx=self.fx,
+            fy=self.fy,
+            cx=self.cx,
+            cy=self.cy,
+            distortion=(k1, k2, p1, p2, k3),
+        )
+
 
 class PriorPoseRecord(Record):
     """A pose that was trusted from a time on; the newest of a camera is its prior pose."""
@@ -97,6 +115,18 @@ class PriorPoseRecord(Record):
         one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
         Index(None, "camera_id", "id"),
     )
+
+    @property
+    def pose(self) -> CameraPose:
+        """As a value."""
+        return CameraPose(
+            height_m=self.height_m,
+            tilt_rad=self.tilt_rad,
+            roll_rad=self.roll_rad,
+            heading_rad=self.heading_rad,
+            x_m=self.x_m,
+            y_m=self.y_m,
+        )
 
 
 def newest_of(
@@ -164,11 +194,6 @@ class Awaited:
     look: bool
     source: bool
     picture: Picture
-
-
-def find(session: Session, camera_id: str) -> CameraRecord | None:
-    """The camera, or None."""
-    return session.get(CameraRecord, camera_id)
 
 
 def picture(connection: Connection, camera_id: str) -> Picture | None:
@@ -243,3 +268,68 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
         .where(CameraRecord.estimate_failing_since.is_not(None) | CameraRecord.id.in_(besides))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()
+
+
+class RhythmRecord(Record):
+    """The arrival model of a camera: how many people come when, and how late.
+
+    `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
+    """
+
+    __tablename__ = "camera_rhythms"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    profile: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    counts: Mapped[dict[str, Any]]
+    learned_at: Mapped[datetime]
+
+
+def arrival_profile(session: Session, camera_id: str) -> dict[str, Any] | None:
+    """The profile of a camera alone; None where there is none yet."""
+    return session.scalar(select(RhythmRecord.profile).where(RhythmRecord.camera_id == camera_id))
+
+
+class SnapshotRecord(Record):
+    """A still image of a camera, a JPEG, in a row of its own: no other query reads it."""
+
+    __tablename__ = "snapshots"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    jpeg: Mapped[bytes] = mapped_column(LargeBinary)
+    sha256: Mapped[str] = mapped_column(String(64))
+    width: Mapped[int]
+    height: Mapped[int]
+    stored_at: Mapped[datetime]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SnapshotFacts:
+    """Facts of a still image, without reading it."""
+
+    sha256: str
+    width: int
+    height: int
+    stored_at: datetime
+
+
+def snapshot_facts(session: Session, camera_id: str) -> SnapshotFacts | None:
+    """The facts of the still image of a camera, or None."""
+    row = session.execute(
+        select(
+            SnapshotRecord.sha256,
+            SnapshotRecord.width,
+            SnapshotRecord.height,
+            SnapshotRecord.stored_at,
+        ).where(SnapshotRecord.camera_id == camera_id)
+    ).first()
+    return None if row is None else SnapshotFacts(**row._mapping)
+
+
+def remove_snapshot(session: Session, camera_id: str) -> bool:
+    """Delete the still image of a camera; False if there was none."""
+    found = delete(SnapshotRecord).where(SnapshotRecord.camera_id == camera_id)
+    return bool(session.execute(found).rowcount)  # type: ignore[attr-defined]

@@ -9,9 +9,7 @@ from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose_parameters import PoseParameters
 from models.monitoring.verdict import Drift
-from service.enums import (
-    PoseState,
-)
+from service.enums import PoseState
 from service.reasons import Reasons
 from service.store.record import (
     Record,
@@ -155,3 +153,25 @@ def _made_between(
     if end is not None:
         conditions.append(EstimateRecord.created_at <= end)
     return conditions
+
+
+def identifiable_drift(drift: Drift) -> dict[str, float | None]:
+    """The identifiable drift as an alert keeps it; None where the tracks leave it open."""
+    angle_rad = drift.angle_rad if drift.turned else None
+    return {**_where_identifiable(drift.by, drift.identifiable), "angle_rad": angle_rad}
+
+
+def identifiable_sd(drift: Drift) -> dict[str, float | None]:
+    """The standard deviations of what is identifiable, likewise."""
+    return _where_identifiable(drift.sd, drift.identifiable)
+
+
+def _where_identifiable(
+    parameters: PoseParameters, identifiable: tuple[str, ...]
+) -> dict[str, float | None]:
+    return {
+        "height_m": parameters.height_m if "height" in identifiable else None,
+        "tilt_rad": parameters.tilt_rad if "tilt" in identifiable else None,
+        "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
+        "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
+    }

@@ -1,4 +1,4 @@
-"""References: what is usual at a site while its camera is at its prior pose."""
+"""References: what is usual at a site while its camera is at its prior pose; maps, anchors."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -17,10 +17,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, defer, mapped_column
 
-from service.enums import (
-    Answer,
-    Origin,
-)
+from service.enums import Answer, Origin
 from service.reasons import Reasons
 from service.store.estimates import EstimateRecord
 from service.store.record import (
@@ -137,3 +134,53 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
         .limit(limit)
     )
     return delete_some(session, SiteReferenceRecord.id, bite)
+
+
+class FlowMapRecord(Record):
+    """The density of paths at a reference's site (`models.paths`), learned of `tracks` tracks.
+
+    `data` is None where too few of them walk. `chart` is the drift chart (`models.monitoring`)
+    that goes with it. `to_s` is when the last of them ended, `weight` what they count for together,
+    of whom older ones count less.
+    """
+
+    __tablename__ = "flow_maps"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    chart: Mapped[bytes | None] = mapped_column(LargeBinary)
+    tracks: Mapped[int]
+    weight: Mapped[float]
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+
+
+class AnchorRecord(Record):
+    """The first flow map and drift chart of a reference: they never grow (`models.pose`).
+
+    `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
+    days since (`models.monitoring.creep_log`), up to `logged_to_s`; None as long as there is none.
+    """
+
+    __tablename__ = "anchors"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    flow: Mapped[bytes] = mapped_column(LargeBinary)
+    chart: Mapped[bytes] = mapped_column(LargeBinary)
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+    creep: Mapped[bytes | None] = mapped_column(LargeBinary)
+    logged_to_s: Mapped[float | None]
+
+
+class LastPoseRecord(Record):
+    """The beginning of the next estimate against a reference (`models.pose.warm_start`).
+
+    `basis` tells what it hangs on beside the tracks: of another one it says nothing.
+    """
+
+    __tablename__ = "last_poses"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    basis: Mapped[bytes] = mapped_column(LargeBinary)
+    data: Mapped[bytes] = mapped_column(LargeBinary)

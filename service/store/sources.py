@@ -3,21 +3,12 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import (
-    Connection,
-    ForeignKey,
-    String,
-    bindparam,
-    delete,
-    func,
-    select,
-    update,
-)
+from sqlalchemy import Connection, ForeignKey, String, bindparam, delete, func, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.engines.prepared import Prepared
 from service.store.record import Record, count_where
-from service.store.stored_tracks import Spans, TrackRecord, outside
+from service.store.tracks import Spans, TrackRecord, outside
 
 
 class SourceRecord(Record):

@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import Index, LargeBinary, String, bindparam, select
+from sqlalchemy import Index, LargeBinary, String, bindparam, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.enums import (
-    TrainingState,
-)
+from service.enums import TrainingState
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first, surplus
 
 
@@ -94,9 +92,10 @@ _UNFINISHED_OF_CAMERA = (
 )
 
 
-def find(session: Session, training_id: str) -> TrainingRecord | None:
-    """The training, or None."""
-    return session.get(TrainingRecord, training_id)
+def count_by_state(session: Session) -> dict[TrainingState, int]:
+    """The number of stored trainings in each state."""
+    query = select(TrainingRecord.state, func.count()).group_by(TrainingRecord.state)
+    return {state: count for state, count in session.execute(query)}
 
 
 def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[TrainingRecord]:

@@ -1,6 +1,7 @@
 """Webhooks, their deliveries and attempts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -106,12 +107,15 @@ class DeliveryAttemptRecord(Record):
     error: Mapped[str | None]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Backlog:
+    """Deliveries that wait for a webhook, and since when."""
+
+    count: int
+    oldest_at: datetime
+
+
 _Earlier = aliased(DeliveryRecord)
-
-
-def find(session: Session, webhook_id: str) -> WebhookRecord | None:
-    """The webhook, or None."""
-    return session.get(WebhookRecord, webhook_id)
 
 
 def every(session: Session) -> Sequence[WebhookRecord]:
@@ -125,14 +129,14 @@ def enabled(session: Session) -> Sequence[WebhookRecord]:
     return session.scalars(query.order_by(WebhookRecord.created_at)).all()
 
 
-def pending(session: Session) -> dict[str, int]:
-    """The number of waiting deliveries of each webhook."""
+def backlogs(session: Session) -> dict[str, Backlog]:
+    """The backlog of each webhook that something waits for."""
     rows = session.execute(
-        select(DeliveryRecord.webhook_id, func.count())
+        select(DeliveryRecord.webhook_id, func.count(), func.min(DeliveryRecord.created_at))
         .where(DeliveryRecord.state == DeliveryState.PENDING)
         .group_by(DeliveryRecord.webhook_id)
     )
-    return {webhook_id: count for webhook_id, count in rows}
+    return {name: Backlog(count=count, oldest_at=oldest) for name, count, oldest in rows}
 
 
 def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:

@@ -1,15 +1,16 @@
-"""Statements on the tracks of a window, and of the times when a camera stood still."""
+"""Windows of tracks, times when a camera stood still, and models' predictions on tracks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, ForeignKey, Select, and_, func, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
-from service.store.engines.dialects import whole
-from service.store.record import count_where
-from service.store.stored_tracks import (
+from service.store.engines.dialects import new_rows, whole
+from service.store.record import Record, count_where, foreign_key
+from service.store.tracks import (
     Spans,
     StoredTrack,
     TrackRecord,
@@ -183,3 +184,62 @@ def _inside(bounds: WindowBounds) -> list[ColumnElement[bool]]:
     if bounds.ended_from_s is not None:
         inside.append(TrackRecord.ended_s >= bounds.ended_from_s)
     return inside
+
+
+class PredictionRecord(Record):
+    """A model's prediction on a track; without numbers where the track gives no window."""
+
+    __tablename__ = "predictions"
+
+    model_id: Mapped[str] = foreign_key("models.id", primary_key=True)
+    track_pk: Mapped[int] = mapped_column(
+        ForeignKey("tracks.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    windows: Mapped[int]
+    height_m: Mapped[float | None]
+    qw: Mapped[float | None]
+    qx: Mapped[float | None]
+    qy: Mapped[float | None]
+    qz: Mapped[float | None]
+
+
+def without_prediction(
+    session: Session, bounds: WindowBounds, model_id: str, limit: int
+) -> Sequence[StoredTrack]:
+    """Tracks of the window that the model has not looked at, newest first."""
+    return read(
+        session,
+        select_tracks()
+        .outerjoin(
+            PredictionRecord,
+            (PredictionRecord.track_pk == TrackRecord.id) & (PredictionRecord.model_id == model_id),
+        )
+        .where(
+            TrackRecord.id.in_(window_ids(session, bounds)),
+            PredictionRecord.track_pk.is_(None),
+        )
+        .order_by(TrackRecord.ended_s.desc())
+        .limit(limit),
+    )
+
+
+def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
+    """Insert predictions; a second run of the same job changes nothing."""
+    if rows:
+        session.execute(new_rows(PredictionRecord.__table__), rows)
+
+
+def predictions(
+    session: Session, model_id: str, track_pks: Sequence[int]
+) -> Sequence[PredictionRecord]:
+    """The model's predictions on some tracks, newest first, of those with a window."""
+    return session.scalars(
+        select(PredictionRecord)
+        .join(TrackRecord, PredictionRecord.track_pk == TrackRecord.id)
+        .where(
+            PredictionRecord.model_id == model_id,
+            PredictionRecord.windows > 0,
+            PredictionRecord.track_pk.in_(track_pks),
+        )
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+    ).all()

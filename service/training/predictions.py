@@ -12,9 +12,9 @@ from sqlalchemy.orm import Session
 from models.regression.weights_files import weights_path
 from service.references import window_of
 from service.settings import Settings
-from service.store import predictions, references, tracks, trainings
+from service.store import references, tracks, trainings, windows
 from service.store.engines.store import Store
-from service.store.stored_tracks import StoredTrack
+from service.store.tracks import StoredTrack
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -66,7 +66,7 @@ def load_pending(
         model_id=model.id,
         weights_sha256=model.weights_sha256,
         config=model.config,
-        tracks=predictions.without_prediction(session, bounds, model.id, limit),
+        tracks=windows.without_prediction(session, bounds, model.id, limit),
     )
 
 
@@ -74,7 +74,7 @@ def save_predictions(session: Session, model_id: str, rows: Sequence[dict[str, A
     """Store predictions, of those tracks and that model that still exist."""
     existing = tracks.existing(session, [row["track_pk"] for row in rows])
     if trainings.model_exists(session, model_id):
-        predictions.add_predictions(session, [row for row in rows if row["track_pk"] in existing])
+        windows.add_predictions(session, [row for row in rows if row["track_pk"] in existing])
 
 
 def drop_model(session: Session, model_id: str) -> None:

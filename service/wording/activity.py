@@ -1,7 +1,7 @@
 """Entries of the log of a camera, as sentences."""
 
 from service.enums import Activity, Outcome
-from service.store.activity import ActivityRecord
+from service.store.journal import ActivityRecord
 from service.wording.alerts import KINDS, OUTCOMES
 from service.wording.times import Clock
 

@@ -12,11 +12,7 @@ from service.estimate_queue import (
     leave_poisoned,
     note_partial_failures,
 )
-from service.estimation.anchoring import (
-    compute_anchor_days,
-    load_anchor_days,
-    save_anchor_days,
-)
+from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding

@@ -13,7 +13,7 @@ from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.tracks.trajectory import cut_windows
 from service.estimation.people import Unpacked
-from service.store.stored_tracks import StoredTrack
+from service.store.tracks import StoredTrack
 from service.training import PendingTracks
 
 _NETWORKS = 64  # kept in memory, of the cameras that were looked at last

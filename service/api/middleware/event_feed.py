@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.store.events import EventRecord
+from service.store.journal import EventRecord
 
 log = logging.getLogger("surefoot.http")
 

@@ -11,7 +11,7 @@ from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.enums import PoseState
 from service.pages.fleet import counts_of, list_fleet, list_groups
-from service.store import events
+from service.store import journal
 from service.wording.camera import STATES, fleet_alert_flags
 from service.wording.reasons import group_in_words
 from service.wording.times import Clock
@@ -23,7 +23,7 @@ router = APIRouter(include_in_schema=False)
 def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Every camera, what needs a person first."""
     # What happens from here on is an event that the page asks for, even if it is in here too.
-    newest = events.newest_id(session)
+    newest = journal.newest_event_id(session)
     cameras = list_fleet(session, state.settings)
     return render(
         request,

@@ -17,7 +17,7 @@ from service.job_queue import JobQueue
 from service.notifications import deliveries
 from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, predictions, references, tracks, trainings
+from service.store import cameras, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
 from service.training import StepWatch, requeue_lost, train_if_needed
 from service.workers.context import JobContext
@@ -69,7 +69,7 @@ def reconcile_camera(
 
     Without `steps` nothing is remembered of what its tracks were.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is None:
         return []
     now = datetime.now(UTC)
@@ -112,4 +112,4 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
     if model is None:
         return False
     bounds = window_of(session, references.newest(session, camera.id), settings)
-    return bool(predictions.without_prediction(session, bounds, model.id, 1))
+    return bool(windows.without_prediction(session, bounds, model.id, 1))

@@ -12,11 +12,10 @@ from sqlalchemy.orm import Session
 from models.durations import HOUR_S
 from service.settings import Settings
 from service.store import (
-    activity,
     alerts,
     cameras,
     estimates,
-    events,
+    journal,
     maintenance,
     references,
     tracks,
@@ -89,10 +88,10 @@ def limits_of_all(settings: Settings) -> Iterator[Limit]:
     ended = now - timedelta(days=settings.keep_deliveries_days)
     resolved = now - timedelta(days=settings.keep_alerts_days)
     done = now - timedelta(days=settings.keep_activity_days)
-    yield Limit("events", lambda s: events.forget(s, settings.keep_events, BITE))
+    yield Limit("events", lambda s: journal.forget_events(s, settings.keep_events, BITE))
     yield Limit("weights", lambda s: trainings.forget_weights(s, BITE))
     yield Limit("alerts", lambda s: alerts.forget(s, resolved, BITE))
-    yield Limit("activity", lambda s: activity.forget(s, done, BITE))
+    yield Limit("activity", lambda s: journal.forget_activity(s, done, BITE))
     yield Limit("deliveries_given_up", lambda s: webhooks.give_up(s, patience, now, BITE))
     yield Limit("deliveries", lambda s: webhooks.forget(s, ended, BITE))
     yield Limit("old_secrets", lambda s: webhooks.forget_old_secrets(s, now, BITE))

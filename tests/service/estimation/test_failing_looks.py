@@ -16,11 +16,10 @@ from service.estimate_queue import (
     request_estimate,
 )
 from service.reasons import ServiceCode
-from service.store import flow_maps, references, trainings
+from service.store import references, trainings
 from service.store.cameras import CameraRecord
-from service.store.flow_maps import FlowMapRecord
-from service.store.references import SiteReferenceRecord
-from service.store.stored_tracks import TrackRecord
+from service.store.references import FlowMapRecord, SiteReferenceRecord
+from service.store.tracks import TrackRecord
 from service.training import begin_training, publish_model
 from service.workers.estimate import run_estimate
 from service.workers.upkeep import reconciliation
@@ -125,7 +124,7 @@ def test_a_map_or_chart_that_cannot_be_read_blinds_nobody(street, part):
 def test_a_map_that_cannot_grow_is_left_as_it_was(street):
     with street.context.store.read() as session:
         reference = references.newest(session, "corner")
-        before = flow_maps.find(session, reference.id).learned_at
+        before = session.get(FlowMapRecord, reference.id).learned_at
     # Read by the growth alone: the pose does without.
     change(street, window_tracks=40, flow_unsure_tracks=5, flow_half_life_days="not a number")
     street.keep_to_lanes(PRIOR, 100)
@@ -139,7 +138,7 @@ def test_a_map_that_cannot_grow_is_left_as_it_was(street):
     street.look()
     assert camera(street).lacks == (lack,)
     with street.context.store.read() as session:
-        assert flow_maps.find(session, reference.id).learned_at == before
+        assert session.get(FlowMapRecord, reference.id).learned_at == before
 
 
 def test_a_camera_whose_looks_fail_rests_longer_each_time_and_is_told(street):
