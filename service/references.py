@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
+from models.monitoring.verdict import DriftLimits
 from service.enums import Answer, Origin
 from service.settings import Settings
 from service.store import cameras, estimates, maintenance, references, tracks
@@ -179,3 +180,14 @@ def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: i
     if reference.ready_at is not None:
         return reference.tracks
     return min(counted, wanted_tracks(reference, settings))
+
+
+def drift_limits(settings: Settings) -> DriftLimits:
+    """The limits from which on a drift counts, by the settings."""
+    return DriftLimits(
+        sigmas=settings.drift_sigmas,
+        floor_rad=math.radians(settings.drift_floor_deg),
+        floor_m=settings.drift_floor_m,
+        people=settings.drift_people,
+        clear_ratio=settings.drift_clear_ratio,
+    )

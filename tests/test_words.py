@@ -56,8 +56,8 @@ OTHERS = {
     ("commands/serve.py", "warning"): "uvicorn's log level",
     ("store/engines/files.py", "ok"): "what SQLite's quick_check answers",
     ("store/record.py", "source"): "the name of a column",
-    ("store/stored_tracks.py", "source"): "the name of a column",
-    ("store/stored_tracks.py", "tracks"): "the name of a table",
+    ("store/tracks.py", "source"): "the name of a column",
+    ("store/tracks.py", "tracks"): "the name of a table",
     ("wording/typed_pose.py", "critical"): "a tone, defined there",
     ("wording/typed_pose.py", "warning"): "a tone, defined there",
 }

@@ -24,7 +24,6 @@ from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
-from service.estimation.last_poses import save_last_pose
 from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
@@ -33,7 +32,7 @@ from service.settings import Settings
 from service.store import estimates, journal, references
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
-from service.store.references import SiteReferenceRecord
+from service.store.references import LastPoseRecord, SiteReferenceRecord
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
 
@@ -98,7 +97,10 @@ def save_estimate(
         _update_alerts(session, settings, camera.id, drift, judgement)
     camera.urgent = record.suspected or record.drift_streak > 0 or bool(record.drifted)
     session.add(record)
-    save_last_pose(session, reference.id, finding.last)
+    if finding.last is not None:
+        session.merge(finding.last)
+    elif (last := session.get(LastPoseRecord, reference.id)) is not None:
+        session.delete(last)
     payload = {
         "camera_id": record.camera_id,
         "state": record.state,

@@ -22,8 +22,8 @@ from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
 from service.alerts.suspected_moves import SuspectedMove, suspected_moves
-from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
-from service.estimation.people import Unpacked
+from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
+from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import (
     Attendance,
     attendance_of,
@@ -152,8 +152,8 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         return None
     trajectories, weights = period.trajectories, period.weights
     anchor = period.anchor
-    if anchor is not None and anchor.log is not None:
-        log = creep_log_from_bytes(anchor.log)
+    if anchor is not None and anchor.record.creep is not None:
+        log = creep_log_from_bytes(anchor.record.creep)
         stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
         trajectories = tuple(track for track in stood if track is not None)
         weights = weights[[track is not None for track in stood]]

@@ -19,8 +19,7 @@ from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
 from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
-from service.estimation.evidence import walk_of
-from service.estimation.people import Unpacked, until_so_many
+from service.estimation.evidence import Unpacked, until_so_many, walk_of
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings

@@ -11,9 +11,8 @@ from sqlalchemy.orm import Session
 from models.monitoring.verdict import Drift
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, Severity
-from service.estimation.limits import drift_limits
 from service.pages.drawings.sparkline import sparkline
-from service.references import tracks_so_far, wanted_tracks
+from service.references import drift_limits, tracks_so_far, wanted_tracks
 from service.settings import Settings
 from service.store import fleet
 from service.store.alerts import AlertRecord

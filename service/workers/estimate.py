@@ -14,12 +14,10 @@ from service.estimate_queue import (
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.estimates import save_estimate
-from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
+from service.estimation.evidence import Unpacked, load_evidence
+from service.estimation.finding import PartialFailures, compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
-from service.estimation.partial_failures import PartialFailures
-from service.estimation.people import Unpacked
 from service.workers.context import JobContext
 from service.workers.predictions import predict_pending
 

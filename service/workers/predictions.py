@@ -3,7 +3,7 @@
 import logging
 
 from models.errors import CheckpointError
-from service.estimation.people import Unpacked
+from service.estimation.evidence import Unpacked
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
 

@@ -12,7 +12,7 @@ from models.regression.checkpoint import load_weights
 from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.tracks.trajectory import cut_windows
-from service.estimation.people import Unpacked
+from service.estimation.evidence import Unpacked
 from service.store.tracks import StoredTrack
 from service.training import PendingTracks
 

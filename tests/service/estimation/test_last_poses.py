@@ -7,8 +7,7 @@ import pytest
 
 from models.pose import warm_start_from_bytes
 from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
-from service.estimation.last_poses import basis_of, begin_of
+from service.estimation.finding import basis_of, begin_of, compute_finding
 from tests.conftest import CAMERA
 from tests.service.street import KNOCKED, PRIOR, Street
 
