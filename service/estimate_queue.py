@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
 from service.reasons import Reasons
-from service.store import tracks
+from service.store import estimates, tracks
 from service.store.cameras import CameraRecord
 
 LONGEST_COOLDOWN_S = 600.0
@@ -29,7 +29,8 @@ def request_estimate(
         now = _now()
         camera.estimate_due_at = now
         if not is_cooling(camera.estimate_after, now):
-            queue.enqueue_estimate(session, camera_id, now, urgent=watched or camera.urgent)
+            urgent = watched or _may_have_moved(session, camera_id)
+            queue.enqueue_estimate(session, camera_id, now, urgent=urgent)
 
 
 def overlooked(session: Session, queue: JobQueue) -> list[str]:
@@ -50,7 +51,8 @@ def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str
     for camera_id in camera_ids:
         camera = session.get(CameraRecord, camera_id)
         if camera is not None and camera.estimate_due_at is not None:
-            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
+            urgent = _may_have_moved(session, camera_id)
+            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=urgent)
 
 
 def is_cooling(until: datetime | None, now: datetime) -> bool:
@@ -133,6 +135,11 @@ def fail_look(session: Session, camera_id: str, error: str) -> None:
         _note_failure(camera, error, now)
         camera.estimate_due_at = camera.estimate_due_at or now
         camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
+
+
+def _may_have_moved(session: Session, camera_id: str) -> bool:
+    last = estimates.newest(session, camera_id)
+    return last is not None and last.suspects_move
 
 
 def _note_failure(camera: CameraRecord, error: str, now: datetime) -> None:

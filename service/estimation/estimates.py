@@ -95,7 +95,6 @@ def save_estimate(
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
         _update_alerts(session, settings, camera.id, drift, judgement)
-    camera.urgent = record.suspected or record.drift_streak > 0 or bool(record.drifted)
     session.add(record)
     if finding.last is not None:
         session.merge(finding.last)

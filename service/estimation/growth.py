@@ -211,7 +211,7 @@ def _may_have_moved(
         return True
     if is_before(last.to_s, window_of(session, reference, settings)):
         return True  # somebody was at the camera, and nobody knows yet how it stands since
-    if last.drift_streak > 0 or last.drifted or last.suspected:
+    if last.suspects_move:
         return True
     if any(alerts.firing(session, reference.camera_id, kind) for kind in alerts.POSE_KINDS):
         return True

@@ -16,7 +16,6 @@ from sqlalchemy import (
     String,
     bindparam,
     delete,
-    false,
     func,
     select,
     type_coerce,
@@ -48,8 +47,7 @@ class CameraRecord(Record):
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `lacks` says what failed beside the served estimate. One that is `urgent` may
-    have moved: it is looked at before others.
+    `estimate_after`. `lacks` says what failed beside the served estimate.
     """
 
     __tablename__ = "cameras"
@@ -75,7 +73,6 @@ class CameraRecord(Record):
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
     lacks: Mapped[Reasons] = mapped_column(default=())
-    urgent: Mapped[bool] = mapped_column(default=False, server_default=false())
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 

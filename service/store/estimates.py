@@ -94,6 +94,11 @@ class EstimateRecord(Record):
     )
 
     @property
+    def suspects_move(self) -> bool:
+        """True where its camera may have moved: it is looked at before others, its map stays."""
+        return self.suspected or self.drift_streak > 0 or bool(self.drifted)
+
+    @property
     def drift(self) -> Drift:
         """The drift against the prior pose, and which of it is identifiable."""
         return Drift(
