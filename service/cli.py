@@ -14,7 +14,7 @@ from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.logs import configure_logs
 from service.workers.processes.collector import importing
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:

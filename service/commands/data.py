@@ -11,7 +11,7 @@ from rich.console import Console
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.logs import configure_logs
-from service.workers.processes.signals import be_private, end_like_ctrl_c
+from service.workers.processes.process import be_private, end_like_ctrl_c
 
 if TYPE_CHECKING:
     from service.settings import Settings

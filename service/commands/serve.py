@@ -22,7 +22,7 @@ from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
 from service.workers.processes.local_workers import local_workers
-from service.workers.processes.resources import settle_allocator
+from service.workers.processes.process import settle_allocator
 
 if TYPE_CHECKING:
     from fastapi import FastAPI

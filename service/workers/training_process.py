@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from service.logs import configure_logs
-from service.workers.processes.resources import settle_allocator, yield_to_others
+from service.workers.processes.process import settle_allocator, yield_to_others
 from service.workers.training_child import REST
 
 log = logging.getLogger("surefoot.jobs")

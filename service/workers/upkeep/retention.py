@@ -23,8 +23,7 @@ from service.store import (
     webhooks,
 )
 from service.store.engines import files
-from service.workers.context import JobContext
-from service.workers.running_jobs import UPKEEP
+from service.workers.context import UPKEEP, JobContext
 
 log = logging.getLogger("surefoot.jobs")
 

@@ -11,7 +11,7 @@ from service.store import webhooks
 from service.store.engines.store import Store
 from service.store.workers import WorkerRecord
 from service.workers.processes.workers import register_worker
-from service.workers.upkeep.clock import ClockWatch, follow_clock_since_last_run
+from service.workers.upkeep.periodic import ClockWatch, follow_clock_since_last_run
 from tests.running import free_port
 
 

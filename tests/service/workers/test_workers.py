@@ -8,9 +8,9 @@ import pytest
 
 from service.store.engines.store import Store
 from service.store.workers import WorkerRecord
+from service.workers.context import RunningJobs
 from service.workers.processes.local_workers import pause_s
 from service.workers.processes.workers import Watch, heartbeat, note_trouble, register_worker
-from service.workers.running_jobs import RunningJobs
 
 LOST_S = 0.2
 
@@ -82,7 +82,7 @@ def test_who_dies_again_and_again_is_started_ever_more_rarely(deaths, seconds):
 def test_a_task_beyond_its_limit_is_overdue(monkeypatch):
     clock = iter([0.0, 0.0, 60.0, 60.1])
     standing = SimpleNamespace(monotonic=lambda: next(clock))
-    monkeypatch.setattr("service.workers.running_jobs.time", standing)
+    monkeypatch.setattr("service.workers.context.time", standing)
     running = RunningJobs(limits_s={"estimate": 60.0})
     with running.job("train", "a"), running.job("estimate", "corner"):
         assert running.overdue() is None
