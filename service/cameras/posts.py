@@ -46,14 +46,14 @@ class Pictures:
             NotFoundError: there is no such camera.
         """
         with store.look() as connection:
-            found = cameras.picture(connection, camera_id)
+            found = cameras.awaited(connection, camera_id)
         if found is None:
             self._known.pop(camera_id, None)
             raise no_camera(camera_id)
         if len(self._known) >= _MOST_PICTURES:
             self._known.clear()
-        self._known[camera_id] = found
-        return found
+        self._known[camera_id] = found.picture
+        return found.picture
 
 
 def check_picture(connection: Connection, camera_id: str, read_by: Picture) -> cameras.Awaited:

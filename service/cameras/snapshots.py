@@ -3,7 +3,7 @@
 import hashlib
 from datetime import UTC, datetime
 
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
@@ -12,7 +12,7 @@ from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOf
 from service.formats.still import Still
 from service.settings import Settings
 from service.store import cameras
-from service.store.cameras import SnapshotFacts, SnapshotRecord
+from service.store.cameras import SnapshotRecord
 
 _OTHER_SHAPE = 0.01  # of the ratio of its sides
 
@@ -29,7 +29,7 @@ def require_snapshots(settings: Settings) -> None:
         )
 
 
-def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFacts:
+def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotRecord:
     """Keep a still image of a camera in place of the one there was.
 
     Raises:
@@ -46,7 +46,7 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
         raise MalformedError(f"body: {reason}", (FieldError(pointer="", reason=reason),))
     digest = hashlib.sha256(still.jpeg).hexdigest()
     now = datetime.now(UTC)
-    session.merge(
+    record = session.merge(
         SnapshotRecord(
             camera_id=camera_id,
             jpeg=still.jpeg,
@@ -57,7 +57,7 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
         )
     )
     note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
-    return SnapshotFacts(sha256=digest, width=still.width, height=still.height, stored_at=now)
+    return record
 
 
 def show_snapshot(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord:
@@ -87,6 +87,8 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 
-def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:
-    """Size and time of a camera's still image; None where none may be shown."""
-    return cameras.snapshot_facts(session, camera_id) if settings.snapshots else None
+def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord | None:
+    """Size and time of a camera's still image, without reading it; None where none may be shown."""
+    if not settings.snapshots:
+        return None
+    return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))

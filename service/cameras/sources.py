@@ -192,7 +192,7 @@ def _make_room(session: Session, camera_id: str, name: str, most: int) -> None:
         record
         for record in known
         if record.name != reference.source
-        and not sources.has_tracks(session, camera_id, record.name)
+        and sources.newest_end_s(session, camera_id, record.name) is None
     ]
     for record in gone:
         session.delete(record)

@@ -1,17 +1,18 @@
 """The requests that tell a webhook of a delivery: URL, headers, body."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
+from standardwebhooks import Webhook
 
 from service.enums import WebhookFormat
 from service.notifications.alertmanager import ended, postable_alerts, postable_test
-from service.notifications.keys import old_secret_of, secret_of
+from service.notifications.keys import secret_of
 from service.notifications.outbox import alert_body, json_time
-from service.notifications.signing import signed_headers
 from service.settings import Settings
 from service.store import webhooks
 from service.store.alerts import AlertRecord
@@ -40,9 +41,9 @@ def message_of(
     body = _json(delivery.payload)
     secrets = [secret_of(settings, webhook) or ""]
     if webhook.old_secret and webhook.old_secret_until and webhook.old_secret_until > now:
-        secrets.append(old_secret_of(settings, webhook) or "")
+        secrets.append(secret_of(settings, webhook, old=True) or "")
     return Message(
-        url=webhook.url, body=body, headers=signed_headers(delivery.id, now, body, secrets)
+        url=webhook.url, body=body, headers=_signed_headers(delivery.id, now, body, secrets)
     )
 
 
@@ -78,6 +79,18 @@ def _stands(
 
 def _to_alertmanager(webhook: WebhookRecord, posted: list[dict[str, Any]]) -> Message:
     return Message(url=f"{webhook.url.rstrip('/')}/api/v2/alerts", body=_json(posted))
+
+
+def _signed_headers(
+    message_id: str, at: datetime, body: str, signing_secrets: Sequence[str]
+) -> dict[str, str]:
+    """The headers of Standard Webhooks: several secrets give several signatures, for rotation."""
+    signatures = [Webhook(secret).sign(message_id, at, body) for secret in signing_secrets]
+    return {
+        "webhook-id": message_id,
+        "webhook-timestamp": str(int(at.timestamp())),
+        "webhook-signature": " ".join(signatures),
+    }
 
 
 def _json(value: Any) -> str:

@@ -14,9 +14,8 @@ from service.enums import Activity, AlertKind, DeliveryState, MessageType, Webho
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
 from service.notifications.addresses import AddressError, check_url
-from service.notifications.keys import sealed_secret
+from service.notifications.keys import new_secret, sealed_secret
 from service.notifications.outbox import add_delivery, wake
-from service.notifications.signing import new_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks

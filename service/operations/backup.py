@@ -4,6 +4,7 @@ import fcntl
 import io
 import os
 import shutil
+import sqlite3
 import tarfile
 import tempfile
 from collections.abc import Callable
@@ -33,7 +34,6 @@ from service.operations.manifest import (
     hash_stream,
     read_manifest,
     release,
-    sqlite_version,
 )
 from service.settings import Settings
 from service.store.engines import files
@@ -140,7 +140,7 @@ def _describe(settings: Settings, scratch: Path, missing: list[str]) -> Manifest
         format=FORMAT,
         release=release(),
         revision=files.revision(database) or "",
-        sqlite=sqlite_version(),
+        sqlite=sqlite3.sqlite_version,
         made_at=datetime.now(UTC).isoformat(timespec="seconds"),
         key=key,
         key_id=key_id,

@@ -46,8 +46,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         with store.write("probe/") as session:
             workers.write_probe(session, now)
         with store.read() as session:
-            heartbeat, asked = workers.newest_heartbeat(session), now_in(session)
-            troubles = workers.troubles(session)
+            known, asked = workers.every(session), now_in(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
             came = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
@@ -55,6 +54,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         return _unwritable(error)
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
     # A heartbeat of the future is one of before the clock was set back: no sign of life either.
+    heartbeat = max((each.heartbeat_at for each in known if not each.lost), default=None)
     silent_s = None if heartbeat is None else abs((asked - heartbeat).total_seconds())
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     # Who fails is named below, and rests between its tries: it does not hold up the queue.
@@ -66,7 +66,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         )
     if 2 * len(failing) > count:
         problems.append(f"estimates: they fail for {len(failing)} of {count} cameras")
-    named = [f"worker: {name} {trouble}" for name, trouble in troubles.items()]
+    named = [f"worker: {each.name} {each.trouble}" for each in known if each.trouble is not None]
     return Readiness(
         store_writable=free_mb >= _FULL_MB,
         worker_alive=alive,

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import sqlite3
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -68,11 +67,6 @@ def release() -> str:
         return version("surefoot")
     except PackageNotFoundError:  # run out of a checkout
         return "unknown"
-
-
-def sqlite_version() -> str:
-    """The version of SQLite that runs."""
-    return sqlite3.sqlite_version
 
 
 def hash_file(path: Path) -> Member:

@@ -18,7 +18,7 @@ from service.enums import AlertState, PoseState
 from service.settings import Settings
 from service.store import cameras, journal, maintenance, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
-from service.store.cameras import PriorPoseRecord, SnapshotFacts
+from service.store.cameras import PriorPoseRecord, SnapshotRecord
 from service.store.journal import ActivityRecord
 from service.store.maintenance import MaintenanceRecord
 from service.store.tracks import trajectory_of
@@ -62,7 +62,7 @@ class CameraPage:
     trainings: tuple[TrainingRecord, ...]
     activity: tuple[ActivityRecord, ...]
     sources: tuple[SourceView, ...]
-    snapshot: SnapshotFacts | None
+    snapshot: SnapshotRecord | None
     snapshots_allowed: bool
     newest_event_id: int
 

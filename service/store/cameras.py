@@ -156,11 +156,6 @@ _AS_SET_UP = (
 _PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
 
 # A record takes ten times as long as what each post of tracks has to know of its camera.
-_PICTURE = Prepared(
-    select(CameraRecord.width, CameraRecord.height, CameraRecord.frame_rate_hz).where(
-        CameraRecord.id == bindparam("camera")
-    )
-)
 _AWAITED = Prepared(
     select(
         type_coerce(CameraRecord.estimate_due_at.is_(None), Integer),
@@ -191,12 +186,6 @@ class Awaited:
     look: bool
     source: bool
     picture: Picture
-
-
-def picture(connection: Connection, camera_id: str) -> Picture | None:
-    """The pictures of a camera, or None."""
-    row = _PICTURE.row(connection, {"camera": camera_id})
-    return None if row is None else Picture(width=row[0], height=row[1], frame_rate_hz=row[2])
 
 
 def awaited(connection: Connection, camera_id: str) -> Awaited | None:
@@ -301,29 +290,6 @@ class SnapshotRecord(Record):
     width: Mapped[int]
     height: Mapped[int]
     stored_at: Mapped[datetime]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SnapshotFacts:
-    """Facts of a still image, without reading it."""
-
-    sha256: str
-    width: int
-    height: int
-    stored_at: datetime
-
-
-def snapshot_facts(session: Session, camera_id: str) -> SnapshotFacts | None:
-    """The facts of the still image of a camera, or None."""
-    row = session.execute(
-        select(
-            SnapshotRecord.sha256,
-            SnapshotRecord.width,
-            SnapshotRecord.height,
-            SnapshotRecord.stored_at,
-        ).where(SnapshotRecord.camera_id == camera_id)
-    ).first()
-    return None if row is None else SnapshotFacts(**row._mapping)
 
 
 def remove_snapshot(session: Session, camera_id: str) -> bool:

@@ -80,11 +80,6 @@ def count_from(
     return count_where(session, *conditions)
 
 
-def has_tracks(session: Session, camera_id: str, name: str) -> bool:
-    """True if tracks of a source are stored."""
-    return newest_end_s(session, camera_id, name) is not None
-
-
 def forget(session: Session, record: SourceRecord) -> None:
     """Delete a source with its tracks."""
     session.execute(

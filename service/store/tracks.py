@@ -19,7 +19,6 @@ from sqlalchemy import (
     Select,
     String,
     UniqueConstraint,
-    and_,
     bindparam,
     func,
     select,
@@ -79,14 +78,17 @@ class StoredTrack(NamedTuple):
 _COLUMNS = [getattr(TrackRecord, name) for name in StoredTrack._fields]
 
 
-def select_tracks() -> Select[Any]:
-    """A statement whose rows `read` takes."""
-    return select(*_COLUMNS)
-
-
-def read(session: Session, statement: Select[Any]) -> Sequence[StoredTrack]:
-    """The tracks that a statement finds."""
-    return [StoredTrack._make(row) for row in session.execute(statement)]
+def by_end(
+    session: Session,
+    *conditions: ColumnElement[bool],
+    newest_first: bool = False,
+    limit: int | None = None,
+) -> Sequence[StoredTrack]:
+    """Tracks that meet some conditions in the order of their ends; or the newest first."""
+    order = [TrackRecord.ended_s.desc(), TrackRecord.id.desc()]
+    query = select(*_COLUMNS).where(*conditions)
+    query = query.order_by(*order if newest_first else (TrackRecord.ended_s, TrackRecord.id))
+    return [StoredTrack._make(row) for row in session.execute(query.limit(limit))]
 
 
 def pack(array: Array) -> bytes:
@@ -285,50 +287,31 @@ def newest(
     session: Session, camera_id: str, limit: int, started_from_s: float | None = None
 ) -> Sequence[StoredTrack]:
     """The newest tracks, newest first; of those that started from a time on, if it is given."""
-    return read(
-        session,
-        select_tracks()
-        .where(*started_from(camera_id, started_from_s))
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit),
-    )
+    conditions = started_from(camera_id, started_from_s)
+    return by_end(session, *conditions, newest_first=True, limit=limit)
 
 
 def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:
-    """Delete what the limits on age and number say. Returns how many.
+    """Delete up to `limit` tracks that came before a time, or after which so many came; how many.
 
-    At most `limit` at once, those first that came first.
+    By their arrival, not by their own times: what was recorded years ago and is posted today has
+    been acknowledged today, and stays as long as what was walked today. The source that counts has
+    a number of its own: no other can post its tracks away.
     """
-    outlived = _outlived(camera_id, before, keep)
-    bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
+    number = func.row_number().over(
+        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
+    )
+    of_camera = TrackRecord.camera_id == camera_id
+    numbered = select(TrackRecord.id, number.label("number")).where(of_camera).subquery()
+    surplus = select(numbered.c.id).where(numbered.c.number > keep)
+    outlived = (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus)
+    bite = select(TrackRecord.id).where(of_camera, outlived).order_by(TrackRecord.id).limit(limit)
     return delete_some(session, TrackRecord.id, bite)
 
 
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     """Those of the given tracks that are still stored."""
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
-
-
-def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
-    """The condition of being deleted: it came before a time, or so many have come after it.
-
-    By its arrival, not by its own times: what was recorded years ago and is posted today has been
-    acknowledged today, and stays as long as what was walked today. The source that
-    counts has a number of its own: no other can post its tracks away.
-    """
-    number = func.row_number().over(
-        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
-    )
-    numbered = (
-        select(TrackRecord.id, number.label("number"))
-        .where(TrackRecord.camera_id == camera_id)
-        .subquery()
-    )
-    surplus = select(numbered.c.id).where(numbered.c.number > keep)
-    return and_(
-        TrackRecord.camera_id == camera_id,
-        (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus),
-    )
 
 
 def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int) -> int:

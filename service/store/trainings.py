@@ -1,7 +1,7 @@
 """Trainings, the models that they made, and their weights."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Index, LargeBinary, String, bindparam, func, select
@@ -142,35 +142,8 @@ def weights_in_use(session: Session) -> set[str]:
     return set(session.scalars(select(ModelRecord.weights_sha256)))
 
 
-def has_weights(session: Session, sha256: str) -> bool:
-    """True if weights are in the database."""
-    return session.scalar(select(WeightsRecord.sha256).filter_by(sha256=sha256)) is not None
-
-
-def weights(session: Session, sha256: str) -> bytes | None:
-    """Weights by their hash; None where they are not in the database."""
-    return session.scalar(select(WeightsRecord.data).filter_by(sha256=sha256))
-
-
-def keep_weights(session: Session, sha256: str, data: bytes) -> None:
-    """Put weights into the database."""
-    session.add(WeightsRecord(sha256=sha256, data=data, stored_at=datetime.now(UTC)))
-
-
 def forget_weights(session: Session, limit: int) -> int:
     """Delete up to `limit` of the weights that no model names. Returns how many."""
     unused = WeightsRecord.sha256.not_in(select(ModelRecord.weights_sha256))
     bite = select(WeightsRecord.sha256).where(unused).limit(limit)
     return delete_some(session, WeightsRecord.sha256, bite)
-
-
-def model_exists(session: Session, model_id: str) -> bool:
-    """True if a model is still stored."""
-    return session.get(ModelRecord, model_id) is not None
-
-
-def delete_model(session: Session, model_id: str) -> None:
-    """Delete a model and what it says of tracks."""
-    record = session.get(ModelRecord, model_id)
-    if record is not None:
-        session.delete(record)

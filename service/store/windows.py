@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, ForeignKey, Select, and_, func, select
+from sqlalchemy import ColumnElement, ForeignKey, Select, and_, exists, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
@@ -14,10 +14,9 @@ from service.store.tracks import (
     Spans,
     StoredTrack,
     TrackRecord,
+    by_end,
     counting,
     outside,
-    read,
-    select_tracks,
     started_from,
 )
 
@@ -60,12 +59,7 @@ class StillBounds:
 
 def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
-    return read(
-        session,
-        select_tracks()
-        .where(TrackRecord.id.in_(window_ids(session, bounds)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id),
-    )
+    return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)))
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
@@ -82,24 +76,13 @@ def first(
     without: Spans = (),
 ) -> Sequence[StoredTrack]:
     """The first tracks by their ends that started from a time on and were not seen at others."""
-    return read(
-        session,
-        select_tracks()
-        .where(*started_from(camera_id, started_from_s), *outside(without))
-        .order_by(TrackRecord.ended_s, TrackRecord.id)
-        .limit(limit),
-    )
+    conditions = *started_from(camera_id, started_from_s), *outside(without)
+    return by_end(session, *conditions, limit=limit)
 
 
 def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredTrack]:
     """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
-    return read(
-        session,
-        select_tracks()
-        .where(*_still(bounds))
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit),
-    )[::-1]
+    return by_end(session, *_still(bounds), newest_first=True, limit=limit)[::-1]
 
 
 def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
@@ -156,12 +139,7 @@ def of_days(
     )
     nth = (each.c.place * most_a_day) // each.c.people
     before = ((each.c.place - 1) * most_a_day) // each.c.people
-    return read(
-        session,
-        select_tracks()
-        .where(TrackRecord.id.in_(select(each.c.id).where(nth > before)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id),
-    )
+    return by_end(session, TrackRecord.id.in_(select(each.c.id).where(nth > before)))
 
 
 def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
@@ -207,20 +185,11 @@ def without_prediction(
     session: Session, bounds: WindowBounds, model_id: str, limit: int
 ) -> Sequence[StoredTrack]:
     """Tracks of the window that the model has not looked at, newest first."""
-    return read(
-        session,
-        select_tracks()
-        .outerjoin(
-            PredictionRecord,
-            (PredictionRecord.track_pk == TrackRecord.id) & (PredictionRecord.model_id == model_id),
-        )
-        .where(
-            TrackRecord.id.in_(window_ids(session, bounds)),
-            PredictionRecord.track_pk.is_(None),
-        )
-        .order_by(TrackRecord.ended_s.desc())
-        .limit(limit),
+    predicted = exists().where(
+        PredictionRecord.track_pk == TrackRecord.id, PredictionRecord.model_id == model_id
     )
+    inside = TrackRecord.id.in_(window_ids(session, bounds))
+    return by_end(session, inside, ~predicted, newest_first=True, limit=limit)
 
 
 def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:

@@ -49,7 +49,7 @@ def take_setback(session: Session) -> timedelta:
     None of them saw that happen: each was ended before, or is only just being started.
     """
     now = now_in(session)
-    ahead = workers.after(session, now)
+    ahead = [record for record in workers.every(session) if record.heartbeat_at > now]
     back = max((record.heartbeat_at - now for record in ahead), default=timedelta())
     for record in ahead:
         record.heartbeat_at = now
@@ -90,7 +90,9 @@ class Watch:
         """Names of workers that have fallen silent; among all watchers each is named once."""
         now_s = time.monotonic()
         seen, lost = {}, []
-        for record in workers.alive(session):
+        for record in workers.every(session):
+            if record.lost:
+                continue
             beats, since_s = self._seen.get(record.name, (None, now_s))
             if beats != record.beats:
                 since_s = now_s

@@ -81,7 +81,7 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         Recorder(),
         "corner",
         Batch(tracks=tuple(batch), rejections=()),
-        read_by=cameras.picture(session.connection(), "corner"),
+        read_by=cameras.awaited(session.connection(), "corner").picture,
     )
 
 
