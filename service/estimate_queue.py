@@ -1,6 +1,5 @@
 """The estimate queue: cameras that are due, were looked at up to a track, or cool down."""
 
-from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
@@ -33,26 +32,18 @@ def request_estimate(
             queue.enqueue_estimate(session, camera_id, now, urgent=urgent)
 
 
-def overlooked(session: Session, queue: JobQueue) -> list[str]:
-    """Cameras that are due and may be looked at, without a job that waits or runs.
+def queue_overlooked(session: Session, queue: JobQueue) -> list[str]:
+    """Queue a look at cameras that are due and may be looked at, without a job; the longest first.
 
     They were posted to while they were looked at or cooled down, or the engine has lost their job.
     """
-    now = _now()
-    return [
-        camera_id
-        for camera_id, until in queue.due_without_job(session)
-        if not is_cooling(until, now)
-    ]
-
-
-def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
-    """Queue a look at each of some cameras; those first that have been due for longest."""
-    for camera_id in camera_ids:
-        camera = session.get(CameraRecord, camera_id)
-        if camera is not None and camera.estimate_due_at is not None:
+    now, found = _now(), []
+    for camera_id, due_at, until in queue.due_without_job(session):
+        if not is_cooling(until, now):
             urgent = _may_have_moved(session, camera_id)
-            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=urgent)
+            queue.enqueue_estimate(session, camera_id, due_at, urgent=urgent)
+            found.append(camera_id)
+    return found
 
 
 def is_cooling(until: datetime | None, now: datetime) -> bool:

@@ -1,4 +1,4 @@
-"""The store: each concern's tables with their statements, and every SQL statement there is.
+"""The store: each concern's tables with their statements, and all SQL but that of the job engine's.
 
 All tables are known as soon as one is, for a key may name any of them.
 """

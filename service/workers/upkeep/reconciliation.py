@@ -12,7 +12,7 @@ from service.alerts.silence import end_silences
 from service.alerts.staleness import StaleWatch
 from service.cameras.maintenance import note_ends
 from service.cameras.sources import watch_sources
-from service.estimate_queue import overlooked, queue_overlooked, request_estimate
+from service.estimate_queue import queue_overlooked, request_estimate
 from service.job_queue import JobQueue
 from service.notifications import deliveries
 from service.references import window_of
@@ -28,11 +28,7 @@ _CAMERAS_HZ = 10  # reconciled, of hundreds: all of them at once took a quarter 
 
 def run_sweep(context: JobContext) -> None:
     """Queue a look at cameras that were posted to while they were looked at, or cooled down."""
-    with context.store.read() as session:
-        camera_ids = overlooked(session, context.queue)
-    if camera_ids:
-        with context.store.write("sweep/") as session:
-            queue_overlooked(session, context.queue, camera_ids)
+    context.store.write_if_needed("sweep/", partial(queue_overlooked, queue=context.queue))
 
 
 def run_reconcile(context: JobContext, stale: StaleWatch) -> None:

@@ -11,7 +11,6 @@ from models.errors import CheckpointError
 from service.alerts.staleness import StaleWatch
 from service.estimate_queue import (
     cooldown_s,
-    overlooked,
     queue_overlooked,
     request_estimate,
 )
@@ -238,7 +237,7 @@ def test_one_job_a_camera_however_often_it_is_asked_for(newcomer):
             reconciliation.reconcile_camera(session, context.queue, context.settings, "corner")
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
 
 
 def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newcomer):
@@ -248,12 +247,11 @@ def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newco
     with context.store.write() as session:
         session.execute(text("DELETE FROM workflow_status"))
     with context.store.write() as session:
-        assert overlooked(session, context.queue) == ["corner"]
-        queue_overlooked(session, context.queue, ["corner"])
+        assert queue_overlooked(session, context.queue) == ["corner"]
     assert camera(newcomer).estimate_due_at == due_at
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
 
 
 def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
@@ -266,10 +264,10 @@ def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
     newcomer.keep_to_lanes(PRIOR, 5)
     with context.store.read() as session:
         assert queued_cameras(session) == []
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
     let_rest_end(newcomer)
-    with context.store.read() as session:
-        assert overlooked(session, context.queue) == ["corner"]
+    with context.store.write() as session:
+        assert queue_overlooked(session, context.queue) == ["corner"]
 
 
 def test_a_training_that_the_engine_lost_is_queued_again_and_at_last_fails(newcomer):
