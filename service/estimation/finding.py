@@ -116,10 +116,13 @@ class Finding:
         return max(track.pk for track in self.tracks)
 
 
-def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
+def compute_finding(
+    evidence: Evidence, seed: int, failures: PartialFailures | None = None
+) -> Finding | None:
     """The pose by all estimators, from the newest change on; None where too few people walk.
 
-    It begins at what was found of the camera last, if that may be.
+    It begins at what was found of the camera last, if that may be. `failures` are those of the look
+    so far, of which it has those of the finding from then on.
     """
     walks = observe_walks(
         [track.trajectory for track in evidence.tracks],
@@ -130,7 +133,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     observed = walks.observations
     if observed.walkers < FEWEST_WALKERS:
         return None
-    failures = PartialFailures(evidence.camera_id)
+    failures = failures or PartialFailures(evidence.camera_id)
     site = _site_of(evidence, observed, failures)
     creep = failures.unless_failed(
         "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)

@@ -13,9 +13,9 @@ from service.access.activity import note
 from service.enums import Activity, AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
-from service.notifications.addresses import AddressError, check_url
 from service.notifications.keys import new_secret, sealed_secret
 from service.notifications.outbox import add_delivery, wake
+from service.notifications.send import AddressError, check_url
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks

@@ -19,9 +19,8 @@ from service.data_dir import (
     strangers_in,
 )
 from service.job_queue import ENGINE_TABLES
-from service.notifications.keys import require_openable
-from service.notifications.sealing import sealer_of
-from service.operations.manifest import hash_file
+from service.notifications.keys import require_openable, sealer_of
+from service.operations.backup import hash_file
 from service.operations.restore import READY
 from service.settings import Settings
 from service.store.engines import files

@@ -21,13 +21,12 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
-from service.notifications.keys import require_openable
-from service.notifications.sealing import read_key_file, sealer_of
-from service.operations.backup import Progress
-from service.operations.manifest import (
+from service.notifications.keys import read_key_file, require_openable, sealer_of
+from service.operations.backup import (
     MANIFEST,
     Manifest,
     Member,
+    Progress,
     hash_file,
     hash_stream,
     read_manifest,

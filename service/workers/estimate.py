@@ -2,7 +2,6 @@
 
 import logging
 import time
-from dataclasses import replace
 from functools import partial
 
 from models.errors import CheckpointError
@@ -58,19 +57,18 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
-    finding = None if evidence is None else compute_finding(evidence, settings.seed)
-    if finding is not None:
-        finding = replace(finding, failures=(*failures.reasons, *finding.failures))
+    finding = None if evidence is None else compute_finding(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
-        failed = failures.reasons if finding is None else finding.failures
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=(*failed, *cooling))
+        end_look(
+            session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
+        )
     _grow_unless_failed(context, camera_id, unpacked)
 
 

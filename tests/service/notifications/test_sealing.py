@@ -11,8 +11,7 @@ import pytest
 from service.commands.key_rotation import rotate_key
 from service.commands.migrate import migrate
 from service.data_dir import StartError
-from service.notifications.keys import secret_of
-from service.notifications.sealing import Sealer
+from service.notifications.keys import Sealer, secret_of
 from service.notifications.webhooks import WebhookSpec, create_webhook, rotate_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
