@@ -60,10 +60,6 @@ class Manifest:
     missing_weights: list[str]
     members: list[Member]
 
-    def to_json(self) -> bytes:
-        """As it lies in the archive."""
-        return json.dumps(asdict(self), indent=1).encode()
-
 
 def read_manifest(data: bytes) -> Manifest:
     """The manifest of an archive.
@@ -223,7 +219,7 @@ def _pack(manifest: Manifest, scratch: Path, partial: Path, on_progress: Progres
     handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "wb") as file:
         with tarfile.open(fileobj=file, mode="w", format=tarfile.PAX_FORMAT) as tar:
-            description = manifest.to_json()
+            description = json.dumps(asdict(manifest), indent=1).encode()
             tar.addfile(_header(MANIFEST, len(description)), io.BytesIO(description))
             for number, member in enumerate(manifest.members):
                 on_progress("writing", number, len(manifest.members))
