@@ -10,11 +10,10 @@ from sqlalchemy.orm import Session
 from models.monitoring.verdict import DriftLimits
 from service.enums import Answer, Origin
 from service.settings import Settings
-from service.store import cameras, estimates, maintenance, references, tracks
+from service.store import cameras, estimates, references, tracks
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 from service.store.windows import WindowBounds
 
 
@@ -47,7 +46,7 @@ class Attendance:
 
 def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
     """The times in which somebody was at a camera."""
-    return attendance_by(maintenance.of_camera(session, camera_id), now)
+    return attendance_by(references.maintenance_of(session, camera_id), now)
 
 
 def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:

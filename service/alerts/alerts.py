@@ -24,7 +24,7 @@ from service.errors import ConflictError, NotFoundError
 from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import alerts, journal, maintenance, tracks
+from service.store import alerts, journal, references, tracks
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.journal import ActivityRecord
 from service.wording.reasons import in_words
@@ -62,7 +62,7 @@ def open_alert(
     What a reference doubts does not overwrite what estimates have found; they take over its alert.
     """
     now = datetime.now(UTC)
-    attended = maintenance.under_way(session, camera_id, now) is not None
+    attended = references.maintenance_under_way(session, camera_id, now) is not None
     if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)

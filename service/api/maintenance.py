@@ -11,7 +11,7 @@ from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, Wri
 from service.cameras import maintenance
 from service.cameras.maintenance import WindowChange
 from service.enums import WindowState
-from service.store.maintenance import MaintenanceRecord
+from service.store.references import MaintenanceRecord
 
 
 class WindowBody(Body):

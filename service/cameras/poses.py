@@ -18,9 +18,9 @@ from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import tracks_so_far, wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, fleet, maintenance, windows
+from service.store import cameras, estimates, fleet, references, windows
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
+from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
 
 
@@ -149,7 +149,7 @@ def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_f
     now = datetime.now(UTC)
     found: list[Reason] = []
     if status.attended.under_way(now):
-        window = maintenance.under_way(session, status.camera_id, now)
+        window = references.maintenance_under_way(session, status.camera_id, now)
         if window is not None:
             found.append(_window(window))
     estimate = status.estimate

@@ -21,8 +21,7 @@ from service.settings import Settings
 from service.store import fleet
 from service.store.alerts import POSE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

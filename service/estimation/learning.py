@@ -23,7 +23,7 @@ from service.estimation.evidence import Unpacked, until_so_many, walk_of
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
-from service.store import cameras, maintenance, references, windows
+from service.store import cameras, references, windows
 from service.store.cameras import CameraRecord
 from service.store.references import FlowMapRecord
 
@@ -65,7 +65,7 @@ def load_reference_period(
     if camera is None or reference is None or reference.ready_at is not None:
         return None
     now = datetime.now(UTC)
-    if maintenance.under_way(session, camera_id, now) is not None:
+    if references.maintenance_under_way(session, camera_id, now) is not None:
         return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
     attended = attendance_of(session, camera_id, now)

@@ -16,11 +16,11 @@ from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.settings import Settings
-from service.store import cameras, journal, maintenance, tracks, trainings
+from service.store import cameras, journal, references, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.cameras import PriorPoseRecord, SnapshotRecord
 from service.store.journal import ActivityRecord
-from service.store.maintenance import MaintenanceRecord
+from service.store.references import MaintenanceRecord
 from service.store.tracks import trajectory_of
 from service.store.trainings import TrainingRecord
 from service.wording.camera import CameraFacts
@@ -117,7 +117,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     estimate = pose.estimate
     ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
     found = [*pose.status.alerts, *list_alerts(session, ended, _ALERTS)]
-    windows = maintenance.of_camera(session, camera_id)
+    windows = references.maintenance_of(session, camera_id)
     over = sum(window.until <= now for window in windows)
     priors = cameras.prior_poses(session, camera_id, _PRIORS)
     shown = tracks.newest(

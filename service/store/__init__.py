@@ -9,7 +9,6 @@ from service.store import (  # noqa: F401
     cameras,
     estimates,
     journal,
-    maintenance,
     references,
     sources,
     tracks,

@@ -26,7 +26,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.enums import Origin
 from service.reasons import Reasons
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.estimates import EstimateRecord
 from service.store.record import (
     Record,

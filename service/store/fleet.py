@@ -32,8 +32,7 @@ from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord, RhythmRecord, newest_of
 from service.store.engines.dialects import as_json, contains_word, largest
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 from service.store.tracks import Spans, TrackRecord, of_counting_source
 from service.store.trainings import UNFINISHED, TrainingRecord
 

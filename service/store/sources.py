@@ -6,7 +6,7 @@ from datetime import datetime
 from sqlalchemy import Connection, ForeignKey, String, bindparam, delete, func, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.record import Record, count_where
 from service.store.tracks import Spans, TrackRecord, outside
 

@@ -32,7 +32,7 @@ from models.geometry.upright import tops_of_boxes, uncut
 from models.tracks.trajectory import Trajectory
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.record import Record, camera_key, count_where, delete_some
 from service.store.references import CameraId, counting_source
 

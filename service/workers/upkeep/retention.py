@@ -16,7 +16,6 @@ from service.store import (
     cameras,
     estimates,
     journal,
-    maintenance,
     references,
     tracks,
     trainings,
@@ -70,7 +69,9 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
         yield Limit(
             "tracks_by_size", lambda s: tracks.forget_tracks(s, camera_id, most_bytes, BITE)
         )
-    yield Limit("maintenance_windows", lambda s: maintenance.forget(s, camera_id, before, BITE))
+    yield Limit(
+        "maintenance_windows", lambda s: references.forget_maintenance(s, camera_id, before, BITE)
+    )
     kept = settings.keep_estimates
     yield Limit("estimates", lambda s: estimates.forget(s, camera_id, kept, BITE))
     yield Limit("models", lambda s: _forget_models(s, camera_id))

@@ -30,7 +30,7 @@ from service.settings import Settings
 from service.store import cameras as stored_cameras
 from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord, SnapshotRecord
-from service.store.maintenance import MaintenanceRecord
+from service.store.references import MaintenanceRecord
 from service.store.trainings import TrainingRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.training.trainings import queue_training
