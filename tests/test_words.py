@@ -36,7 +36,7 @@ OTHERS = {
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
     ("workers/processes/workers.py", "estimate"): "what a worker may be for alone, defined there",
     ("workers/upkeep/reconciliation.py", "stale"): "the name of a log line",
-    ("workers/running_jobs.py", "upkeep"): "the engine's name of a job",
+    ("workers/context.py", "upkeep"): "the engine's name of a job",
     ("workers/upkeep/periodic.py", "clock"): "the name of a round",
     ("reasons.py", "maintenance"): "the code of a reason, defined there",
     ("alerts/alerts.py", "drift"): "the name of a field",
