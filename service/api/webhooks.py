@@ -10,9 +10,9 @@ from service.api.fields import Body, ReasonCode
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
-from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
+from service.notifications.webhooks import SecretMade, WebhookSpec, WebhookView
 from service.reasons import code_of
-from service.store.webhooks import WebhookRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
@@ -118,12 +118,12 @@ class DeliveryOut(BaseModel):
     finished_at: datetime | None
 
     @classmethod
-    def from_value(cls, view: DeliveryView) -> Self:
+    def from_record(cls, record: DeliveryRecord) -> Self:
         """The body of a delivery."""
         attempts = [
-            AttemptOut.model_validate(attempt, from_attributes=True) for attempt in view.attempts
+            AttemptOut.model_validate(attempt, from_attributes=True) for attempt in record.requests
         ]
-        own = {name: getattr(view.record, name) for name in cls.model_fields if name != "attempts"}
+        own = {name: getattr(record, name) for name in cls.model_fields if name != "attempts"}
         return cls(**own, attempts=attempts)
 
 
@@ -222,7 +222,7 @@ def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
 @router.post("/webhooks/{webhook_id}/test", status_code=202)
 def test(webhook_id: str, session: WriteDep) -> DeliveryOut:
     """Queue a message of the type `test`."""
-    return DeliveryOut.from_value(webhooks.test_webhook(session, webhook_id))
+    return DeliveryOut.from_record(webhooks.test_webhook(session, webhook_id))
 
 
 @router.get("/webhooks/{webhook_id}/deliveries")
@@ -233,17 +233,17 @@ def list_deliveries(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> DeliveryList:
     """What was sent or is to be, newest first, with every attempt."""
-    views = webhooks.list_deliveries(session, webhook_id, state, limit)
-    return DeliveryList(items=[DeliveryOut.from_value(view) for view in views])
+    records = webhooks.list_deliveries(session, webhook_id, state, limit)
+    return DeliveryList(items=[DeliveryOut.from_record(record) for record in records])
 
 
 @router.get("/deliveries/{delivery_id}")
 def show_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
     """A delivery with its attempts."""
-    return DeliveryOut.from_value(webhooks.show_delivery(session, delivery_id))
+    return DeliveryOut.from_record(webhooks.show_delivery(session, delivery_id))
 
 
 @router.post("/deliveries/{delivery_id}/replay", status_code=202)
 def replay(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
     """Send a delivery anew, at once and under the same `webhook-id`."""
-    return DeliveryOut.from_value(webhooks.replay_delivery(session, state.queue, delivery_id))
+    return DeliveryOut.from_record(webhooks.replay_delivery(session, state.queue, delivery_id))

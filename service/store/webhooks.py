@@ -17,7 +17,7 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
+from sqlalchemy.orm import Mapped, Session, aliased, mapped_column, relationship, selectinload
 
 from models.reasons import Reason
 from service.enums import AlertState, DeliveryState, MessageType, WebhookFormat
@@ -64,7 +64,7 @@ class DeliveryRecord(Record):
     """A message for an endpoint, written with the change that it tells of; `id` is `webhook-id`.
 
     `queued_at` is when it was made or last replayed, `tries` counts the attempts since, `attempts`
-    all of them. Its alert may be gone, and is no foreign key.
+    all of them, its `requests`, oldest first. Its alert may be gone, and is no foreign key.
     """
 
     __tablename__ = "deliveries"
@@ -84,6 +84,9 @@ class DeliveryRecord(Record):
     error: Mapped[str | None]
     created_at: Mapped[datetime]
     finished_at: Mapped[datetime | None]
+    requests: Mapped[list["DeliveryAttemptRecord"]] = relationship(
+        order_by="DeliveryAttemptRecord.id", viewonly=True
+    )
 
     __table_args__ = (
         Index(None, "webhook_id", "state", "number"),
@@ -147,23 +150,12 @@ def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:
 def log(
     session: Session, webhook_id: str, state: DeliveryState | None, limit: int
 ) -> Sequence[DeliveryRecord]:
-    """A webhook's deliveries, newest first."""
+    """A webhook's deliveries with their requests, newest first."""
     query = select(DeliveryRecord).where(DeliveryRecord.webhook_id == webhook_id)
     if state is not None:
         query = query.where(DeliveryRecord.state == state)
+    query = query.options(selectinload(DeliveryRecord.requests))
     return session.scalars(query.order_by(DeliveryRecord.number.desc()).limit(limit)).all()
-
-
-def attempts_of(session: Session, numbers: Sequence[int]) -> dict[int, list[DeliveryAttemptRecord]]:
-    """The attempts of some deliveries, oldest first, by the deliveries' numbers."""
-    found: dict[int, list[DeliveryAttemptRecord]] = {number: [] for number in numbers}
-    for attempt in session.scalars(
-        select(DeliveryAttemptRecord)
-        .where(DeliveryAttemptRecord.delivery_number.in_(numbers))
-        .order_by(DeliveryAttemptRecord.id)
-    ):
-        found[attempt.delivery_number].append(attempt)
-    return found
 
 
 def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord | None:
