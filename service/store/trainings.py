@@ -113,10 +113,10 @@ def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
     return session.scalars(_NEWEST_MODEL, {"camera": camera_id}).first()
 
 
-def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:
-    """Models of a camera older than its newest so many."""
-    query = newest_first(ModelRecord, camera_id, ModelRecord.created_at)
-    return session.scalars(query.offset(keep)).all()
+def forget_models(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of a camera's models but its newest so many; how many."""
+    superseded = surplus(ModelRecord, camera_id, keep, ModelRecord.created_at)
+    return delete_some(session, ModelRecord.id, superseded.limit(limit))
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:

@@ -48,9 +48,7 @@ def fetch_weights(store: Store, settings: Settings, sha256: str) -> None:
 class PendingTracks:
     """Tracks without a prediction, and the model that is to look at them."""
 
-    model_id: str
-    weights_sha256: str
-    config: dict[str, Any]
+    model: ModelRecord
     tracks: Sequence[StoredTrack]
 
 
@@ -64,9 +62,7 @@ def load_pending(
         return None
     bounds = window_of(session, reference, settings)
     return PendingTracks(
-        model_id=model.id,
-        weights_sha256=model.weights_sha256,
-        config=model.config,
+        model=model,
         tracks=windows.without_prediction(session, bounds, model.id, limit),
     )
 

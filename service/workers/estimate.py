@@ -95,17 +95,17 @@ def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
             pending = load_pending(session, context.settings, camera_id, _BATCH)
         if pending is None or not pending.tracks:
             return
-        fetch_weights(context.store, context.settings, pending.weights_sha256)
+        fetch_weights(context.store, context.settings, pending.model.weights_sha256)
         from service.workers.regressor import predict  # torch: 200 MB that not every worker needs
 
         try:
             rows = predict(context.settings.weights_dir, pending, unpacked)
         except CheckpointError:
             with context.store.write(camera_id) as session:
-                drop_model(session, pending.model_id)
+                drop_model(session, pending.model.id)
             raise
         with context.store.write(camera_id) as session:
-            save_predictions(session, pending.model_id, rows)
+            save_predictions(session, pending.model.id, rows)
 
 
 def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

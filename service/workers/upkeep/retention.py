@@ -74,7 +74,7 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
     )
     kept = settings.keep_estimates
     yield Limit("estimates", lambda s: estimates.forget(s, camera_id, kept, BITE))
-    yield Limit("models", lambda s: _forget_models(s, camera_id))
+    yield Limit("models", lambda s: trainings.forget_models(s, camera_id, _KEPT_MODELS, BITE))
     ended = settings.keep_trainings
     yield Limit("trainings", lambda s: trainings.forget(s, camera_id, ended, BITE))
     yield Limit("references", lambda s: references.forget(s, camera_id, poses, BITE))
@@ -126,13 +126,6 @@ def _shrink(context: JobContext) -> None:
     files.wipe_log(path, patience_ms=200)
     if files.size(path) < before:
         log.info("shrunk", extra={"bytes": files.size(path), "from_bytes": before})
-
-
-def _forget_models(session: Session, camera_id: str) -> int:
-    superseded = trainings.superseded_models(session, camera_id, _KEPT_MODELS)
-    for model in superseded[:BITE]:
-        session.delete(model)
-    return min(len(superseded), BITE)
 
 
 def _unused_weights(session: Session, folder: Path) -> list[Path]:
