@@ -19,7 +19,7 @@ from prometheus_client.registry import Collector
 from models.geometry.plane_parameters import ANGLES
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.enums import AlertKind, PoseState, Severity, TrainingState
-from service.operations.metrics import Metrics, load_metrics
+from service.operations.health import Metrics, load_metrics
 
 
 class MetricsCollector(Collector):

@@ -15,7 +15,6 @@ from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.access.activity import note
 from service.alerts.alerts import end_alert, open_alert
-from service.alerts.suspected_moves import suspected_moves
 from service.cameras.cameras import require_camera
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
@@ -27,6 +26,7 @@ from service.references import (
     begin_reference,
     is_before,
     made_against,
+    suspected_moves,
     wanted_tracks,
     window_of,
 )

@@ -21,14 +21,15 @@ from models.pose import learn_site, observe, without_creep
 from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
 from models.walking.serialization import reference_from_bytes
-from service.alerts.suspected_moves import SuspectedMove, suspected_moves
 from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
 from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import (
     Attendance,
+    SuspectedMove,
     attendance_of,
     is_before,
     made_against,
+    suspected_moves,
     window_beside,
     window_of,
 )

@@ -17,10 +17,10 @@ from typing import Any
 
 from service.logs import configure_logs
 from service.workers.processes.process import settle_allocator, yield_to_others
-from service.workers.training_child import REST
 
 log = logging.getLogger("surefoot.jobs")
 _TELLS_EVERY_S = 0.25
+REST, GO_ON = "rest", "go on"  # what a training is told, beside its order
 _going = threading.Event()
 _going.set()
 
