@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from models.durations import DAY_S
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
 from models.pose import AlarmRate, SecondLook, alarm_chart_result, drift_of, estimate_pose, observe

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from models.errors import CheckpointError
-from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.monitoring.chart import chart_from_bytes, chart_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import CameraSite, learn_site, observe
-from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.speed_reference import reference_from_bytes, reference_to_bytes
 from surefoot.camera import Camera, camera_of
 from surefoot.tracks import Track, in_order
 

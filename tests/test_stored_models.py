@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.monitoring.chart import chart_from_bytes, chart_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
     WalkConfig,
     estimate_pose,
@@ -19,8 +19,8 @@ from models.pose import (
     warm_start_to_bytes,
 )
 from models.tracks.trajectory import by_end
-from models.walking.reference.learning import learn_speed_reference
-from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import reference_from_bytes, reference_to_bytes
 from tests.models.sites import LENS, PRIOR, tracks_of
 
 GOLDEN = Path(__file__).parent / "golden" / "stored_models"

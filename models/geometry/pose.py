@@ -1,7 +1,12 @@
-"""The pose of a fixed camera, as a value."""
+"""The pose of a fixed camera, as a value, and those of its parameters that people can show.
+
+Arrays, which the numerics work on, are in the order of `PARAMETERS`, the height as its log; this is
+the one place where poses become arrays and come back.
+"""
 
 import math
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
@@ -81,3 +86,106 @@ def pose_from_centre(rotation: Array, centre_m: Array) -> CameraPose:
         x_m=float(centre_m[0]),
         y_m=float(centre_m[1]),
     )
+
+
+PARAMETERS = ("tilt", "roll", "height", "heading")
+_FIELDS = {"tilt": "tilt_rad", "roll": "roll_rad", "height": "height_m", "heading": "heading_rad"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseParameters:
+    """Height, tilt, roll and heading of a pose, their standard deviations, or how far they moved.
+
+    Which of them are identifiable is said beside it.
+    """
+
+    height_m: float
+    tilt_rad: float
+    roll_rad: float
+    heading_rad: float
+
+    def of(self, name: str) -> float:
+        """A parameter by its name: in metres for height, else in radians."""
+        return float(getattr(self, _FIELDS[name]))
+
+    def __composite_values__(self) -> tuple[float, float, float, float]:
+        """The values in the order of the fields, as the store keeps them."""
+        return self.height_m, self.tilt_rad, self.roll_rad, self.heading_rad
+
+    @classmethod
+    def of_pose(cls, pose: CameraPose) -> Self:
+        """Those of a pose."""
+        return cls(
+            height_m=pose.height_m,
+            tilt_rad=pose.tilt_rad,
+            roll_rad=pose.roll_rad,
+            heading_rad=pose.heading_rad,
+        )
+
+    @classmethod
+    def of_array(cls, values: Array, heading_rad: float = 0.0) -> Self:
+        """Those of tilt, roll, log height (3,), or of these and the heading (4,)."""
+        tilt, roll, log_height, *heading = (float(value) for value in values)
+        return cls(
+            height_m=math.exp(log_height),
+            tilt_rad=tilt,
+            roll_rad=roll,
+            heading_rad=heading[0] if heading else heading_rad,
+        )
+
+    @classmethod
+    def sd_of_array(cls, covariance: Array, height_m: float) -> Self:
+        """Standard deviations by a covariance (4, 4) of tilt, roll, log height, heading.
+
+        The height's is in proportion to the height that the log is of.
+        """
+        tilt, roll, log_height, heading = map(float, np.sqrt(np.diag(covariance)))
+        return cls(
+            height_m=height_m * log_height, tilt_rad=tilt, roll_rad=roll, heading_rad=heading
+        )
+
+
+def array_of(parameters: PoseParameters | CameraPose) -> Array:
+    """Tilt, roll (radians), log height and heading (radians) (4,)."""
+    p = parameters
+    return np.array([p.tilt_rad, p.roll_rad, math.log(p.height_m), p.heading_rad])
+
+
+# By name, in the order of every (3,).
+PLANE_PARAMETERS = PARAMETERS[:3]  # of the ground plane before the camera: speeds determine these
+ANGLES = ("tilt", "roll", "heading")
+# A parameter whose standard deviation is larger is not identifiable; in the order of WITH_HEADING.
+IDENTIFIABLE_SD = np.array([math.radians(2.0), math.radians(2.0), 0.12, math.radians(2.0)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaneEstimate:
+    """Tilt, roll (radians) and log height: values (3,), covariance (3, 3), from so many tracks.
+
+    Raises:
+        ShapeError: an array of another shape, or a parameter that is not finite.
+    """
+
+    values: Array
+    covariance: Array
+    tracks: int
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (3,) or self.covariance.shape != (3, 3):
+            raise ShapeError(
+                f"values, covariance: (3,) and (3, 3) are needed, got {self.values.shape} and "
+                f"{self.covariance.shape}"
+            )
+        if not (np.isfinite(self.values).all() and np.isfinite(self.covariance).all()):
+            raise ShapeError("values, covariance: must be finite")
+
+
+def identifiable_of(names: tuple[str, ...], sd: Array) -> tuple[str, ...]:
+    """Those of the named parameters (N,), in the order of `sd` (N,), that the data determine."""
+    most = IDENTIFIABLE_SD[: len(names)]
+    return tuple(name for name, known in zip(names, sd <= most, strict=True) if known)
+
+
+def plane_parameters_of(pose: CameraPose) -> Array:
+    """Tilt, roll (radians) and log height (3,) of a pose."""
+    return array_of(pose)[:3]

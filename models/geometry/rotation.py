@@ -195,3 +195,18 @@ def nearest_rotation(matrix: Any) -> Array:
 
 def _canonical(q: Array) -> Array:
     return np.where(q[..., :1] < 0, -q, q)
+
+
+def dot(first: Array, second: Array) -> Array:
+    """Products (...) of vectors (..., K)."""
+    return np.asarray(np.einsum("...k,...k->...", first, second))
+
+
+def norm(vectors: Array) -> Array:
+    """Lengths (...) of vectors (..., K)."""
+    return np.asarray(np.sqrt(dot(vectors, vectors)))
+
+
+def aside_of(directions: Array) -> Array:
+    """Vectors (M, 2) a quarter turn to the left of others (M, 2)."""
+    return np.column_stack([-directions[:, 1], directions[:, 0]])

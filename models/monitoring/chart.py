@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.errors import CheckpointError
 from models.geometry.rotation import Array
 from models.monitoring.config import (
     FEWEST_GROUPS,
@@ -28,7 +29,7 @@ from models.monitoring.config import (
     SUSPICION,
 )
 from models.monitoring.group_scores import GroupScores
-from models.serialization import stored_as
+from models.serialization import Format, flattened, from_bytes, restored, stored_as, to_bytes
 from models.walking.speed_reference import SpeedReference
 
 CLOCK = 4  # beside the four of a pose: times that are too long
@@ -270,3 +271,25 @@ def _unsure(walking_groups: float, scores: int) -> float:
     """Factor by which a covariance of so few walking groups makes ratios too large, on average."""
     freedom = walking_groups - 1
     return float(min(freedom / max(freedom - scores - 1, freedom / 3), 3.0))
+
+
+_CHART = Format(name="chart", version=1)
+
+
+def chart_to_bytes(chart: DriftChart) -> bytes:
+    """A chart as it is stored."""
+    return to_bytes(_CHART, flattened(chart))
+
+
+def chart_from_bytes(data: bytes) -> DriftChart:
+    """The chart of `chart_to_bytes`.
+
+    Raises:
+        CheckpointError: the bytes are no chart of this format, or of another grid of offsets.
+    """
+    chart = restored(DriftChart, from_bytes(_CHART, data))
+    if chart.responses.shape[1] != len(OFFSET_GRID):
+        raise CheckpointError(
+            f"responses: {len(OFFSET_GRID)} offsets are needed, got {chart.responses.shape[1]}"
+        )
+    return chart

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import (
     OFFSET_GRID,
@@ -26,11 +26,10 @@ from models.monitoring.config import (
 from models.monitoring.group_scores import SCORES, Usual, scores_at
 from models.paths.folds import Fold, Folds
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of
-from models.paths.turn_detection import groups_in_time
+from models.paths.path_tests import groups_in_time
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks.observations import Observations, check_in_time, of_tracks
-from models.walking.reference.learning import relearned
+from models.walking.reference_learning import relearned
 from models.walking.speed_reference import SpeedReference
 
 
@@ -128,7 +127,7 @@ def _fold_scores(
         theirs = np.flatnonzero(np.isin(group_idx, group_idx[last[some]]))
         few = of_tracks(seen, theirs)
         # Who walks with whom hangs on who else is there: the groups stay what they were.
-        walkers = replace(walkers_of(few, candidate_of(prior)), group_idx=group_idx[theirs])
+        walkers = replace(walkers_of(few, array_of(prior)), group_idx=group_idx[theirs])
         # A camera that has moved on sees people as one that stays would from a little back.
         moves = [(np.zeros(4), 1.0), *((-offset.step, offset.stretch) for offset in OFFSET_GRID)]
         answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])

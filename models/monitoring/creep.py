@@ -2,12 +2,16 @@
 
 A map that grows takes a slow turn along with it, and no window of some days is long enough to see
 it. So the first chart of a site, with the map and the speeds of its reference, stays, and each day
-of people is held against it once (`creep_log`). From those of weeks in a row comes the largest
-standard score of any turn that grew evenly from some week on, or from the reference on, or that has
-been the same ever since: a generalised likelihood ratio test for a ramp, with three things in its
-noise that no number of people makes smaller. The reference is of few people, and wrong by the same
-on all days. Habits change where people walk and how fast, by the season (slowly) and by the day.
-Height and pace are such habits: no camera is said to sink.
+of people is held against it once. From those of weeks in a row comes the largest standard score of
+any turn that grew evenly from some week on, or from the reference on, or that has been the same
+ever since: a generalised likelihood ratio test for a ramp, with three things in its noise that no
+number of people makes smaller. The reference is of few people, and wrong by the same on all days.
+Habits change where people walk and how fast, by the season (slowly) and by the day. Height and pace
+are such habits: no camera is said to sink.
+
+What is kept of a day is its people's pull on tilt, roll, log height, heading and the log of times:
+their scores, weighed by how each of these would change them (the sufficient statistic of a small
+move, if scores scatter alike every day).
 
 It is an alarm of its own, with a share of its own in the false ones that are allowed; whatever
 grows or slides elsewhere moves nothing of it. Only a new reference does.
@@ -16,15 +20,139 @@ Source: Basseville and Nikiforov, "Detection of Abrupt Changes" (1993), section 
 test with an unknown start; the ramp in the place of a jump is ours.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
+from models.durations import DAY_S
 from models.geometry.rotation import Array
-from models.monitoring.chart import TestStatistic
-from models.monitoring.config import CREEP_DAYS, CREEP_RAD, CREEP_TESTS, CREEPING_SHARE
-from models.monitoring.creep_log import NUMBERS, CreepLog, noise_of, weeks_of
+from models.monitoring.chart import DriftChart, TestStatistic, slope_of
+from models.monitoring.config import (
+    BLOCK_DAYS,
+    CREEP_DAYS,
+    CREEP_RAD,
+    CREEP_TESTS,
+    CREEPING_SHARE,
+    FEWEST_LOGGED,
+    FREE_RAD,
+    HABITS_OF_DAYS,
+    MOST_BLOCKS,
+    OTHER_PEOPLE,
+    SEASON_DAYS,
+)
+from models.monitoring.group_scores import GroupScores
 from models.quantiles import value_below
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes
+
+NUMBERS = 5  # tilt, roll, log height, heading, log of times
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CreepLog:
+    """Sums of the scores of days (D,) of people, against the first map and speeds of a reference.
+
+    `day_idx` counts days from the epoch, `groups` are how many came, `pulls` (D, 5) what they
+    add up to. `information` (5, 5) is that of a group, and `reference_groups` made the chart,
+    the last of them on the day `since_day`.
+    """
+
+    day_idx: npt.NDArray[np.int64]
+    groups: Array
+    pulls: Array
+    information: Array
+    reference_groups: float
+    since_day: float
+
+
+def begin_log(chart: DriftChart, to_s: float) -> CreepLog:
+    """The log of a chart whose last people came at a time, without a day."""
+    slopes = _slopes(chart)
+    return CreepLog(
+        day_idx=np.zeros(0, dtype=np.int64),
+        groups=np.zeros(0),
+        pulls=np.zeros((0, NUMBERS)),
+        information=slopes.T @ np.linalg.solve(chart.covariance, slopes),
+        reference_groups=chart.walking_groups,
+        since_day=to_s / DAY_S,
+    )
+
+
+def add_day(log: CreepLog, chart: DriftChart, day: int, scores: GroupScores) -> CreepLog:
+    """The log with a day that it does not know yet, and what its groups say of it.
+
+    Args:
+        log: of the same chart.
+        chart: the first of the site.
+        day: from the epoch.
+        scores: of the groups, by the first map and speeds.
+    """
+    apart = (chart.bounded(scores.values) - chart.mean).sum(axis=0)
+    pull = np.linalg.solve(chart.covariance, _slopes(chart)).T @ apart
+    at = int(np.searchsorted(log.day_idx, day))
+    return replace(
+        log,
+        day_idx=np.insert(log.day_idx, at, day),
+        groups=np.insert(log.groups, at, len(scores.values)),
+        pulls=np.insert(log.pulls, at, pull, axis=0),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weeks:
+    """Weeks (B,), each with its people's mean move (B, 5); the newest ends with the last day."""
+
+    groups: Array
+    days: Array
+    first_day: Array
+    middle_day: Array
+    moves: Array
+    last_day: float
+
+
+def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
+    """The newest weeks since a time, the newest first; None of too few people."""
+    from_day = -np.inf if from_s is None else np.ceil(from_s / DAY_S)
+    kept = (log.day_idx >= from_day) & (log.groups > 0)
+    if log.groups[kept].sum() < FEWEST_LOGGED:
+        return None
+    day_idx, groups = log.day_idx[kept], log.groups[kept]
+    ago, week = np.unique((day_idx[-1] - day_idx) // BLOCK_DAYS, return_inverse=True)
+    people = np.bincount(week, groups)
+    pulls = np.zeros((ago.size, NUMBERS))
+    np.add.at(pulls, week, log.pulls[kept])
+    first = np.full(ago.size, np.inf)
+    np.minimum.at(first, week, day_idx.astype(np.float64))
+    newest = slice(0, MOST_BLOCKS)
+    moves = np.linalg.solve(_group_information(log), (pulls / people[:, None]).T)
+    return Weeks(
+        groups=np.asarray(people[newest], dtype=np.float64),
+        days=np.bincount(week)[newest].astype(np.float64),
+        first_day=first[newest],
+        middle_day=(np.bincount(week, groups * (day_idx + 0.5)) / people)[newest],
+        moves=np.asarray(moves.T[newest], dtype=np.float64),
+        last_day=float(day_idx[-1] + 1),
+    )
+
+
+def noise_of(log: CreepLog, weeks: Weeks) -> Array:
+    """The covariance (5 B, 5 B) of the weeks' mean moves if the camera stands."""
+    person = np.linalg.inv(_group_information(log))
+    apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
+    people = np.diag(1 / weeks.groups) + OTHER_PEOPLE / log.reference_groups
+    habits = np.exp(-apart / SEASON_DAYS) + np.diag(1 / weeks.days)
+    return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS_OF_DAYS**2)))
+
+
+def _group_information(log: CreepLog) -> Array:
+    """Information of a group (5, 5), none of it so small that it cannot be inverted."""
+    return np.asarray(log.information + np.eye(NUMBERS) / FREE_RAD**2)
+
+
+def _slopes(chart: DriftChart) -> Array:
+    """Change of the mean scores (14, 5) with each parameter, by its smallest offsets."""
+    return np.stack([slope_of(chart, number) for number in range(NUMBERS)], axis=1)
+
 
 ANGLES = (0, 1, 3)  # tilt, roll and heading creep
 
@@ -142,3 +270,20 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     probability = odds / (1 + odds.sum())
     turns[:, ANGLES] = ((probability * size) @ scores.ramps.at(np.asarray(days))).T
     return turns
+
+
+_CREEP_LOG = Format(name="creep", version=1)
+
+
+def creep_log_to_bytes(log: CreepLog) -> bytes:
+    """A log as it is stored."""
+    return to_bytes(_CREEP_LOG, flattened(log))
+
+
+def creep_log_from_bytes(data: bytes) -> CreepLog:
+    """The log of `creep_log_to_bytes`.
+
+    Raises:
+        CheckpointError: the bytes are no log of this format.
+    """
+    return restored(CreepLog, from_bytes(_CREEP_LOG, data))

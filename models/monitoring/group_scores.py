@@ -14,16 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of, plane_parameters_of
 from models.geometry.rotation import Array
 from models.monitoring.config import LARGEST_RESIDUAL, PACE_SD, STATURE_SD, STEP_SHARES
 from models.paths.config import REACH
 from models.paths.likelihood import PathModel, Walkers, walkers_of
-from models.paths.reference import candidate_of
-from models.paths.turn_detection import along_paths, groups_in_time, sums_of_groups
+from models.paths.path_tests import along_paths, groups_in_time, sums_of_groups
 from models.tracks.observations import Observations, Steps, check_in_time
-from models.walking.fit import Learned, per_track
+from models.walking.field import Learned
+from models.walking.fit import per_track
 from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.speed_reference import SpeedReference, channels_of
 
@@ -58,7 +57,7 @@ def score_groups(
     """
     check_in_time(observations)
     if walkers is None:
-        walkers = walkers_of(observations, candidate_of(usual.prior))
+        walkers = walkers_of(observations, array_of(usual.prior))
     _, _, last = groups_in_time(walkers)
     return GroupScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
 
@@ -74,7 +73,7 @@ def scores_at(
 
     By a clock whose times are longer by a factor, everybody is as much slower.
     """
-    at = candidate_of(usual.prior) + beside
+    at = array_of(usual.prior) + beside
     if not walkers.people:
         return np.zeros((0, SCORES))
     parameters = plane_parameters_of(usual.prior) + beside[:3]

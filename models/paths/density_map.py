@@ -1,34 +1,186 @@
 """The path density map: how often people are where, and which way they walk, on a grid.
 
-Log densities are rounded to 1/64, so that they are the same offline as they are stored.
-
-Source: Silverman 1982, a kernel density by binning; von Mises kernels over directions are Hall,
-Watson and Cabrera's, 1987.
+Log densities are rounded to 1/64, so that they are the same offline as they are stored. Between
+nodes, loops read them with slopes. Places are in metres from the camera's foot point, directions in
+radians from +X towards +Y.
 """
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from models.compiled import compiled
 from models.durations import DAY_S
 from models.geometry.rotation import Array
 from models.paths import config
-from models.paths.density_grid import Grid, log_densities_at, unseen_at_places
-from models.paths.ground_steps import Placement
+
+Four = tuple[float, float, float, float]
+
+_TURNS_PER_RAD = 1 / (2 * math.pi)
+_LAST = 1.001  # nodes: on the last one a place has no cell any more
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bandwidths:
-    """Of a map: the Gaussian's over places, the von Mises kernel's over directions, the day's.
+class Grid(NamedTuple):
+    """A map's `log_density` (S, X, Y, W), `unseen` (X, Y), `corner` (2,) and the rest."""
 
-    `slots` is the number of equal parts of the day.
+    log_density: Array
+    unseen: Array
+    corner: Array
+    nodes_per_m: float
+    elsewhere: float
+
+
+class Cell(NamedTuple):
+    """The node before a place, how far beyond it that is, and whether it is in the grid."""
+
+    column: int
+    row: int
+    x: float
+    y: float
+    inside: bool
+
+
+class Blend(NamedTuple):
+    """A value between nodes, and its slopes by place (1/m)."""
+
+    value: float
+    by_x: float
+    by_y: float
+
+
+class LogDensity(NamedTuple):
+    """A log density, and its slopes by place (1/m) and direction (1/rad)."""
+
+    value: float
+    by_x: float
+    by_y: float
+    by_direction: float
+
+
+@compiled
+def _cell_at(grid: Grid, x_m: float, y_m: float) -> Cell:
+    """The cell of a place."""
+    columns, rows = grid.unseen.shape
+    x = (x_m - grid.corner[0]) * grid.nodes_per_m
+    y = (y_m - grid.corner[1]) * grid.nodes_per_m
+    if 0 <= x < columns - _LAST and 0 <= y < rows - _LAST:
+        column, row = int(x), int(y)
+        return Cell(column, row, x - column, y - row, True)
+    return Cell(0, 0, 0.5, 0.5, False)
+
+
+@compiled
+def _blended(
+    cell: Cell, nodes_per_m: float, first: float, second: float, third: float, fourth: float
+) -> Blend:
+    """Between the values at a cell's corners (0, 0), (0, 1), (1, 0), (1, 1)."""
+    left, right = second - first, fourth - third
+    low, high = first + left * cell.y, third + right * cell.y
+    across = high - low
+    return Blend(
+        low + across * cell.x, across * nodes_per_m, (left + (right - left) * cell.x) * nodes_per_m
+    )
+
+
+@compiled
+def unseen_at(grid: Grid, x_m: float, y_m: float) -> Blend:
+    """The part of the ground at a place that was not seen; 0 outside of the grid."""
+    cell = _cell_at(grid, x_m, y_m)
+    if not cell.inside:
+        return Blend(0.0, 0.0, 0.0)
+    unseen, column, row = grid.unseen, cell.column, cell.row
+    return _blended(
+        cell,
+        grid.nodes_per_m,
+        unseen[column, row],
+        unseen[column, row + 1],
+        unseen[column + 1, row],
+        unseen[column + 1, row + 1],
+    )
+
+
+@compiled
+def _cubic(part: float) -> tuple[Four, Four]:
+    """Shares of four directions in a row, a part of the way from the second to the third.
+
+    With their slopes. Between straight lines a path's direction would be where a node is.
+    Source: Catmull and Rom 1974, cubic splines through nodes.
     """
+    squared, cubed = part * part, part * part * part
+    shares = (
+        (2 * squared - part - cubed) / 2,
+        (2 - 5 * squared + 3 * cubed) / 2,
+        (part + 4 * squared - 3 * cubed) / 2,
+        (cubed - squared) / 2,
+    )
+    slopes = (
+        (4 * part - 1 - 3 * squared) / 2,
+        (9 * squared - 10 * part) / 2,
+        (1 + 8 * part - 9 * squared) / 2,
+        (3 * squared - 2 * part) / 2,
+    )
+    return shares, slopes
 
-    place_m: float
-    direction_kappa: float
-    slots: int = 1
+
+@compiled
+def log_density_at(grid: Grid, slot: int, x_m: float, y_m: float, direction: float) -> LogDensity:
+    """The log density at a place and direction in a part of the day."""
+    cell = _cell_at(grid, x_m, y_m)
+    if not cell.inside:
+        return LogDensity(grid.elsewhere, 0.0, 0.0, 0.0)
+    nodes, column, row = grid.log_density, cell.column, cell.row
+    directions = nodes.shape[3]
+    turns = direction * _TURNS_PER_RAD
+    turn = (turns - math.floor(turns)) * directions
+    way = int(turn)
+    shares, slopes = _cubic(turn - way)
+    value_0 = value_1 = value_2 = value_3 = 0.0
+    turning_0 = turning_1 = turning_2 = turning_3 = 0.0
+    for number in range(4):
+        node = way + number - 1
+        if node < 0:
+            node += directions
+        elif node >= directions:
+            node -= directions
+        share, slope = shares[number], slopes[number]
+        node_0, node_1 = nodes[slot, column, row, node], nodes[slot, column, row + 1, node]
+        node_2, node_3 = nodes[slot, column + 1, row, node], nodes[slot, column + 1, row + 1, node]
+        value_0, turning_0 = value_0 + share * node_0, turning_0 + slope * node_0
+        value_1, turning_1 = value_1 + share * node_1, turning_1 + slope * node_1
+        value_2, turning_2 = value_2 + share * node_2, turning_2 + slope * node_2
+        value_3, turning_3 = value_3 + share * node_3, turning_3 + slope * node_3
+    at = _blended(cell, grid.nodes_per_m, value_0, value_1, value_2, value_3)
+    turning = _blended(cell, grid.nodes_per_m, turning_0, turning_1, turning_2, turning_3)
+    return LogDensity(at.value, at.by_x, at.by_y, turning.value * directions * _TURNS_PER_RAD)
+
+
+@compiled
+def log_densities_at(
+    grid: Grid, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
+) -> tuple[Array, Array, Array]:
+    """Log densities (M,) at places (M, 2), with slopes by place (M, 2) and direction (M,)."""
+    count = len(place)
+    value, by_place, by_direction = np.empty(count), np.empty((count, 2)), np.empty(count)
+    for number in range(count):
+        x_m, y_m = place[number, 0], place[number, 1]
+        found = log_density_at(grid, slot_idx[number], x_m, y_m, direction[number])
+        value[number], by_direction[number] = found.value, found.by_direction
+        by_place[number, 0], by_place[number, 1] = found.by_x, found.by_y
+    return value, by_place, by_direction
+
+
+@compiled
+def unseen_at_places(grid: Grid, place: Array) -> tuple[Array, Array]:
+    """The part (M,) of the ground at places (M, 2) that was not seen, and its slopes (M, 2)."""
+    value, by_place = np.empty(len(place)), np.empty((len(place), 2))
+    for number in range(len(place)):
+        unseen = unseen_at(grid, place[number, 0], place[number, 1])
+        value[number] = unseen.value
+        by_place[number, 0], by_place[number, 1] = unseen.by_x, unseen.by_y
+    return value, by_place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,97 +248,6 @@ def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
     if slots == 1:
         return np.zeros(time_s.shape, dtype=np.int64)
     return np.floor(time_s % DAY_S / DAY_S * slots).astype(np.int64) % slots
-
-
-def learn_map(
-    placed: Placement,
-    weight: Array,
-    time_s: Array,
-    seen_at: Callable[[Array], Array],
-    bandwidths: Bandwidths,
-) -> PathDensityMap:
-    """The map of steps seen from a known pose, each counted by its weight (M,).
-
-    Args:
-        placed: the steps on the ground.
-        weight: those of a person add up to how much that person counts.
-        time_s: when each step was (M,).
-        seen_at: which part (N,) of the ground around places (N, 2) that pose sees.
-        bandwidths: of its kernels.
-
-    Raises:
-        ValueError: no step counts.
-    """
-    used = placed.valid & (weight > 0)
-    if not used.any():
-        raise ValueError("steps: at least one must count, got none")
-    place, direction, weight = placed.place[used], placed.direction[used], weight[used]
-    low, high = (np.quantile(place, q, axis=0) for q in (config.QUANTILE, 1 - config.QUANTILE))
-    low, high = low - config.MARGIN_M, high + config.MARGIN_M
-    cell_m = max(config.CELL_M, float((high - low).max()) / (config.MOST_CELLS - 2))
-    size = np.ceil((high - low) / cell_m).astype(np.int64) + 2
-    at = (place - low) / cell_m
-    slots, sd = bandwidths.slots, bandwidths.place_m / cell_m
-    slot_idx = slot_of(time_s[used], slots)
-    counts = np.stack(
-        [
-            _smoothed(_binned(at[own], direction[own], weight[own], size), bandwidths, cell_m)
-            for own in (slot_idx == slot for slot in range(slots))
-        ]
-    )
-    whole = counts.sum(axis=0)
-    if slots > 1:
-        counts = counts + config.SLOT_PEOPLE * whole / whole.sum()
-    counts = counts / counts.sum(axis=(1, 2, 3), keepdims=True)
-    counts = (1 - config.ANY_WAY) * counts + config.ANY_WAY * counts.mean(axis=3, keepdims=True)
-    share = counts * (1 - config.ANYWHERE) + config.ANYWHERE / whole.size
-    nodes = low + cell_m * np.indices(tuple(size.tolist())).reshape(2, -1).T
-    seen = seen_at(nodes).reshape(size)
-    node = cell_m**2 * 2 * np.pi / config.DIRECTIONS
-    return PathDensityMap(
-        corner=low,
-        cell_m=cell_m,
-        log_density=of_levels(to_levels(np.log(share / node))),
-        elsewhere=float(np.log(config.ANYWHERE / whole.size / node)),
-        unseen=np.rint((1 - seen) * 255) / 255,
-        log_level=float(-np.log(max(seen.sum(), 1.0) * config.DIRECTIONS * node)),
-        log_typical=float((share * np.log(share / node)).sum() / slots) - config.UNSEEN_COST,
-        people=(whole.sum(axis=2) * 2 * np.pi * sd**2).astype(np.float32),
-    )
-
-
-def _binned(at: Array, direction: Array, weight: Array, size: npt.NDArray[np.int64]) -> Array:
-    """Weights spread linearly over the nodes (X, Y, 16) around each step."""
-    turn = (direction % (2 * np.pi)) / (2 * np.pi) * config.DIRECTIONS
-    at = np.clip(at, 0, size - 1.001)
-    first, way = np.floor(at).astype(np.int64), np.floor(turn).astype(np.int64)
-    parts = np.concatenate([at - first, (turn - way)[:, None]], axis=1)
-    counts = np.zeros((*size, config.DIRECTIONS))
-    for corner in np.ndindex(2, 2, 2):
-        share = np.where(np.array(corner) == 1, parts, 1 - parts).prod(axis=1)
-        turned = (way + corner[2]) % config.DIRECTIONS
-        node = (first[:, 0] + corner[0], first[:, 1] + corner[1], turned)
-        np.add.at(counts, node, weight * share)
-    return counts
-
-
-def _smoothed(counts: Array, bandwidths: Bandwidths, cell_m: float) -> Array:
-    """Counts (X, Y, 16) smoothed by a Gaussian over places and a von Mises over directions."""
-    from scipy.linalg import circulant  # late: the HTTP process has no use for it
-
-    sd = bandwidths.place_m / cell_m
-    along = [circulant(_gaussian(length, sd)) for length in counts.shape[:2]]
-    angles = np.arange(config.DIRECTIONS) * 2 * np.pi / config.DIRECTIONS
-    kernel = np.exp(bandwidths.direction_kappa * (np.cos(angles) - 1))
-    # Products of matrices, one for each axis, take a quarter of the time of Fourier transforms.
-    smooth = along[1] @ np.tensordot(along[0], counts, axes=1)
-    return np.asarray(np.clip(smooth @ circulant(kernel / kernel.sum()), 0.0, None))
-
-
-def _gaussian(length: int, sd: float) -> Array:
-    """Weights (length,) of nodes so many away, around the grid, by their Fourier transform."""
-    rates = 2 * np.pi * np.fft.fftfreq(length)
-    return np.asarray(np.fft.ifft(np.exp(-0.5 * (sd * rates) ** 2)).real)
 
 
 def to_levels(log_density: Array) -> npt.NDArray[np.int16]:

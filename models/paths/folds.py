@@ -12,12 +12,10 @@ import numpy.typing as npt
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.paths import config
-from models.paths.density_map import Bandwidths
 from models.paths.likelihood import PathModel, Walkers, walkers_of
-from models.paths.map_learning import best_bandwidths, path_model_of
-from models.paths.path_test import group_fits
+from models.paths.map_learning import Bandwidths, best_bandwidths, path_model_of
+from models.paths.path_tests import group_fits, group_scores, sums_of_groups
 from models.paths.registration import shape_at
-from models.paths.turn_detection import group_scores, sums_of_groups
 from models.tracks.observations import Observations, of_tracks
 
 Index = npt.NDArray[np.int64]

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.compiled import compiled
-from models.geometry.ground_flow import ground_flow
-from models.geometry.landing import landing
+from models.geometry.ground import ground_flow, landing
 from models.geometry.rotation import Array, Mask, rotation_from_angles
 from models.tracks.observations import Steps
 

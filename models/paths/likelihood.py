@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.ground import rotation_and_turns
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, rotation_from_angles
 from models.paths import config

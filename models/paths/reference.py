@@ -8,19 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.errors import CheckpointError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import array_of
+from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.paths import config
-from models.paths.coverage import Coverage
-from models.paths.density_map import PathDensityMap
+from models.paths.coverage import Coverage, coverage_of
+from models.paths.density_map import PathDensityMap, of_levels, to_levels
 from models.paths.folds import ChosenBandwidths, CrossFit, Folds, cross_fit, fold_maps
 from models.paths.likelihood import PathModel, walkers_of
 from models.paths.map_learning import path_model_of
-from models.paths.path_test import UsualFit, usual_fit
+from models.paths.path_tests import StillScores, UsualFit, learn_scores, usual_fit
 from models.paths.registration import Shape
-from models.paths.turn_detection import StillScores, learn_scores
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes, under
 from models.tracks.observations import Observations
 
 
@@ -78,11 +78,6 @@ class PathReference:
         return np.asarray(shape.curvature @ np.linalg.solve(scatter, shape.curvature))
 
 
-def candidate_of(pose: CameraPose) -> Array:
-    """Tilt, roll, log height, heading (4,) of a pose."""
-    return array_of(pose)
-
-
 def learn_paths(
     observations: Observations,
     intrinsics: Intrinsics,
@@ -106,7 +101,7 @@ def learn_paths(
         weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
         folds: of the same tracks and seed, where they have been made already.
     """
-    at = candidate_of(prior)
+    at = array_of(prior)
     if folds is None:
         folds = fold_maps(observations, intrinsics, at, seed, weights)
     if folds is None:
@@ -150,3 +145,32 @@ def _scatter(crossed: CrossFit) -> tuple[float, Array]:
     found = float((sums**2).mean() / config.RUN)
     weight = runs / (runs + config.ASSUMED_INFLATION_WEIGHT)
     return max(1.0, weight * found + (1 - weight) * config.ASSUMED_INFLATION), scatter
+
+
+_FORMAT = Format(name="paths", version=1)
+
+
+def paths_to_bytes(reference: PathReference) -> bytes:
+    """A reference as it is stored."""
+    values = flattened(reference)
+    for name in flattened(reference.coverage, "coverage."):
+        del values[name]  # made anew of the map
+    values["density.log_density"] = to_levels(reference.density.log_density)
+    values["density.unseen"] = np.rint(reference.density.unseen * 255).astype(np.uint8)
+    return to_bytes(_FORMAT, values)
+
+
+def paths_from_bytes(data: bytes) -> PathReference:
+    """The reference of `paths_to_bytes`.
+
+    Raises:
+        CheckpointError: the bytes are no paths of this format.
+    """
+    values = from_bytes(_FORMAT, data)
+    try:
+        values["density.log_density"] = of_levels(values["density.log_density"])
+        values["density.unseen"] = values["density.unseen"] / 255
+    except KeyError as error:
+        raise CheckpointError(f"paths: {error} is missing") from error
+    density = restored(PathDensityMap, under(values, "density"))
+    return restored(PathReference, values, coverage=coverage_of(density))

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.landing import landing
+from models.geometry.ground import landing
 from models.geometry.rotation import Array, Mask
 from models.paths.config import NO_GROUND
-from models.paths.density_grid import Grid, LogDensity, log_density_at, unseen_at
+from models.paths.density_map import Grid, LogDensity, log_density_at, unseen_at
 from models.paths.ground_steps import Slope, log_ratio_of, slope_of, step_on_ground
 
 Index = npt.NDArray[np.int64]

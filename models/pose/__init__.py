@@ -6,16 +6,30 @@ All that these three take and give can be imported from here.
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep, creep_result
-from models.monitoring.creep_log import CreepLog
+from models.monitoring.creep import Creep, CreepLog, creep_result
 from models.monitoring.verdict import Drift, DriftLimits
-from models.pose.alarms import AlarmRate, alarm_chart_result
-from models.pose.anchoring import begin_creep_log, log_creep, without_creep
-from models.pose.estimating import PoseFinding, SecondLook, drift_of, estimate_pose
-from models.pose.learning import assume_site, learn_site
-from models.pose.partial_failures import PartialFailure
-from models.pose.site import CameraSite
-from models.pose.warm_start import WarmStart, warm_start_from_bytes, warm_start_to_bytes
+from models.pose.alarms import (
+    AlarmRate,
+    alarm_chart_result,
+    begin_creep_log,
+    log_creep,
+    without_creep,
+)
+from models.pose.estimating import (
+    PartialFailure,
+    PoseFinding,
+    SecondLook,
+    drift_of,
+    estimate_pose,
+    unless_failed,
+)
+from models.pose.pose_fit import (
+    FusedEstimate,
+    WarmStart,
+    warm_start_from_bytes,
+    warm_start_to_bytes,
+)
+from models.pose.site import CameraSite, assume_site, learn_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -30,6 +44,7 @@ __all__ = [
     "CreepLog",
     "Drift",
     "DriftLimits",
+    "FusedEstimate",
     "Intrinsics",
     "Observations",
     "PartialFailure",
@@ -54,5 +69,6 @@ __all__ = [
     "creep_result",
     "warm_start_from_bytes",
     "warm_start_to_bytes",
+    "unless_failed",
     "without_creep",
 ]

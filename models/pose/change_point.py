@@ -1,16 +1,26 @@
-"""The change point by speeds: the best place to cut a window in two poses."""
+"""The change point by speeds, the best place to cut a window in two poses, and a second look at it.
+
+Are there two poses beyond doubt, and how sure is the later one?
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import (
+    PARAMETERS,
+    PLANE_PARAMETERS,
+    CameraPose,
+    identifiable_of,
+    plane_parameters_of,
+)
 from models.geometry.rotation import Array
-from models.pose.config import CHANGE_BY_CHANCE, CLEARLY_BELOW, CUT_ROUNDS, FEWEST_BESIDE
-from models.quantiles import chi_squared_above
+from models.paths.reference import PathReference
+from models.pose import config
+from models.pose.pose_fit import FusedEstimate
+from models.quantiles import chi_squared_above, f_above
 from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.fit import (
     Channel,
@@ -20,7 +30,7 @@ from models.walking.fit import (
     per_track,
     track_log_likelihoods,
 )
-from models.walking.speed_reference import SpeedReference, channels_of, pose_prior
+from models.walking.speed_reference import SpeedReference, channels_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,12 +65,12 @@ def find_change(
         ShapeError: tracks that are not in the order of their ends.
     """
     check_in_time(observations)
-    if observations.tracks < 2 * FEWEST_BESIDE:
+    if observations.tracks < 2 * config.FEWEST_BESIDE:
         return None
     start = FitStart(candidate=plane_parameters_of(prior) + reference.offset)
     if warm_start is not None:
         about = _likeliest(observations, prior, reference, warm_start)
-        if about.excess < CLEARLY_BELOW:
+        if about.excess < config.CLEARLY_BELOW:
             return None
     found = _likeliest(observations, prior, reference, start)
     return found if found.excess > 1 else None
@@ -73,7 +83,7 @@ def _likeliest(
     channels = channels_of(observations, reference, prior)
     cut = _first_cut(channels, prior, reference, start)
     before = after = None
-    for _ in range(CUT_ROUNDS):
+    for _ in range(config.CUT_ROUNDS):
         before = _fit(observations, np.arange(cut), prior, reference, start)
         after = _fit(observations, np.arange(cut, observations.tracks), prior, reference, start)
         gain = track_log_likelihoods(channels, after.candidate) - track_log_likelihoods(
@@ -87,7 +97,7 @@ def _likeliest(
     assert after is not None
     apart = after.candidate - before.candidate
     covariance = (before.covariance + after.covariance) * reference.pose_variance_inflation
-    limit = chi_squared_above(CHANGE_BY_CHANCE, 3)
+    limit = chi_squared_above(config.CHANGE_BY_CHANCE, 3)
     excess = float(apart @ np.linalg.solve(covariance, apart)) / limit
     return ChangePoint(track_idx=cut, excess=excess)
 
@@ -101,10 +111,10 @@ def suspicion(
     small move, and a tenth of the time of `find_change`. Large moves it makes smaller than they
     are, to a quarter of the excess.
     """
-    if observations.tracks < 2 * FEWEST_BESIDE:
+    if observations.tracks < 2 * config.FEWEST_BESIDE:
         return 0.0
     ratio = _ratios_at(channels_of(observations, reference, prior), at)
-    limit = chi_squared_above(CHANGE_BY_CHANCE, 3) * reference.pose_variance_inflation
+    limit = chi_squared_above(config.CHANGE_BY_CHANCE, 3) * reference.pose_variance_inflation
     return float(ratio[_best_cut(ratio)]) / limit
 
 
@@ -118,8 +128,8 @@ def _first_cut(
     at_prior = plane_parameters_of(prior) + reference.offset
     whole = start.candidate
     if not start.warm:
-        whole = fit_pose(channels, start, pose_prior(prior)).candidate
-    best, place = -np.inf, FEWEST_BESIDE
+        whole = fit_pose(channels, start, prior).candidate
+    best, place = -np.inf, config.FEWEST_BESIDE
     for candidate in (at_prior, whole):
         ratio = _ratios_at(channels, candidate)
         cut = _best_cut(ratio)
@@ -150,8 +160,8 @@ def _ratios_at(channels: Sequence[Channel], candidate: Array) -> Array:
 
 def _best_cut(gain: Array) -> int:
     """The place of the highest gain (N,) that leaves enough tracks on both sides."""
-    allowed = gain[FEWEST_BESIDE : len(gain) - FEWEST_BESIDE + 1]
-    return FEWEST_BESIDE + int(np.argmax(allowed))
+    allowed = gain[config.FEWEST_BESIDE : len(gain) - config.FEWEST_BESIDE + 1]
+    return config.FEWEST_BESIDE + int(np.argmax(allowed))
 
 
 def _fit(
@@ -162,4 +172,91 @@ def _fit(
     start: FitStart,
 ) -> Fit:
     channels = channels_of(of_tracks(observations, chosen), reference, prior)
-    return fit_pose(channels, start, pose_prior(prior))
+    return fit_pose(channels, start, prior)
+
+
+def moved_beyond_doubt(
+    before: FusedEstimate, groups_before: int, after: FusedEstimate, groups_after: int
+) -> bool:
+    """True if a camera has moved from one estimate to the other.
+
+    Neither chance may have made them so different nor, whoever walked, people's habits. Of few
+    groups a covariance is not well known, and chance goes farther. A heading that is not
+    identifiable counts for as little as is known of it. There must have been a pose to move from,
+    and what has moved the farthest by its standard deviation must be identifiable where it is now:
+    the rest may be left open by the few who came since, as the prior's, and is better so than by
+    those of before.
+
+    Source: Hotelling 1931, T squared, by the freedom of the smaller part; with habits, whose
+    variance is given, a chi square.
+    """
+    groups = min(groups_before, groups_after)
+    posed = set(PLANE_PARAMETERS) <= set(before.identifiable)
+    if groups < config.GROUPS_OF_A_COVARIANCE or not posed:
+        return False
+    offset = after.values - before.values
+    chance = before.covariance + after.covariance
+    habits = chance + 2 * np.diag(config.HABITS)
+    farthest = PARAMETERS[int(np.argmax(offset**2 / np.diag(habits)))]
+    if farthest not in set(before.identifiable) & set(after.identifiable):
+        return False
+    parameters, freedom = len(PARAMETERS), groups - len(PARAMETERS)
+    highest = f_above(config.MOVED_BY_CHANCE, parameters, freedom)
+    limit = parameters * (groups - 1) / freedom * highest
+    beyond_chance = float(offset @ np.linalg.solve(chance, offset)) > limit
+    beyond_habit = float(offset @ np.linalg.solve(habits, offset)) > chi_squared_above(
+        config.MOVED_BY_HABIT, parameters
+    )
+    return beyond_chance and beyond_habit
+
+
+def widened(
+    before: FusedEstimate,
+    after: FusedEstimate,
+    walking_groups: int,
+    speed_reference: SpeedReference,
+    paths: PathReference | None,
+) -> FusedEstimate:
+    """The estimate after a change with the covariance that it deserves.
+
+    The cut is where it suits the tracks best. One group on its wrong side would move the pose by
+    the way between the two poses over the number of groups. And no parameter is surer than so many
+    people can make it: few of them, who walk alike, may seem to agree.
+
+    Args:
+        before: of the tracks before the change.
+        after: of those after it.
+        walking_groups: that walk after it.
+        speed_reference: how people walk at the site.
+        paths: where they do, if that is known.
+    """
+    offset = (after.values - before.values) / max(walking_groups, 1)
+    floor = least_covariance(walking_groups, speed_reference, paths)
+    covariance = _at_least(after.covariance + np.outer(offset, offset), floor)
+    determined = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
+    return replace(
+        after,
+        covariance=covariance,
+        identifiable=tuple(name for name in after.identifiable if name in determined),
+    )
+
+
+def least_covariance(
+    walking_groups: int, speed_reference: SpeedReference, paths: PathReference | None
+) -> Array:
+    """The covariance (4, 4) that none of so many groups is below, by the reference's own."""
+    information = np.diag([0.0, 0.0, 0.0, config.HEADING_SD**-2])
+    information[:3, :3] = speed_reference.information_of_a_track * walking_groups
+    if paths is not None:
+        information = information + paths.still.information_of_a_group * walking_groups
+    floor = 1e-9 * np.trace(information) * np.eye(4)  # what nobody shows is not below anything
+    return np.asarray(np.linalg.inv(information + floor)) / config.BETTER_VIEW**2
+
+
+def _at_least(covariance: Array, floor: Array) -> Array:
+    """A covariance (4, 4) whose every direction is at least as wide as the floor's."""
+    lower = np.linalg.cholesky(floor)
+    back = np.linalg.inv(lower)
+    sizes, axes = np.linalg.eigh(back @ covariance @ back.T)
+    wide = (lower @ axes) * np.sqrt(np.maximum(sizes, 1.0))
+    return np.asarray(wide @ wide.T)

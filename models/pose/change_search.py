@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.paths.likelihood import walkers_of
-from models.paths.turn_detection import moved_within
-from models.pose.change_confirmation import moved_beyond_doubt, widened
-from models.pose.change_point import find_change, suspicion
+from models.paths.path_tests import moved_within
+from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
 from models.pose.config import SUSPECT_RATE, SUSPECTED
 from models.pose.fusion import fused_estimate
-from models.pose.pose_fit import FusedEstimate, PoseFit
+from models.pose.pose_fit import FullSearch, FusedEstimate, PoseFit, WarmStart, warm_start_of
 from models.pose.site import CameraSite
-from models.pose.warm_start import FullSearch, WarmStart, warm_start_of
 from models.tracks.observations import Observations, of_tracks
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import joint_estimate

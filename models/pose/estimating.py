@@ -1,20 +1,28 @@
 """The pose of a camera whose site is known, by its tracks: by speeds, places and since when."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import Drift, DriftLimits, asks_again, drift_between, pose_after
 from models.pose.change_search import pose_fit_of, search_change
-from models.pose.partial_failures import PartialFailure, unless_failed
-from models.pose.pose_fit import FusedEstimate, by_speeds_alone
+from models.pose.pose_fit import FusedEstimate, WarmStart, by_speeds_alone
 from models.pose.site import CameraSite
-from models.pose.warm_start import WarmStart
 from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate, joint_estimate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartialFailure:
+    """A part that is not needed and could not be made, and the error that it failed with."""
+
+    part: str
+    error: Exception
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,3 +143,17 @@ def _look_again(
         return None
     older = of_tracks(tracks, np.arange(walkers[-limits.people]))
     return pose_fit_of(older, site).fused
+
+
+_Made = TypeVar("_Made")
+
+
+def unless_failed(
+    failures: list[PartialFailure], part: str, make: Callable[[], _Made]
+) -> _Made | None:
+    """The part that is made; None if it failed, and then there is one failure more."""
+    try:
+        return make()
+    except Exception as error:
+        failures.append(PartialFailure(part=part, error=error))
+        return None

@@ -5,15 +5,18 @@ Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / 
 
 import numpy as np
 
-from models.geometry.plane_parameters import IDENTIFIABLE_SD, identifiable_of
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import IDENTIFIABLE_SD, PARAMETERS, CameraPose, array_of, identifiable_of
 from models.geometry.rotation import Array
-from models.paths.heading import on_seen_ground, variance_of_halves
 from models.paths.likelihood import walkers_of
-from models.paths.path_test import group_fits
-from models.paths.reference import PathReference, candidate_of
-from models.paths.registration import Posterior, refined, shape_at
+from models.paths.path_tests import group_fits
+from models.paths.reference import PathReference
+from models.paths.registration import (
+    Posterior,
+    on_seen_ground,
+    refined,
+    shape_at,
+    variance_of_halves,
+)
 from models.pose import config
 from models.pose.modes import (
     Mode,
@@ -24,9 +27,8 @@ from models.pose.modes import (
     find_modes,
     odds_of,
 )
-from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, by_speeds_alone
+from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, WarmStart, by_speeds_alone
 from models.pose.site import CameraSite
-from models.pose.warm_start import WarmStart
 from models.quantiles import chi_squared_above
 from models.reasons import Reason, TracksCode
 from models.tracks.observations import Observations
@@ -79,7 +81,7 @@ def _changed_paths(
     posterior: Posterior, paths: PathReference, joint: JointEstimate, prior: CameraPose
 ) -> Reason | None:
     """The reason of people who fit no pose; None if only times changed, by a clock."""
-    at_prior = group_fits(posterior.walkers, posterior.paths, candidate_of(prior))
+    at_prior = group_fits(posterior.walkers, posterior.paths, array_of(prior))
     if not paths.fit.has_changed(at_prior) and _same_angles(joint, prior):
         return None
     return Reason(code=TracksCode.PATHS_CHANGED)
@@ -87,7 +89,7 @@ def _changed_paths(
 
 def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
     """True if speeds show no turn in tilt or roll, whatever they show of the scale."""
-    turn = joint.values[:2] - candidate_of(prior)[:2]
+    turn = joint.values[:2] - array_of(prior)[:2]
     squared = float(turn @ np.linalg.solve(joint.covariance[:2, :2], turn))
     return squared < chi_squared_above(config.BY_CHANCE, 2)
 
@@ -102,7 +104,7 @@ def _refined(
     """The pose (4,) around a mode with each direction of the paths weighed, and its covariance."""
     walkers = mode.posterior.walkers
     shape = shape_at(walkers, mode.posterior.paths, mode.candidate)
-    precision = paths.precision(shape, walkers.people, mode.candidate - candidate_of(prior))
+    precision = paths.precision(shape, walkers.people, mode.candidate - array_of(prior))
     precision = precision / paths.fit.variance_inflation(fits)
     warm = warm_start is not None and warm_start.neighbourhood is not None
     values, covariance = refined(

@@ -7,11 +7,11 @@ import numpy as np
 
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.paths.path_test import loss
+from models.paths.path_tests import loss
 from models.paths.registration import Belief, Peak, Posterior, distinct, register
 from models.pose import config
+from models.pose.pose_fit import WarmStart
 from models.pose.site import CameraSite
-from models.pose.warm_start import WarmStart
 from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate, joint_at_heading
 

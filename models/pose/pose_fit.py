@@ -1,15 +1,28 @@
-"""The pose that is fitted to some tracks, as values: by speeds alone, and by places too."""
+"""The pose that is fitted to some tracks, as values: by speeds, by places too, and a warm start.
+
+From that a window is fitted where the last one ended, or all poses are searched again. Of almost
+the same tracks the likelihood has almost the same modes, and Gauss-Newton ends at them wherever
+near them it begins. What may have changed with a few new tracks is which mode is the highest, and
+whether one pose explains all tracks: any sign of that, and a share of the window that is new since
+all poses were searched, leads to the full search.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.plane_parameters import identifiable_of
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS, PoseParameters
+from models.geometry.pose import (
+    PARAMETERS,
+    PLANE_PARAMETERS,
+    CameraPose,
+    PoseParameters,
+    identifiable_of,
+)
 from models.geometry.rotation import Array
-from models.pose.config import HEADING_SD, NARROW
+from models.pose import config
 from models.reasons import Reason
+from models.serialization import Format, flattened, from_bytes, restored, to_bytes
+from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate
 from models.walking.fit import FitStart
 
@@ -28,7 +41,7 @@ class PathNeighbourhood:
 
     def is_narrow(self, covariance: Array) -> bool:
         """True if so little of a covariance (4, 4) was added that it need not be computed anew."""
-        return float(self.extra_covariance[3, 3]) < NARROW * float(covariance[3, 3])
+        return float(self.extra_covariance[3, 3]) < config.NARROW * float(covariance[3, 3])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +113,7 @@ def by_speeds_alone(
     values, covariance[:3, :3] = joint.values, joint.covariance
     if reason is not None:
         values, covariance[:3, :3] = joint.beside_strangers()
-    covariance[3, 3] = HEADING_SD**2
+    covariance[3, 3] = config.HEADING_SD**2
     determined = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))
     return FusedEstimate(
         values=np.append(values, prior.heading_rad),
@@ -108,3 +121,149 @@ def by_speeds_alone(
         identifiable=tuple(name for name in joint.identifiable if name in determined),
         reason=reason,
     )
+
+
+_FORMAT = Format(name="warm_start", version=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FullSearch:
+    """The last search of all poses and of all places to cut, which found no change.
+
+    `ended_s` (tracks,) is when each of its tracks ended, in order. `suspicion` is how much two
+    poses explained speeds better than one when a change was last looked for, in units of the
+    limit; `path_fit` how well a walking group fitted the paths. None is made of a window that was
+    suspected.
+    """
+
+    ended_s: Array
+    suspicion: float
+    path_fit: float
+
+    @property
+    def to_s(self) -> float:
+        """The end of the newest of its tracks."""
+        return float(self.ended_s[-1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RefinedPose:
+    """An estimate that the next one is held against.
+
+    `modes` (modes, parameters) is where its search ended, the best first.
+    """
+
+    values: Array
+    covariance: Array
+    modes: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WarmStart:
+    """The start of a next estimate: the pose of almost the same tracks at the same site.
+
+    `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
+    the mixed model's fields there. `fused` is by places too, where they are `registered`: what they
+    determine together is `identifiable`, and `reason_code` says what was wrong with the paths.
+    `neighbourhood` is of its mode, where there was a single one. `search` is when all other poses
+    were searched.
+    """
+
+    prior: CameraPose
+    joint: RefinedPose
+    means: tuple[Array, ...]
+    fused: RefinedPose
+    registered: bool
+    identifiable: tuple[str, ...]
+    reason_code: str | None
+    search: FullSearch
+    neighbourhood: PathNeighbourhood | None = None
+
+    @property
+    def speed_starts(self) -> tuple[FitStart, ...]:
+        """The modes of the speeds, to be fitted to almost the same tracks."""
+        return tuple(
+            FitStart(candidate=mode, means=self.means, warm=True) for mode in self.joint.modes
+        )
+
+    def suits(self, tracks: Observations) -> bool:
+        """True if tracks are so much the same that only its own modes are refined."""
+        # Late tracks are as new: a tracker may post yesterday's today.
+        new = int((~np.isin(tracks.ended_s, self.search.ended_s)).sum())
+        return (
+            tracks.tracks >= max(config.WARM_TRACKS, (1 - config.NEW) * self.search.ended_s.size)
+            and new <= config.NEW * tracks.tracks
+        )
+
+    def is_refined_by(self, found: PoseFit) -> bool:
+        """True if a pose that was fitted from here is another version of the same."""
+        joint, fused = found.joint, found.fused
+        worse = config.WORSE / max(joint.walking_groups, 1)
+        return (
+            joint.identifiable == PLANE_PARAMETERS
+            and fused.identifiable == self.identifiable
+            and fused.registered == self.registered
+            and _code(fused) == self.reason_code
+            and len(fused.modes) == len(self.fused.modes)
+            and found.mean_path_fit > self.search.path_fit - worse
+            and _is_near(joint, self.joint, PLANE_PARAMETERS)
+            and _is_near(fused, self.fused, self.identifiable)
+        )
+
+    def is_calm(self, suspicion: float) -> bool:
+        """True if tracks are no more suspected of a change than those were that had none."""
+        return suspicion <= max(config.SUSPICION, config.MORE_SUSPICION * self.search.suspicion)
+
+
+def warm_start_of(found: PoseFit, prior: CameraPose, search: FullSearch) -> WarmStart | None:
+    """The warm start of a pose; None where the next search has to be a full one anyway."""
+    joint, fused = found.joint, found.fused
+    if joint.reason is not None or joint.identifiable != PLANE_PARAMETERS:
+        return None
+    if fused.identifiable[: len(PLANE_PARAMETERS)] != PLANE_PARAMETERS:
+        return None
+    return WarmStart(
+        prior=prior,
+        joint=_refined(joint),
+        means=joint.means,
+        fused=_refined(fused),
+        registered=fused.registered,
+        identifiable=fused.identifiable,
+        reason_code=_code(fused),
+        search=search,
+        neighbourhood=fused.neighbourhood if len(fused.modes) == 1 else None,
+    )
+
+
+def warm_start_to_bytes(warm_start: WarmStart) -> bytes:
+    """A warm start as it is stored with each estimate: some kilobytes."""
+    return to_bytes(_FORMAT, flattened(warm_start))
+
+
+def warm_start_from_bytes(data: bytes) -> WarmStart:
+    """The warm start of `warm_start_to_bytes`.
+
+    Raises:
+        CheckpointError: the bytes are no warm start of this format.
+    """
+    return restored(WarmStart, from_bytes(_FORMAT, data))
+
+
+def _code(fused: FusedEstimate) -> str | None:
+    return None if fused.reason is None else str(fused.reason.code)
+
+
+def _refined(found: JointEstimate | FusedEstimate) -> RefinedPose:
+    modes = np.array(found.modes, dtype=np.float64).reshape(-1, found.values.size)
+    return RefinedPose(values=found.values, covariance=found.covariance, modes=modes)
+
+
+def _is_near(
+    found: JointEstimate | FusedEstimate, last: RefinedPose, names: tuple[str, ...]
+) -> bool:
+    """True if the named parameters are as before, and as sure."""
+    places = [PARAMETERS.index(name) for name in names]
+    sd, last_sd = (np.sqrt(np.diag(each.covariance)[places]) for each in (found, last))
+    near = np.abs(found.values - last.values)[places] <= config.FARTHEST * np.minimum(sd, last_sd)
+    ratio = sd / last_sd
+    return bool(near.all() and (ratio < config.WIDER).all() and (ratio > 1 / config.WIDER).all())

@@ -1,13 +1,21 @@
-"""The site of a camera: how people walk before it, where, and what is usual."""
+"""The site of a camera, and learning it: how people walk before it, where, and what is usual."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of
+from models.geometry.rotation import Array
 from models.monitoring.chart import DriftChart
+from models.monitoring.chart_learning import learn_chart
 from models.monitoring.group_scores import Usual
-from models.paths.reference import PathReference
-from models.walking.speed_reference import SpeedReference
+from models.paths.folds import ChosenBandwidths, fold_maps
+from models.paths.reference import PathReference, learn_paths
+from models.simulation.walkers import WalkConfig
+from models.tracks.observations import Observations, check_in_time, of_tracks
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import SpeedReference, assumed_speed_reference
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,3 +44,72 @@ class CameraSite:
             speed_reference=chart.speed_reference,
             paths=paths.model(self.intrinsics),
         )
+
+
+_USUAL_WALK = WalkConfig()
+
+
+def learn_site(
+    tracks: Observations,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    walk: WalkConfig = _USUAL_WALK,
+    *,
+    seed: int = 0,
+    speed_reference: SpeedReference | None = None,
+    weights: Array | None = None,
+    speed_tracks: int | None = None,
+    chart: bool = True,
+    chosen: ChosenBandwidths | None = None,
+) -> CameraSite:
+    """The site of tracks at the prior pose; no map and no chart where fewer than 12 groups walk.
+
+    A map that grows is learned anew of all tracks that are known to be of the prior pose, older
+    ones by less weight; how people walk there stays what the reference said, as an anchor.
+
+    Args:
+        tracks: of the reference, or of all that a map grows by, in the order of their ends.
+        intrinsics: of the camera.
+        prior: where it stood.
+        walk: how fast people are taken to walk before any are seen.
+        seed: of all that is drawn.
+        speed_reference: how people walk, where that was learned before: then it is not learned
+            again.
+        weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
+        speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
+        chart: whether the chart is wanted: it takes as long as all the rest.
+        chosen: the bandwidths of the map that grows, which are kept for some hours.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step, and how people walk is not known.
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    check_in_time(tracks)
+    if speed_reference is None:
+        count = tracks.tracks if speed_tracks is None else min(speed_tracks, tracks.tracks)
+        first = of_tracks(tracks, np.arange(count))
+        speed_reference = learn_speed_reference(first, prior, walk, seed)
+    site = CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)
+    folds = fold_maps(tracks, intrinsics, array_of(prior), seed, weights, chosen)
+    if folds is None:
+        return site
+    return replace(
+        site,
+        paths=learn_paths(tracks, intrinsics, prior, seed, weights, folds),
+        chart=learn_chart(tracks, prior, speed_reference, folds, seed) if chart else None,
+    )
+
+
+def assume_site(
+    tracks: Observations,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    walk: WalkConfig = _USUAL_WALK,
+) -> CameraSite:
+    """A site of which nothing is known yet but an assumed walking speed.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than 5 tracks with a step.
+    """
+    speed_reference = assumed_speed_reference(tracks, prior, walk)
+    return CameraSite(intrinsics=intrinsics, prior=prior, speed_reference=speed_reference)

@@ -12,7 +12,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose.alarms import AlarmRate, alarm_chart_result
 from models.pose.estimating import PoseFinding, estimate_pose
-from models.pose.learning import learn_site
+from models.pose.site import learn_site
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import by_end

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import PoseParameters
 from models.geometry.rotation import (
     Array,
     angles_from_rotation,

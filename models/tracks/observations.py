@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from models.errors import ShapeError
 from models.geometry.rotation import Array, Mask
-from models.tracks.head_foot import HeadFootPairs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +55,48 @@ class Tops:
     foot_rays: Array
     top_y: Array
     rows: Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadFootPairs:
+    """People upright for 1.5 s each: rays (M, 3), z = 1, in the camera frame, undistorted.
+
+    `foot_rays` and `head_rays` are means over that time. `column_rays` are to the pixels right
+    above the feet, at the heads' v: where heads would be had nobody seen them beside their feet.
+    `from_rays` and `to_rays` are the same walker's feet before and after. `owner_idx` (M,) is the
+    track, in ascending order, `owners` the number of tracks, with heads and without.
+    """
+
+    foot_rays: Array
+    head_rays: Array
+    column_rays: Array
+    from_rays: Array
+    to_rays: Array
+    owner_idx: npt.NDArray[np.int64]
+    owners: int
+
+    def __len__(self) -> int:
+        return int(self.owner_idx.size)
+
+    @property
+    def tracks(self) -> npt.NDArray[np.int64]:
+        """The tracks (K,) that have heads, ascending."""
+        return np.unique(self.owner_idx)
+
+    def of_tracks(self, chosen: npt.NDArray[np.int64]) -> "HeadFootPairs":
+        """Those of some tracks only, given by ascending indices, which are numbered anew."""
+        renumber = np.full(self.owners, -1)
+        renumber[chosen] = np.arange(chosen.size)
+        kept = renumber[self.owner_idx] >= 0
+        return HeadFootPairs(
+            foot_rays=self.foot_rays[kept],
+            head_rays=self.head_rays[kept],
+            column_rays=self.column_rays[kept],
+            from_rays=self.from_rays[kept],
+            to_rays=self.to_rays[kept],
+            owner_idx=renumber[self.owner_idx[kept]],
+            owners=int(chosen.size),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

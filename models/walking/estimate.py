@@ -11,23 +11,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import (
+from models.geometry.pose import (
     PLANE_PARAMETERS,
+    CameraPose,
     PlaneEstimate,
+    PoseParameters,
     identifiable_of,
     plane_parameters_of,
 )
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
 from models.geometry.rotation import Array
 from models.reasons import Reason, TracksCode, Value
 from models.tracks.observations import Observations, of_tracks
 from models.walking import config
-from models.walking.fit import Channel, Fit, FitStart, fit_pose
+from models.walking.fit import Channel, Fit, FitStart, fit_pose, starts
 from models.walking.groups import count_walking_groups
-from models.walking.heads.estimate import HeadEstimate, head_estimate, joined
-from models.walking.speed_reference import SpeedReference, channels_of, pose_prior
-from models.walking.starts import starts
+from models.walking.heads import HeadEstimate, head_estimate, joined
+from models.walking.speed_reference import SpeedReference, channels_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,14 +95,13 @@ def joint_estimate(
     From the modes of an estimate of almost the same tracks, `warm_starts`, no others are searched.
     """
     channels = channels_of(observations, reference, prior)
-    hold = pose_prior(prior)
     begin = warm_starts
     if not begin:
         few = channels_of(of_tracks(observations, _some(observations)), reference, prior)
         found = starts(few, plane_parameters_of(prior), config.STARTS)
-        first = _distinct([fit_pose(few, FitStart(candidate=start), hold) for start in found])
+        first = _distinct([fit_pose(few, FitStart(candidate=start), prior) for start in found])
         begin = [FitStart(candidate=fit.candidate) for fit in first]
-    ends = _distinct([fit_pose(channels, start, hold) for start in begin])
+    ends = _distinct([fit_pose(channels, start, prior) for start in begin])
     heads = head_estimate(observations.heads, reference.heads)
     return _estimate_of(observations, channels, ends, reference, heads)
 
@@ -126,7 +124,7 @@ def joint_at_heading(
     start = warm_start or FitStart(candidate=candidate[:3] + reference.offset, means=means)
     turned = replace(prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
     channels = channels_of(observations, reference, turned)
-    fit = fit_pose(channels, start, pose_prior(prior))
+    fit = fit_pose(channels, start, prior)
     return _estimate_of(observations, channels, [fit], reference, heads)
 
 

@@ -1,4 +1,4 @@
-"""The mean of log speed or log stature at a site, by place and direction.
+"""The mean of log speed or log stature at a site, by place and direction, and learning it.
 
 m(x, d) = c + a d_x + b d_y + g (d_x^2 - d_y^2) + 2 e d_x d_y + sum_k w_k exp(-|x - x_k|^2 / 2 l^2)
 is linear in its coefficients, which have Gaussian priors.
@@ -13,11 +13,21 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array
+from models.serialization import stored_as
 from models.walking.config import MOST_BUMPS
 from models.walking.measures import Measured
+from models.walking.mixed_model import (
+    Normal,
+    VarianceComponents,
+    em_step,
+    h_log_likelihood,
+    regress,
+    reweigh,
+)
 
 # The squares of Gaussian bumps one length apart sum to pi, wherever one looks.
 _BUMP_SHARE = np.pi
+_FIELD_SETTLED = 1e-4  # of a log at any row
 _NO_DIRECTION, _NO_CHANGE = np.empty((0, 2)), np.empty((0, 2, 3))
 
 
@@ -118,6 +128,65 @@ def field_over(measured: Measured, shape: FieldShape) -> Field:
         prior_mean=mean,
         prior_variance=variance,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learned:
+    """A field with the mean (P,) and covariance (P, P) of its coefficients.
+
+    `components` are of variance; `usual` is the field's mean over all that it was learned of.
+    """
+
+    field: Field
+    mean: Array
+    covariance: Array
+    components: VarianceComponents = stored_as("spread")
+    usual: float
+
+
+def assumed(field: Field, components: VarianceComponents) -> Learned:
+    """A field that nothing has been learned of yet."""
+    return Learned(
+        field=field,
+        mean=field.prior_mean,
+        covariance=np.diag(field.prior_variance),
+        components=components,
+        usual=float(field.prior_mean[0]),
+    )
+
+
+def learn(measured: Measured, start: Learned, *, em_rounds: int) -> Learned:
+    """The field and the components that explain what was measured at a known pose.
+
+    The components are learned in so many rounds of EM; with 0 they are taken as given.
+    """
+    features, components = start.field.features(measured), start.components
+    prior = Normal(mean=start.mean, covariance=start.covariance)
+    found = prior
+    for round_ in range(em_rounds + 1):
+        found, weights = regress(
+            features, measured, components, prior, found.mean,
+            lambda move: bool(np.abs(features @ move).max(initial=0.0) < _FIELD_SETTLED),
+        )  # fmt: skip
+        if round_ < em_rounds:
+            residual = measured.value - features @ found.mean
+            components = em_step(residual, measured, weights, components)
+    inlier = weights.inlier
+    return Learned(
+        field=start.field,
+        mean=found.mean,
+        covariance=found.covariance,
+        components=components,
+        usual=float((inlier * (features @ found.mean)).sum() / max(float(inlier.sum()), 1e-9)),
+    )
+
+
+def held_out_log_likelihood(measured: Measured, learned: Learned) -> float:
+    """The log likelihood, by a learned field, of what other tracks measured at the same pose."""
+    residual = measured.value - learned.field.features(measured) @ learned.mean
+    residual = np.where(measured.valid, residual, 0.0)
+    weights = reweigh(residual, measured, learned.components)
+    return h_log_likelihood(residual, weights, measured.rows, learned.components)
 
 
 def _centres(places: Array, length_m: float) -> Array:

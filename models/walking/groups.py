@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.rotation import Array
-from models.tracks.components import first_of_component
+from models.tracks.linking import first_of_component
 from models.walking import config
 from models.walking.measures import Measured
 

@@ -12,10 +12,118 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.ground_flow import rotation_and_turns
+from models.compiled import compiled
+from models.geometry.ground import ground_flow, landing, rotation_and_turns
 from models.geometry.rotation import Array, Mask, rotation_from_angles
 from models.tracks.observations import Rows, Steps, Tops
-from models.walking.ground_loops import heights_of_tops, speeds_of_steps
+
+_LEAST_STEP_M = 1e-3  # keeps the logarithm of no step at all finite
+_LEAST_RATIO = 0.01  # of a person's height to the camera's
+
+
+@compiled
+def speeds_of_steps(
+    start_rays: Array,
+    end_rays: Array,
+    noisy_end_rays: Array,
+    seconds: Array,
+    rotation: Array,
+    turns: Array,
+    height_m: float,
+) -> tuple[Array, Array, Array, Mask, Array, Array, Array, Array]:
+    """Log speeds (M,), middles (M, 2) in metres, directions (M, 2), and which are on the ground.
+
+    After these, derivatives of the first three (M, 3), (M, 2, 3) and (M, 2, 3) by tilt, roll, log
+    height, and how much the first of these change (M, 3) with a step that ends at its noisy end.
+    `turns` say how a ray's direction in the world moves (T, 3, 3), for tilt and roll, or for none:
+    derivatives are then by log height alone. Rays (M, 3) are in the camera frame, `rotation` is
+    `camera_from_world`.
+    """
+    count = seconds.size
+    value, valid = np.zeros(count), np.zeros(count, dtype=np.bool_)
+    place, direction = np.empty((count, 2)), np.empty((count, 2))
+    d_value, d_noise = np.zeros((count, 3)), np.zeros((count, 3))
+    d_place, d_direction = np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
+    for j in range(count):
+        start_x, start_y, start_valid = landing(start_rays, j, rotation)
+        end_x, end_y, end_valid = landing(end_rays, j, rotation)
+        x, y = (start_x + end_x) / 2, (start_y + end_y) / 2
+        across_x, across_y = end_x - start_x, end_y - start_y
+        length = math.sqrt(across_x * across_x + across_y * across_y)
+        per_length = 1 / max(length, 1e-12)
+        way_x, way_y = across_x * per_length, across_y * per_length
+        place[j, 0], place[j, 1] = x * height_m, y * height_m
+        direction[j, 0], direction[j, 1] = way_x, way_y
+        d_place[j, 0, 2], d_place[j, 1, 2] = x * height_m, y * height_m
+        if start_valid and end_valid:
+            valid[j], d_value[j, 2] = True, 1.0
+            square_m2 = (length * height_m) ** 2 + _LEAST_STEP_M**2
+            value[j] = math.log(square_m2 / seconds[j] ** 2) / 2
+        if not len(turns):
+            continue
+        noisy_x, noisy_y, noisy_valid = landing(noisy_end_rays, j, rotation)
+        off = (noisy_y - end_y) * way_x - (noisy_x - end_x) * way_y if noisy_valid else 0.0
+        turned = off / max(length / 2, 1e-12)
+        toward, beside = way_x * x + way_y * y, way_x * y - way_y * x
+        for number in range(len(turns)):
+            turn = turns[number]
+            flow = ground_flow(x, y, turn)
+            d_place[j, 0, number], d_place[j, 1, number] = flow.x * height_m, flow.y * height_m
+            along = way_x * turn[0, 2] + way_y * turn[1, 2]
+            aside = way_x * turn[1, 2] - way_y * turn[0, 2]
+            if valid[j]:
+                d_value[j, number] = flow.fall + toward * along
+                d_noise[j, number] = turned * (beside * along + toward * aside)
+            bent_x = way_x * turn[0, 0] + way_y * turn[1, 0] + x * along
+            bent_y = way_x * turn[0, 1] + way_y * turn[1, 1] + y * along
+            same = bent_x * way_x + bent_y * way_y
+            d_direction[j, 0, number] = bent_x - same * way_x
+            d_direction[j, 1, number] = bent_y - same * way_y
+    return value, place, direction, valid, d_value, d_place, d_direction, d_noise
+
+
+@compiled
+def heights_of_tops(
+    foot_rays: Array, top_y: Array, rotation: Array, turns: Array, height_m: float
+) -> tuple[Array, Array, Mask, Array, Array]:
+    """Log heights of people (M,), where they stand (M, 2) in metres, and which are on the ground.
+
+    A height is that of `geometry.upright.stature_ratio`: n / m camera heights, with
+    m = down_z - y forward_z and n = (y forward - down) . (p, -1).
+
+    After these, derivatives of the first two (M, 3) and (M, 2, 3) by tilt, roll, log height; where
+    there are no turns, by log height alone. `top_y` (M,) is undistorted, normalised y.
+    """
+    count = top_y.size
+    value, valid = np.zeros(count), np.zeros(count, dtype=np.bool_)
+    place, d_value, d_place = np.zeros((count, 2)), np.zeros((count, 3)), np.zeros((count, 2, 3))
+    for j in range(count):
+        y = top_y[j]
+        east, north, on_ground = landing(foot_rays, j, rotation)
+        lean_x = y * rotation[2, 0] - rotation[1, 0]
+        lean_y = y * rotation[2, 1] - rotation[1, 1]
+        lean_z = y * rotation[2, 2] - rotation[1, 2]
+        ratio = 1.0
+        if on_ground:
+            seen = (lean_x * east + lean_y * north - lean_z) / -lean_z
+            if seen > _LEAST_RATIO:
+                ratio, valid[j] = seen, True
+                value[j] = math.log(ratio * height_m)
+        place[j, 0], place[j, 1] = east * height_m, north * height_m
+        for number in range(len(turns)):
+            turn = turns[number]
+            flow = ground_flow(east, north, turn)
+            d_place[j, 0, number], d_place[j, 1, number] = flow.x * height_m, flow.y * height_m
+            if valid[j]:
+                bent_x = lean_x * turn[0, 0] + lean_y * turn[1, 0] + lean_z * turn[2, 0]
+                bent_y = lean_x * turn[0, 1] + lean_y * turn[1, 1] + lean_z * turn[2, 1]
+                bent_z = lean_x * turn[0, 2] + lean_y * turn[1, 2] + lean_z * turn[2, 2]
+                top = bent_x * east + bent_y * north - bent_z + lean_x * flow.x + lean_y * flow.y
+                d_value[j, number] = (top + ratio * bent_z) / -lean_z / ratio
+        d_place[j, 0, 2], d_place[j, 1, 2] = place[j]
+        d_value[j, 2] = 1.0 if valid[j] else 0.0
+    return value, place, valid, d_value, d_place
+
 
 _NO_TURNS = np.empty((0, 3, 3))
 

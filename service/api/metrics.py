@@ -16,7 +16,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoM
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
-from models.geometry.plane_parameters import ANGLES
+from models.geometry.pose import ANGLES
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.enums import AlertKind, PoseState, Severity, TrainingState
 from service.operations.health import Metrics, load_metrics

@@ -9,17 +9,13 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.monitoring.chart import chart_from_bytes, chart_to_bytes
 from models.monitoring.config import CREEP_SHARE
-from models.monitoring.serialization import (
-    chart_from_bytes,
-    chart_to_bytes,
-    creep_log_from_bytes,
-    creep_log_to_bytes,
-)
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.monitoring.creep import creep_log_from_bytes, creep_log_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import CameraSite, Creep, begin_creep_log, creep_result, log_creep, observe
 from models.tracks.trajectory import Trajectory
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import window_of
 from service.settings import Settings

@@ -7,13 +7,15 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
-from models.geometry.plane_parameters import PLANE_PARAMETERS
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.chart import CLOCK
-from models.monitoring.verdict import Drift, DriftVerdict, judge, pose_after
-from models.monitoring.verdict_reasons import (
+from models.monitoring.verdict import (
+    Drift,
+    DriftVerdict,
     clock_fault,
+    judge,
     may_be_clock,
+    pose_after,
     reason_of_chart,
     reason_of_creep,
     reason_of_drift,

@@ -10,10 +10,9 @@ from typing import TypeVar
 import numpy as np
 
 from models.errors import CheckpointError
-from models.monitoring.chart import ChartResult
+from models.monitoring.chart import ChartResult, chart_from_bytes
 from models.monitoring.config import CREEP_SHARE
-from models.monitoring.serialization import chart_from_bytes
-from models.paths.serialization import paths_from_bytes
+from models.paths.reference import paths_from_bytes
 from models.pose import (
     AlarmRate,
     CameraSite,
@@ -29,7 +28,7 @@ from models.pose import (
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
-from models.pose.partial_failures import PartialFailure, unless_failed
+from models.pose.estimating import PartialFailure, unless_failed
 from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 from models.regression.averaging import (
@@ -40,7 +39,7 @@ from models.regression.averaging import (
 )
 from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import MOST_PIECES, Evidence, SeenTrack
 from service.reasons import Reasons, ServiceCode

@@ -15,12 +15,12 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.serialization import creep_log_from_bytes
-from models.paths.serialization import paths_from_bytes
+from models.monitoring.creep import creep_log_from_bytes
+from models.paths.reference import paths_from_bytes
 from models.pose import learn_site, observe, without_creep
 from models.pose.config import FEWEST_BESIDE
 from models.tracks.trajectory import Trajectory
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
 from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import (

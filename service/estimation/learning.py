@@ -13,8 +13,7 @@ from models.pose import learn_site, observe
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.serialization import reference_to_bytes
-from models.walking.speed_reference import SpeedReference
+from models.walking.speed_reference import SpeedReference, reference_to_bytes
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity

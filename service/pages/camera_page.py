@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.geometry.misplacement import Misplacement, misplacements
+from models.geometry.ground import Misplacement, misplacements
 from models.tracks.trajectory import Trajectory
 from service.alerts.alerts import list_alerts
 from service.alerts.data_gaps import DataGap, data_gap_of

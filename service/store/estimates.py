@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Index, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import PoseParameters
 from models.monitoring.verdict import Drift
 from service.enums import PoseState
 from service.reasons import Reasons

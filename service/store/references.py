@@ -161,7 +161,7 @@ class AnchorRecord(Record):
     """The first flow map and drift chart of a reference: they never grow (`models.pose`).
 
     `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
-    days since (`models.monitoring.creep_log`), up to `logged_to_s`; None as long as there is none.
+    days since (`models.monitoring.creep`), up to `logged_to_s`; None as long as there is none.
     """
 
     __tablename__ = "anchors"
@@ -176,7 +176,7 @@ class AnchorRecord(Record):
 
 
 class LastPoseRecord(Record):
-    """The beginning of the next estimate against a reference (`models.pose.warm_start`).
+    """The beginning of the next estimate against a reference (`models.pose.pose_fit`).
 
     `basis` tells what it hangs on beside the tracks: of another one it says nothing.
     """

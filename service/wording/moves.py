@@ -4,10 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from models.geometry.misplacement import Misplacement
-from models.geometry.plane_parameters import ANGLES
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.ground import Misplacement
+from models.geometry.pose import ANGLES, CameraPose, PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
 from service.store.estimates import EstimateRecord

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from models.durations import HOUR_S
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import PARAMETERS
 from models.reasons import Reason, TracksCode
 from service.enums import Cause
 from service.reasons import ServiceCode

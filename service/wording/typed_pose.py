@@ -7,9 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from models.geometry.ground import ground_from_pixel
-from models.geometry.ground_speed import walking_speed
-from models.geometry.horizon import ground_share, horizon_pixels
+from models.geometry.ground import ground_from_pixel, ground_share, horizon_pixels, walking_speed
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array

@@ -11,13 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of
 from models.monitoring.chart import trace
 from models.monitoring.chart_learning import drawn_blocks
 from models.monitoring.group_scores import score_groups
 from models.monitoring.verdict import DriftLimits, judge
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of
 from models.pose import Observations, observe
 from models.simulation.pose_offset import offset_trajectory
 from models.tracks.observations import of_tracks
@@ -120,5 +119,5 @@ def _seen(scene: Scene, tracks: Sequence[Trajectory], moved: CameraPose) -> Obse
 
 
 def _groups_a_track(observations: Observations, prior: CameraPose) -> float:
-    walkers = walkers_of(observations, candidate_of(prior))
+    walkers = walkers_of(observations, array_of(prior))
     return max(walkers.walking_groups, 1) / observations.tracks

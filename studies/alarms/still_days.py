@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from models.durations import DAY_S
+from models.geometry.pose import array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import OFFSET_GRID, DriftChart, Ratios, ratios_of, slope_of, trace
 from models.monitoring.config import RUN
 from models.monitoring.group_scores import score_groups, scores_at
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of
 from models.pose import learn_site, observe
 from models.tracks.observations import of_tracks
 from models.tracks.scenes import Scene
@@ -96,7 +96,7 @@ def still_days(scene: Scene, alarms_a_year: float) -> Iterator[StillDay]:
         highest = int(path.statistic.argmax())
         over = np.flatnonzero(path.statistic > level)
         first = of_tracks(seen, np.arange(min(seen.tracks, _MOVED)))
-        walkers = walkers_of(first, candidate_of(prior))
+        walkers = walkers_of(first, array_of(prior))
         delays = {}
         for name, (parameter, size) in MOVES.items():
             # A camera that has moved on sees people as one that stays would from a little back.

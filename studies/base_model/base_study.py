@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import plane_parameters_of
+from models.geometry.pose import plane_parameters_of
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.tracks.scenes import Scene

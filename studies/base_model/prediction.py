@@ -5,8 +5,7 @@ import torch
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import PlaneEstimate, plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, PlaneEstimate, plane_parameters_of
 from models.geometry.rotation import Array
 from models.regression.averaging import FEWEST_TRACKS
 from models.simulation.walkers import WalkConfig

@@ -13,8 +13,7 @@ import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import PlaneEstimate
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, PlaneEstimate
 from models.geometry.rotation import Array
 from models.tracks.trajectory import Trajectory
 

@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import plane_parameters_of
+from models.geometry.pose import plane_parameters_of
 from models.geometry.rotation import Array
 from models.regression.averaging import PoseEstimate
 from models.regression.recipe import TrainingPlan, plan_training

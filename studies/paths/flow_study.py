@@ -14,9 +14,8 @@ import numpy as np
 
 from models.errors import DegenerateGeometryError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
-from models.paths.reference import candidate_of
 from models.quantiles import Z90
 from models.reasons import Reason
 from models.simulation.pose_offset import PoseOffset
@@ -257,7 +256,7 @@ def _judge_change(
 
 def _errors(values: Array, truth: CameraPose) -> Array:
     """Tilt, roll, log height, heading (4,) less the truth's; angles within half a turn."""
-    errors = values - candidate_of(truth)
+    errors = values - array_of(truth)
     for number in (1, 3):
         errors[number] = math.remainder(errors[number], 2 * math.pi)
     return errors

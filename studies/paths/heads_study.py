@@ -17,8 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.pose import learn_site, observe
 from models.quantiles import Z90

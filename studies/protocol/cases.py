@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import PLANE_PARAMETERS, plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
 from models.simulation.pose_offset import PoseOffset

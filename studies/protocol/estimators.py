@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import (
+from models.geometry.pose import (
     PLANE_PARAMETERS,
     PlaneEstimate,
     identifiable_of,
@@ -16,8 +16,8 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.scenes import Scene
 from models.walking.estimate import JointEstimate, joint_estimate
-from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import assumed_speed_reference
 from studies.base_model.network import SetNetwork
 from studies.base_model.prediction import base_estimate
 from studies.base_model.segments import segments_of

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import PLANE_PARAMETERS, identifiable_of
+from models.geometry.pose import PLANE_PARAMETERS, array_of, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of
 from models.paths.registration import (
     Belief,
     Peak,
@@ -58,7 +57,7 @@ def registration(learned: Learned) -> Answer:
     case, reference = learned.case, learned.site.paths
     if reference is None:
         return nothing_identifiable(case)
-    mean = candidate_of(case.prior_pose)
+    mean = array_of(case.prior_pose)
     walkers = walkers_of(learned.seen, mean)
     if walkers.walking_groups < _FEWEST:
         return nothing_identifiable(case)

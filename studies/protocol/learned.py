@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from models.pose import CameraSite, Observations, WalkConfig, learn_site, observe
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from models.walking.speed_reference import SpeedReference
 from studies.protocol.cases import Answer, ProtocolCase
 

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.plane_parameters import PLANE_PARAMETERS, PlaneEstimate, plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import PLANE_PARAMETERS, CameraPose, PlaneEstimate, plane_parameters_of
 from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.network import predict_windows
 from models.regression.recipe import plan_training

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
-from models.geometry.plane_parameters import PlaneEstimate
+from models.geometry.pose import PlaneEstimate
 from models.geometry.rotation import (
     Array,
     angles_from_rotation,

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.regression.averaging import TrackPredictions, average_windows
 from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan

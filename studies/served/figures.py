@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.geometry.pose_parameters import PARAMETERS
+from models.geometry.pose import PARAMETERS
 from studies.served.outcomes import ParameterOutcome, ServedOutcome
 from studies.slopes import slope_with_error
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.errors import CalibrationError
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PARAMETERS, array_of
+from models.geometry.pose import PARAMETERS, CameraPose, array_of
 from models.pose import CameraSite, PoseFinding
 from models.quantiles import Z90
 from studies.protocol.cases import ProtocolCase, angle_deg

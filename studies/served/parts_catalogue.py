@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from models.paths.density_map import Bandwidths
+from models.paths.map_learning import Bandwidths
 
 _ROOT = Path(__file__).parents[2]
 _COARSE = Bandwidths(place_m=1.0, direction_kappa=6.0)
@@ -89,20 +89,20 @@ def _lines(source: str) -> int:
 PARTS: dict[str, Part] = {
     "hidden feet": Part(
         words="boxes whose feet are hidden are found by their heights",
-        off=(("models.tracks.observing:short_boxes", _none_of_points),),
-        source=("models/tracks/loops/short_boxes.py",),
+        off=(("models.tracks.walks:short_boxes", _none_of_points),),
+        source=("models/tracks/hidden_feet.py",),
         faults=("hidden-feet",),
     ),
     "jumps": Part(
         words="points that jump away and back are left out",
-        off=(("models.tracks.observing:jumped", _none_of_points),),
-        source=("models/tracks/loops/jumps.py",),
+        off=(("models.tracks.walks:jumped", _none_of_points),),
+        source=("models/tracks/hidden_feet.py",),
         faults=("jumps",),
     ),
     "pieces": Part(
         words="pieces of one walk are put together",
         off=(("models.tracks.walks:link_pieces", _alone),),
-        source=("models/tracks/linking.py", "models/tracks/ends.py"),
+        source=("models/tracks/linking.py", "models/tracks/linking.py"),
         faults=("fragments",),
     ),
     "walking groups": Part(
@@ -116,17 +116,17 @@ PARTS: dict[str, Part] = {
     "noise of directions": Part(
         words="information that is noise of directions is taken off",
         off=(("models.walking.fit:noise_information", _nothing(3)),),
-        source=("models/walking/direction_noise.py",),
+        source=("models/walking/fit.py",),
     ),
     "freedom of the field": Part(
         words="how freely speeds vary by place is chosen by halves",
         off=(
             (
-                "models.walking.reference.learning:_cross_validated",
+                "models.walking.reference_learning:_cross_validated",
                 lambda observations, prior, blank, seed: blank,
             ),
         ),
-        source=("models.walking.reference.learning:_cross_validated",),
+        source=("models.walking.reference_learning:_cross_validated",),
     ),
     "bandwidths": Part(
         words="the map's bandwidths are chosen by people left out",
@@ -135,20 +135,20 @@ PARTS: dict[str, Part] = {
     ),
     "path test": Part(
         words="a map that does not fit has no part",
-        off=(("models.paths.path_test:UsualFit.has_changed", lambda *_: False),),
-        source=("models.paths.path_test:UsualFit.has_changed",),
+        off=(("models.paths.path_tests:UsualFit.has_changed", lambda *_: False),),
+        source=("models.paths.path_tests:UsualFit.has_changed",),
     ),
     "seen ground": Part(
         words="no heading is identifiable on ground that the reference never saw",
         off=(("models.pose.fusion:on_seen_ground", lambda *_: True),),
-        source=("models.paths.heading:on_seen_ground",),
+        source=("models.paths.registration:on_seen_ground",),
     ),
     "halves of the people": Part(
         words="the heading is less sure where halves find it apart",
         off=(("models.pose.fusion:_covariance_of_halves", _nothing(4)),),
         source=(
             "models.pose.fusion:_covariance_of_halves",
-            "models.paths.heading:variance_of_halves",
+            "models.paths.registration:variance_of_halves",
         ),
     ),
     "flat posterior": Part(
@@ -172,8 +172,8 @@ PARTS: dict[str, Part] = {
         source=(
             "models/pose/change_search.py",
             "models/pose/change_point.py",
-            "models/pose/change_confirmation.py",
-            "models/paths/turn_detection.py",
+            "models/pose/change_point.py",
+            "models/paths/path_tests.py",
         ),
     ),
 }

@@ -9,9 +9,8 @@ import numpy as np
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, aside_of, norm
 from models.geometry.upright import heads_seen, statures
-from models.geometry.vectors import aside_of, norm
 from models.tracks.trajectory import Trajectory
 
 _USUAL_M = 1.7  # of people whose top is not in view: their head is not either

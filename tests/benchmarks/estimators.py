@@ -25,7 +25,7 @@ from models.pose.site import CameraSite
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 MAPS, TRACKS, RUNS = (200, 2000), 400, 7

@@ -10,8 +10,8 @@ from models.geometry.pose import CameraPose
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import Observations
-from models.tracks.observing import observe
 from models.tracks.trajectory import Trajectory
+from models.tracks.walks import observe_each
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(18), roll_rad=math.radians(1))
@@ -44,7 +44,7 @@ def tracks_of(
 
 def seen(tracks: list[Trajectory]) -> Observations:
     """What the joint estimator reads of tracks."""
-    return observe(tracks, LENS)
+    return observe_each(tracks, LENS)
 
 
 def near(pose: CameraPose) -> np.ndarray:

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.geometry.pose import array_of
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of
-from models.paths.turn_detection import moved_within
+from models.paths.path_tests import moved_within
 from models.pose import estimate_pose, learn_site
-from models.pose.change_confirmation import least_covariance
+from models.pose.change_point import least_covariance
 from models.pose.change_search import pose_fit_of
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks
@@ -46,7 +46,7 @@ def window(*parts, seed):
 def test_a_crowd_that_changes_its_ways_before_a_knocked_camera_is_no_move(site, lanes):
     """First one lane's people, then the others': from the prior pose, that is a move."""
     tracks = window((lanes[:1], KNOCKED, 50), (lanes[1:], KNOCKED, 60), seed=5)
-    at = candidate_of(PRIOR)
+    at = array_of(PRIOR)
     paths = site.paths.model(LENS)
     assert moved_within(walkers_of(tracks, at), paths, at, site.paths.still, 1e-6) is not None
     assert estimate_pose(tracks, site).change_idx is None
@@ -59,7 +59,7 @@ def test_a_turn_by_5_deg_is_found_within_40_people(site, lanes, first, number):
     tracks = window((lanes, first, 80), (lanes, after, 40), seed=6)
     found = estimate_pose(tracks, site)
     assert found.change_idx == pytest.approx(80, abs=8)
-    off = candidate_of(found.pose) - candidate_of(after)
+    off = array_of(found.pose) - array_of(after)
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 1.5
 
 

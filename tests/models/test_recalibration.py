@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from models.errors import ShapeError, TooFewTrajectoriesError
+from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
 from models.monitoring.group_scores import score_groups
 from models.monitoring.verdict import DriftLimits
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of
 from models.pose import (
     AlarmRate,
     SecondLook,
@@ -198,7 +198,7 @@ def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, 
 def refusals(site, tracks):
     """All that goes by the order of time, each given tracks out of order."""
     mixed = swapped(tracks)
-    folds = fold_maps(mixed, LENS, candidate_of(PRIOR), 0)
+    folds = fold_maps(mixed, LENS, array_of(PRIOR), 0)
     return {
         "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
         "estimate_pose": lambda: estimate_pose(mixed, site),

@@ -6,8 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from models.geometry.plane_parameters import PLANE_PARAMETERS
-from models.geometry.pose import CameraPose
+from models.geometry.pose import PLANE_PARAMETERS, CameraPose
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate

@@ -16,9 +16,9 @@ from models.geometry.pose import CameraPose
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
-from models.tracks.observing import observe
 from models.tracks.trajectory import Trajectory
-from models.walking.reference.learning import learn_speed_reference
+from models.tracks.walks import observe_each
+from models.walking.reference_learning import learn_speed_reference
 from models.walking.speed_reference import SpeedReference
 from service.alerts.staleness import StaleWatch
 from service.app import create_app
@@ -199,7 +199,7 @@ class Life:
 @lru_cache(maxsize=1)
 def some_site() -> SpeedReference:
     """A reference that was really learned."""
-    observations = observe(walks_of("prior"), LENS)
+    observations = observe_each(walks_of("prior"), LENS)
     return learn_speed_reference(observations, PRIOR, WalkConfig(speed_sd_mps=0.2), 0)
 
 

@@ -11,7 +11,7 @@ from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from studies.protocol.cases import ProtocolCase, judge_answer
 from studies.protocol.estimators import joint, joint_feet
 from studies.protocol.flow_runs import fused, registration

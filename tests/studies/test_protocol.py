@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.upright import statures
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks

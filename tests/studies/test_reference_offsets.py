@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.plane_parameters import PlaneEstimate, plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, PlaneEstimate, plane_parameters_of
 from studies.protocol.regressors import SITE_BIAS_SD, without_offset
 
 PRIOR = CameraPose(height_m=5, tilt_rad=0.2, roll_rad=-0.05)

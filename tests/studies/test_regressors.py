@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import array_of
+from models.geometry.pose import CameraPose, array_of
 from models.regression import training
 from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.network import predict_windows

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.geometry.upright import tops_of_boxes
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site, observe
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory

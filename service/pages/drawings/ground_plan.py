@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup, escape
 
-from models.geometry.ground import ground_from_pixel
+from models.geometry.ground import Misplacement, ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.misplacement import Misplacement
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.pages.drawings.picture import Overlay, ground_of

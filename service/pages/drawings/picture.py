@@ -10,8 +10,12 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup, escape
 
-from models.geometry.ground import ground_from_pixel, pixel_from_ground
-from models.geometry.horizon import horizon_pixels, picture_lattice
+from models.geometry.ground import (
+    ground_from_pixel,
+    horizon_pixels,
+    picture_lattice,
+    pixel_from_ground,
+)
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array

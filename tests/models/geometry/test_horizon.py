@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.horizon import ground_share, horizon_pixels
+from models.geometry.ground import ground_share, horizon_pixels
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 

@@ -5,8 +5,8 @@ from math import radians, sin, tan
 import pytest
 
 from models.errors import ShapeError
+from models.geometry.ground import misplacements
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.misplacement import misplacements
 from models.geometry.pose import CameraPose
 
 LENS = Intrinsics(width=1001, height=1001, fx=500, fy=500, cx=500, cy=500)

@@ -10,8 +10,11 @@ from models.errors import ShapeError
 from models.geometry.rotation import (
     angle_between,
     angles_from_rotation,
+    aside_of,
+    dot,
     mean_quaternion,
     nearest_rotation,
+    norm,
     quaternion_from_rotation,
     rotation_from_angles,
     rotation_from_quaternion,
@@ -230,3 +233,17 @@ def test_nearest_rotation_repairs_rounding() -> None:
 def test_nearest_rotation_refuses_what_is_none(matrix: np.ndarray, says: str) -> None:
     with pytest.raises(ShapeError, match=says):
         nearest_rotation(matrix)
+
+
+def test_products_lengths_and_quarter_turns_are_row_by_row():
+    first, second = np.array([[3.0, 4.0], [0.0, -2.0]]), np.array([[1.0, 2.0], [5.0, 0.5]])
+    np.testing.assert_array_equal(dot(first, second), [11.0, -1.0])
+    np.testing.assert_array_equal(norm(first), [5.0, 2.0])
+    np.testing.assert_array_equal(aside_of(first), [[-4.0, 3.0], [2.0, 0.0]])
+
+
+def test_they_take_whatever_stands_before_the_last_axis():
+    many = np.random.default_rng(0).normal(size=(2, 5, 3))
+    np.testing.assert_allclose(norm(many), np.linalg.norm(many, axis=-1))
+    assert dot(many, many).shape == (2, 5)
+    assert norm(np.empty((0, 2))).shape == (0,)

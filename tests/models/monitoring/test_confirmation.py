@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.geometry.pose_parameters import PARAMETERS
-from models.pose.change_confirmation import moved_beyond_doubt
+from models.geometry.pose import PARAMETERS
+from models.pose.change_point import moved_beyond_doubt
 from models.pose.pose_fit import FusedEstimate
 
 

@@ -8,18 +8,20 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.errors import CheckpointError
-from models.monitoring.creep import creep_result, posterior_mean_turns
-from models.monitoring.creep_log import (
+from models.monitoring.creep import (
     DAY_S,
     NUMBERS,
     CreepLog,
     add_day,
     begin_log,
+    creep_log_from_bytes,
+    creep_log_to_bytes,
+    creep_result,
     noise_of,
+    posterior_mean_turns,
     weeks_of,
 )
 from models.monitoring.group_scores import score_groups
-from models.monitoring.serialization import creep_log_from_bytes, creep_log_to_bytes
 from models.pose import begin_creep_log, learn_site, log_creep, observe, without_creep
 from models.serialization import flattened
 from models.simulation.pose_offset import PoseOffset, offset_trajectory

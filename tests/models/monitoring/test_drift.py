@@ -4,11 +4,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.geometry.pose import CameraPose
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
-from models.monitoring.verdict import DriftLimits, asks_again, drift_between, judge, pose_after
-from models.monitoring.verdict_reasons import clock_fault
+from models.monitoring.verdict import (
+    DriftLimits,
+    asks_again,
+    clock_fault,
+    drift_between,
+    judge,
+    pose_after,
+)
 from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)

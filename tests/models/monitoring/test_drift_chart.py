@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from models.errors import CheckpointError
+from models.geometry.pose import array_of
 from models.monitoring import chart_learning
 from models.monitoring.chart import (
     CLOCK,
     OFFSET_GRID,
     DriftChart,
     GridOffset,
+    chart_from_bytes,
+    chart_to_bytes,
     highest,
     ratios_of,
     trace,
@@ -21,19 +24,18 @@ from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
 from models.monitoring.config import LENGTHS
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
-from models.monitoring.serialization import chart_from_bytes, chart_to_bytes
-from models.monitoring.verdict_reasons import may_be_clock
+from models.monitoring.verdict import may_be_clock
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of, learn_paths
+from models.paths.reference import learn_paths
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
-from models.tracks.observing import observe
 from models.tracks.trajectory import by_end
-from models.walking.reference.learning import learn_speed_reference
+from models.tracks.walks import observe_each
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR
 
-AT = candidate_of(PRIOR)
+AT = array_of(PRIOR)
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = 1000 / 36_500  # a run is 1000 walking groups: of 100 a day
 
@@ -44,7 +46,7 @@ def chart_result(chart, scores, alarms):
 
 def feet(tracks):
     """What is read of feet, in the order of the tracks' ends."""
-    return observe(by_end(replace(track, top_v=None) for track in tracks), LENS)
+    return observe_each(by_end(replace(track, top_v=None) for track in tracks), LENS)
 
 
 @pytest.fixture(scope="module")

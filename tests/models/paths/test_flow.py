@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.ground_flow import rotation_and_turns
+from models.geometry.ground import rotation_and_turns
+from models.geometry.pose import array_of
 from models.paths.config import DIRECTIONS
 from models.paths.ground_steps import place_steps, slope_of, step_on_ground
 from models.paths.likelihood import walkers_of
-from models.paths.reference import candidate_of, learn_paths
+from models.paths.reference import learn_paths
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
 from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Steps
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))
@@ -45,7 +46,7 @@ def step_between(start: np.ndarray, end: np.ndarray) -> Steps:
 
 @pytest.mark.parametrize("number", [0, 1, 2, 3])
 def test_derivatives_are_those_of_differences(site, number):
-    at = candidate_of(TURNED)
+    at = array_of(TURNED)
     step = 1e-6 * np.eye(4)[number]
     steps = site[2].steps
     rotation, turns = rotation_and_turns(at[0], at[1], at[3])
@@ -65,7 +66,7 @@ def test_derivatives_are_those_of_differences(site, number):
 
 
 def test_the_change_of_measure_is_the_jacobian_written_out():
-    at = candidate_of(TURNED)
+    at = array_of(TURNED)
 
     def on_ground(x: float, y: float, angle: float) -> np.ndarray:
         half = 1e-4 * np.array([math.cos(angle), math.sin(angle)])
@@ -86,8 +87,8 @@ def test_the_density_is_one_in_all_and_high_where_people_walk(site):
     flow, known = site[0].density, site[4]
     node = flow.cell_m**2 * 2 * math.pi / DIRECTIONS
     assert np.exp(flow.log_density).sum() * node == pytest.approx(1, abs=1e-3)
-    walkers = walkers_of(known, candidate_of(PRIOR))
-    placed = place_steps(walkers.steps, candidate_of(PRIOR))
+    walkers = walkers_of(known, array_of(PRIOR))
+    placed = place_steps(walkers.steps, array_of(PRIOR))
     all_day = np.zeros(len(placed.place), dtype=np.int64)
     along, _, _ = flow.log_density_at(placed.place, placed.direction, all_day)
     across, _, _ = flow.log_density_at(placed.place, placed.direction + math.pi / 2, all_day)
@@ -132,7 +133,7 @@ def test_off_the_grid_is_elsewhere(site):
 def test_a_camera_sees_what_is_before_it(site):
     coverage = site[0].coverage
     assert coverage.shares.sum() == pytest.approx(1, abs=1e-3)
-    at = candidate_of(PRIOR)
+    at = array_of(PRIOR)
     known, unknown = coverage.seen_from(LENS, at)
     assert known > 0.8
     assert unknown < 0.1
@@ -144,7 +145,7 @@ def test_a_camera_sees_what_is_before_it(site):
 
 def test_scores_are_derivatives_of_the_likelihood(site):
     reference, _, after, _, _ = site
-    at = candidate_of(TURNED)
+    at = array_of(TURNED)
     walkers = walkers_of(after, at)
 
     def value(candidate: np.ndarray) -> float:
@@ -167,7 +168,7 @@ def test_a_turned_camera_is_told_with_its_heading(site):
         )
         assert fused.registered
         assert fused.identifiable == ("tilt", "roll", "height", "heading")
-        off = fused.values - candidate_of(pose)
+        off = fused.values - array_of(pose)
         assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 1.0
         assert np.abs(off / np.sqrt(np.diag(fused.covariance))).max() < 3.5
         assert math.sqrt(fused.covariance[3, 3]) < math.radians(1.0)

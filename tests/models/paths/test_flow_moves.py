@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.geometry.pose import array_of
 from models.paths.likelihood import walkers_of
-from models.paths.path_test import UsualFit
-from models.paths.reference import candidate_of, learn_paths
-from models.paths.turn_detection import StillScores, learn_scores, moved_within
+from models.paths.path_tests import StillScores, UsualFit, learn_scores, moved_within
+from models.paths.reference import learn_paths
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
@@ -20,19 +20,19 @@ from models.simulation.simulated_site import (
     walk_site,
 )
 from models.simulation.walkers import WalkConfig
-from models.tracks.observing import observe
 from models.tracks.trajectory import by_end
+from models.tracks.walks import observe_each
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from studies.paths.flow_study import draw_new_lane, walk_changed
 from tests.models.sites import LENS, PRIOR
 
-AT = candidate_of(PRIOR)
+AT = array_of(PRIOR)
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 
 
 def feet(tracks):
-    return observe([replace(track, top_v=None) for track in tracks], LENS)
+    return observe_each([replace(track, top_v=None) for track in tracks], LENS)
 
 
 def camera_site(speeds, flow):

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.errors import CheckpointError
 from models.paths.coverage import coverage_of
 from models.paths.density_map import of_levels, to_levels
-from models.paths.reference import learn_paths
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import learn_paths, paths_from_bytes, paths_to_bytes
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
 NESTED = ("density", "coverage", "still", "fit")

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from models.geometry.pose import array_of
 from models.paths import folds
 from models.paths.folds import fold_maps
-from models.paths.reference import candidate_of, learn_paths
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import learn_paths, paths_from_bytes, paths_to_bytes
 from models.pose import learn_site
 from models.tracks.trajectory import by_end
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
-AT = candidate_of(PRIOR)
+AT = array_of(PRIOR)
 HOUR_S = 3600.0
 
 

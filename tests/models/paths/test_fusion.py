@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.paths.reference import candidate_of, learn_paths
+from models.geometry.pose import array_of
+from models.paths.reference import learn_paths
 from models.paths.registration import Belief
 from models.pose.fusion import fused_estimate
 from models.pose.modes import birge_ratio
@@ -15,7 +16,7 @@ from models.reasons import TracksCode
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_at_heading, joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import LENS, PRIOR, seen
 
 SLOW = SiteConfig(aside_m=0.8, standing_share=0.0, speed_mean_mps=1.1)
@@ -62,11 +63,11 @@ def test_a_pan_alone_moves_neither_tilt_nor_roll(lanes, site, degrees):
     tracks = walk(lanes, pose, 120, 5)
     joint, found = fused(tracks, site)
     assert found.identifiable == ("tilt", "roll", "height", "heading")
-    off = found.values - candidate_of(pose)
+    off = found.values - array_of(pose)
     assert np.abs(np.degrees(off[[0, 1, 3]])).max() < 0.5
     assert abs(off[2]) < 0.03
     # The fast lane's people are where, and go as, they did: seen with the heading that they have.
-    turned = joint_at_heading(tracks, PRIOR, site[0], candidate_of(pose))
+    turned = joint_at_heading(tracks, PRIOR, site[0], array_of(pose))
     assert turned.log_likelihood > joint.log_likelihood + 1
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.simulation.simulated_site import SiteConfig
-from models.tracks.observing import observe
 from models.tracks.trajectory import Trajectory
+from models.tracks.walks import observe_each
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
 
@@ -30,7 +30,7 @@ def test_nodes_are_the_values_of_weighted_straight_lines():
     clean = straight(time_s)
     uv = clean.uv + rng.normal(0, 1.0, clean.uv.shape)
     tops = uv[:, 1] - 120.0
-    found = observe([Trajectory(time_s=time_s, uv=uv, top_v=tops)], LENS).tops
+    found = observe_each([Trajectory(time_s=time_s, uv=uv, top_v=tops)], LENS).tops
     nodes_s = (4.6 - 4.5) / 2 + 1.5 * np.arange(4)
     for node_s, ray in zip(nodes_s, found.foot_rays, strict=True):
         weight = np.clip(1 - np.abs(time_s - node_s) / 0.7, 0, None)
@@ -44,7 +44,7 @@ def test_nodes_are_the_values_of_weighted_straight_lines():
 
 
 def test_a_step_lies_along_the_line_and_has_no_noise_where_there_is_none():
-    found = observe([straight(np.arange(0.0, 9.1, 0.5))], LENS).steps
+    found = observe_each([straight(np.arange(0.0, 9.1, 0.5))], LENS).steps
     way = found.end_rays - found.start_rays
     np.testing.assert_allclose(way[:, 1] / way[:, 0], 20 / 30)
     np.testing.assert_allclose(way[:, 0], 1.5 * 30 / LENS.fx)
@@ -56,10 +56,17 @@ def test_a_step_lies_along_the_line_and_has_no_noise_where_there_is_none():
 def test_a_gap_and_the_edge_of_the_picture_part_a_track():
     whole = straight(np.arange(0.0, 12.1, 0.4))
     cut = whole.part(np.flatnonzero((whole.time_s < 4.9) | (whole.time_s > 7.0)))
-    assert observe([whole], LENS).steps.rows.linked.sum() == 7
-    assert observe([cut], LENS).steps.rows.linked.tolist() == [False, True, True, False, True, True]
+    assert observe_each([whole], LENS).steps.rows.linked.sum() == 7
+    assert observe_each([cut], LENS).steps.rows.linked.tolist() == [
+        False,
+        True,
+        True,
+        False,
+        True,
+        True,
+    ]
     beyond = straight(np.arange(0.0, 40.1, 0.4))  # leaves the picture after 21 s
-    found = observe([beyond], LENS).steps.rows
+    found = observe_each([beyond], LENS).steps.rows
     assert 18 < found.time_s[-1] < 21
     assert found.owner_idx.tolist() == [0] * found.owner_idx.size
 
@@ -69,10 +76,10 @@ def test_feet_that_a_box_has_lost_below_the_picture_are_not_where_it_ends():
     goes = Trajectory(time_s=time_s, uv=np.column_stack([400 + 0 * time_s, 300 + 20 * time_s]))
     in_view = goes.part(np.flatnonzero(goes.uv[:, 1] < 717))  # two pixels and a half above 719.5
     stays = np.minimum(goes.uv, [np.inf, 719.0])  # from 21 s on the box ends with the picture
-    cut = observe([replace(goes, uv=stays)], LENS).steps
+    cut = observe_each([replace(goes, uv=stays)], LENS).steps
     for field in ("start_rays", "end_rays", "seconds"):
         np.testing.assert_array_equal(
-            getattr(cut, field), getattr(observe([in_view], LENS).steps, field)
+            getattr(cut, field), getattr(observe_each([in_view], LENS).steps, field)
         )
     assert len(cut.rows) == 13
 
@@ -81,12 +88,12 @@ def test_boxes_are_smoothed_as_heights_and_may_be_missing():
     time_s = np.arange(0.0, 6.1, 0.4)
     tops = straight(time_s).uv[:, 1] - 100.0
     tops[:5] = np.nan
-    some = observe([straight(time_s, top_v=tops), straight(time_s)], LENS).tops
+    some = observe_each([straight(time_s, top_v=tops), straight(time_s)], LENS).tops
     assert set(some.rows.owner_idx.tolist()) == {0}
     assert 0 < len(some.rows) < 5
     one = np.full(time_s.size, np.nan)
     one[8] = tops[8]
-    assert not len(observe([straight(time_s, top_v=one)], LENS).tops.rows)
+    assert not len(observe_each([straight(time_s, top_v=one)], LENS).tops.rows)
 
 
 def test_tracks_are_read_the_same_alone_and_together():
@@ -102,7 +109,7 @@ def test_tracks_are_read_the_same_alone_and_together():
         assert (together.steps.rows.owner_idx[here] == number).all()
         at += count
     assert at == len(together.steps.rows)
-    nobody = observe([], LENS)
+    nobody = observe_each([], LENS)
     assert (nobody.tracks, len(nobody.steps.rows), nobody.ended_s.size) == (0, 0, 0)
 
 
@@ -113,7 +120,8 @@ def test_feet_that_are_hidden_for_a_second_are_left_out_and_the_walk_goes_on(box
     high = (time_s > 7.1) & (time_s < 7.9)
     raised = replace(whole, uv=whole.uv - np.outer(high, [0.0, 50.0]))
     found, calm = (
-        observe([each if boxes else replace(each, top_v=None)], LENS) for each in (raised, whole)
+        observe_each([each if boxes else replace(each, top_v=None)], LENS)
+        for each in (raised, whole)
     )
     for field in ("start_rays", "end_rays", "seconds"):
         np.testing.assert_allclose(
@@ -124,6 +132,6 @@ def test_feet_that_are_hidden_for_a_second_are_left_out_and_the_walk_goes_on(box
     np.testing.assert_allclose(found.tops.foot_rays, calm.tops.foot_rays, atol=1e-9)
     for_long = (time_s > 7.1) & (time_s < 11.9)
     gone = replace(whole, uv=whole.uv - np.outer(for_long, [0.0, 50.0]))
-    parted = observe([gone if boxes else replace(gone, top_v=None)], LENS).steps.rows
+    parted = observe_each([gone if boxes else replace(gone, top_v=None)], LENS).steps.rows
     assert parted.linked.sum() == len(parted) - 2
     assert not ((parted.time_s > 7.8) & (parted.time_s < 11.2)).any()

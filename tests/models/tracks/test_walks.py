@@ -4,9 +4,8 @@ import numpy as np
 
 from models.reasons import Reason, TracksCode
 from models.tracks.observations import check_in_time
-from models.tracks.observing import observe as observe_each
 from models.tracks.trajectory import by_end
-from models.tracks.walks import observe, observe_walks
+from models.tracks.walks import observe, observe_each, observe_walks
 from tests.models.sites import LENS, PRIOR, tracks_of
 from tests.models.tracks.test_linking import START_M, walk
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from models.geometry.plane_parameters import plane_parameters_of
+from models.geometry.pose import plane_parameters_of
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import PRIOR, seen, tracks_of
 
 SITES = 14

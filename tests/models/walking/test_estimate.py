@@ -8,17 +8,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from models.errors import CheckpointError, TooFewTrajectoriesError
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.reasons import TracksCode
 from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.config import PLAUSIBLE_OFFSET
 from models.walking.estimate import joint_estimate
-from models.walking.mixed.variance_inflation import shrink_offset
-from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.learning import learn_speed_reference
-from models.walking.serialization import reference_from_bytes, reference_to_bytes
+from models.walking.reference_learning import learn_speed_reference
+from models.walking.speed_reference import (
+    assumed_speed_reference,
+    reference_from_bytes,
+    reference_to_bytes,
+)
+from models.walking.variance_inflation import shrink_offset
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FAR = CameraPose(

@@ -8,13 +8,12 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_seen
 from models.tracks.observations import of_tracks
-from models.tracks.observing import observe
 from models.tracks.trajectory import Trajectory
+from models.tracks.walks import observe_each
 from models.walking.measures import Measured, measure_speeds, measure_statures
 
 LENS = Intrinsics(
@@ -38,7 +37,7 @@ def walk(
 
 
 def speeds(tracks: list[Trajectory], candidate: Array) -> Measured:
-    return measure_speeds(observe(tracks, LENS).steps, candidate, POSE.heading_rad)
+    return measure_speeds(observe_each(tracks, LENS).steps, candidate, POSE.heading_rad)
 
 
 def test_a_walk_at_even_speed_is_measured_as_such_at_the_true_pose():
@@ -61,7 +60,7 @@ def test_twice_the_height_is_twice_the_speed():
 
 def test_statures_are_those_of_the_people():
     tracks = [walk(1.2, tall_m=1.6), walk(0.8, tall_m=1.9)]
-    tops = observe(tracks, LENS).tops
+    tops = observe_each(tracks, LENS).tops
     measured = measure_statures(tops, plane_parameters_of(POSE), POSE.heading_rad)
     assert_allclose(np.exp(measured.value), [1.6] * 5 + [1.9] * 5, rtol=5e-3)
 
@@ -69,7 +68,7 @@ def test_statures_are_those_of_the_people():
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_derivatives_are_those_of_differences(number):
     tracks = [walk(1.2), walk(0.9, direction=AHEAD), walk(1.4, direction=(AHEAD + ASIDE) / 1.414)]
-    observations = observe(tracks, LENS)
+    observations = observe_each(tracks, LENS)
     at = plane_parameters_of(POSE) + [0.03, -0.05, 0.1]
     step = np.zeros(3)
     step[number] = 1e-6
@@ -115,7 +114,7 @@ def test_what_is_above_the_horizon_counts_for_nothing():
 
 def test_a_choice_of_tracks_is_measured_as_if_alone():
     tracks = [walk(1.2), walk(0.8), walk(1.5)]
-    some = of_tracks(observe(tracks, LENS), np.array([0, 2]))
+    some = of_tracks(observe_each(tracks, LENS), np.array([0, 2]))
     chosen = measure_speeds(some.steps, plane_parameters_of(POSE), 0.4)
     alone = speeds([tracks[0], tracks[2]], plane_parameters_of(POSE))
     assert_allclose(chosen.value, alone.value)
@@ -126,7 +125,7 @@ def test_a_gap_and_the_edge_of_the_picture_end_a_run():
     whole = walk(1.2, seconds=12)
     kept = (whole.time_s < 4.6) | (whole.time_s > 7.4)
     broken = Trajectory(time_s=whole.time_s[kept], uv=whole.uv[kept])
-    rows = observe([broken], LENS).steps.rows
+    rows = observe_each([broken], LENS).steps.rows
     assert_allclose(rows.linked, [False, True, True, False, True, True])
     outside = Trajectory(time_s=whole.time_s, uv=whole.uv + [0.0, 5000.0])
-    assert observe([outside], LENS).walkers == 0
+    assert observe_each([outside], LENS).walkers == 0

@@ -13,7 +13,7 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
-from models.walking.reference.learning import learn_speed_reference
+from models.walking.reference_learning import learn_speed_reference
 from tests.models.sites import KNOCKED, PRIOR, seen, tracks_of
 
 

@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from models.geometry.ground import pixel_from_ground
-from models.geometry.ground_speed import walking_speed
+from models.geometry.ground import pixel_from_ground, walking_speed
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from tests.conftest import CAMERA

@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import select
 
 from models.durations import DAY_S
-from models.monitoring.serialization import creep_log_from_bytes
+from models.monitoring.creep import creep_log_from_bytes
 from service.estimation.anchoring import (
     compute_anchor_days,
     load_anchor_days,

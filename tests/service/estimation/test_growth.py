@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sqlalchemy import delete, select
 
-from models.paths.serialization import paths_from_bytes
+from models.paths.reference import paths_from_bytes
 from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from models.monitoring.serialization import chart_from_bytes
+from models.monitoring.chart import chart_from_bytes
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.store import references

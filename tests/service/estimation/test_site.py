@@ -7,10 +7,10 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from models.paths.serialization import paths_from_bytes, paths_to_bytes
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site
 from models.walking.estimate import joint_estimate
-from models.walking.serialization import reference_from_bytes
+from models.walking.speed_reference import reference_from_bytes
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.finding import compute_finding

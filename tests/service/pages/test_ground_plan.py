@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.ground import pixel_from_ground
+from models.geometry.ground import misplacements, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.misplacement import misplacements
 from models.geometry.pose import CameraPose
 from service.pages.drawings.ground_plan import ground_plan_svg, plan_around, view_outline
 from service.pages.drawings.picture import Overlay

@@ -6,10 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from models.geometry.pose_parameters import PoseParameters
+from models.geometry.pose import PoseParameters
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.verdict import Drift, DriftLimits, DriftVerdict
-from models.monitoring.verdict_reasons import reason_of_chart, reason_of_drift
+from models.monitoring.verdict import (
+    Drift,
+    DriftLimits,
+    DriftVerdict,
+    reason_of_chart,
+    reason_of_drift,
+)
 from models.reasons import Reason, TracksCode
 from service.reasons import (
     CODES,

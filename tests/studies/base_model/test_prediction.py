@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from models.errors import TooFewTrajectoriesError
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.simulation.pose_offset import PoseOffset
 from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from studies.base_model.network import SetNetwork

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.rotation import Array
 from models.tracks.observations import Rows
-from models.walking.mixed.model import (
+from models.walking.mixed_model import (
     VarianceComponents,
     Weights,
     composite_log_likelihoods,

@@ -1,26 +1,31 @@
-"""Learn a reference from tracks at a known pose: speeds, boxes, and our own bias there."""
+"""Learn a reference from tracks at a known pose: speeds, boxes, our own bias; what is doubtful."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from models.geometry.plane_parameters import plane_parameters_of
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, plane_parameters_of
+from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, of_tracks
 from models.walking import config
-from models.walking.fit import FitStart, assumed, fit_pose, held_out_log_likelihood
-from models.walking.heads.reference import learn_heads
+from models.walking.estimate import joint_estimate
+from models.walking.field import assumed, held_out_log_likelihood
+from models.walking.fit import FitStart, fit_pose
+from models.walking.heads import learn_heads
 from models.walking.measures import measure_speeds
-from models.walking.mixed.variance_inflation import (
+from models.walking.speed_reference import (
+    SpeedReference,
+    assumed_speed_reference,
+    channels_of,
+    learned_at,
+)
+from models.walking.variance_inflation import (
     Tracks,
     shrink_offset,
     squared_ratio,
     variance_inflation,
 )
-from models.walking.reference.assumed import assumed_speed_reference
-from models.walking.reference.plausibility import implausibility_of
-from models.walking.speed_reference import SpeedReference, channels_of, learned_at, pose_prior
 
 
 def learn_speed_reference(
@@ -35,18 +40,18 @@ def learn_speed_reference(
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step.
     """
-    at, weak = plane_parameters_of(prior), pose_prior(prior)
+    at = plane_parameters_of(prior)
     start = FitStart(candidate=at)
     blank = assumed_speed_reference(observations, prior, walk)
     blank = _cross_validated(observations, prior, blank, seed)
     learned = learned_at(observations, prior, blank, config.EM_ROUNDS)
-    whole = fit_pose(channels_of(observations, learned, prior), start, weak)
+    whole = fit_pose(channels_of(observations, learned, prior), start, prior)
     offset = whole.candidate - at
     unlearned = _with_components(blank, learned)
 
     def error_ratio(train: Tracks, test: Tracks) -> float:
         part = learned_at(of_tracks(observations, train), prior, unlearned, 0)
-        fit = fit_pose(channels_of(of_tracks(observations, test), part, prior), start, weak)
+        fit = fit_pose(channels_of(of_tracks(observations, test), part, prior), start, prior)
         return squared_ratio(fit.candidate - at - offset, fit.covariance)
 
     walkers = np.unique(observations.steps.rows.owner_idx)
@@ -122,3 +127,31 @@ def _with_components(blank: SpeedReference, learned: SpeedReference) -> SpeedRef
         statures = replace(blank.statures, components=learned.statures.components)
     speeds = replace(blank.speeds, components=learned.speeds.components)
     return replace(blank, speeds=speeds, statures=statures)
+
+
+def implausibility_of(
+    observations: Observations, prior: CameraPose, blank: SpeedReference, reference: SpeedReference
+) -> Reason | None:
+    """A reason that names what is too far off to be a bias; None where nothing is."""
+    slow, fast = config.USUAL_SPEEDS_MPS
+    speed_mps, stature_m = reference.walking_speed_mps, reference.stature_m
+    if not slow <= speed_mps <= fast:
+        return Reason(
+            code=TracksCode.SPEED_UNUSUAL,
+            values={"speed_mps": speed_mps, "slow_mps": slow, "fast_mps": fast},
+        )
+    short, tall = config.USUAL_STATURES_M
+    if stature_m is not None and not short <= stature_m <= tall:
+        return Reason(
+            code=TracksCode.STATURE_UNUSUAL,
+            values={"stature_m": stature_m, "short_m": short, "tall_m": tall},
+        )
+    inflated = replace(blank, pose_variance_inflation=reference.pose_variance_inflation)
+    free = joint_estimate(observations, prior, inflated)
+    apart = (free.raw - plane_parameters_of(prior))[:2]
+    sigmas = np.abs(apart) / np.sqrt(np.diag(free.covariance))[:2]
+    if ((np.abs(apart) > config.DOUBTED_RAD) & (sigmas > config.DOUBTED_SIGMAS)).any():
+        tilt, roll = (float(angle) for angle in apart)
+        values = {"tilt_rad": tilt, "roll_rad": roll}
+        return Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
+    return None

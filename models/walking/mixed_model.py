@@ -23,13 +23,16 @@ from models.geometry.rotation import Array, Mask
 from models.serialization import stored_as
 from models.tracks.observations import Rows
 from models.walking import config
-from models.walking.config import FREEDOM
-from models.walking.mixed.sums import moments_of_tracks, whitened
-from models.walking.mixed.weights import log_likelihoods_apart, weights_of_tracks
+from models.walking.mixed_loops import (
+    log_likelihoods_apart,
+    moments_of_tracks,
+    weights_of_tracks,
+    whitened,
+)
 
 # The inverse of a Student-t's information on its middle, for a scale of 1: its weights, one on
 # average, say 1. Source: Lange, Little and Taylor 1989.
-FISHER = (FREEDOM + 3) / (FREEDOM + 1)
+FISHER = (config.FREEDOM + 3) / (config.FREEDOM + 1)
 
 
 class Values(Protocol):
@@ -224,13 +227,13 @@ def h_log_likelihood(
     residual: Array, weights: Weights, rows: Rows, components: VarianceComponents
 ) -> float:
     """The h-likelihood (Lee and Nelder 1996), but for what the components alone decide."""
-    half = (FREEDOM + 1) / 2
+    half = (config.FREEDOM + 1) / 2
     scaled = weights.deviation(residual, rows) / components.within_sd
-    within = (weights.inlier * np.log1p(scaled**2 / FREEDOM)).sum()
+    within = (weights.inlier * np.log1p(scaled**2 / config.FREEDOM)).sum()
     # Correlated rows count as fewer.
     within *= (1 - components.correlation) / (1 + components.correlation)
     level, trend = weights.effects.T
-    between = np.log1p((level / components.between_sd) ** 2 / FREEDOM).sum()
+    between = np.log1p((level / components.between_sd) ** 2 / config.FREEDOM).sum()
     return float(-half * (within + between) - 0.5 * ((trend / components.trend_sd) ** 2).sum())
 
 

@@ -9,9 +9,10 @@ from numpy.testing import assert_allclose
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.tracks.head_foot import HeadFootPairs, observe_heads
+from models.tracks.observations import HeadFootPairs
 from models.tracks.trajectory import Trajectory
-from models.walking.heads.lean_angles import measure_lean_angles
+from models.tracks.walks import observe_heads
+from models.walking.head_angles import measure_lean_angles
 
 LENS = Intrinsics(
     width=1920, height=1080, fx=1300, fy=1250, cx=950, cy=560, distortion=(-0.2, 0.05, 1e-3, 0, 0)

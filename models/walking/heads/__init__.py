@@ -1,1 +1,0 @@
-"""Tilt and roll by people's heads above their feet."""

@@ -1,1 +1,0 @@
-"""A robust linear mixed model of speeds, statures and heads, and its variance inflation."""

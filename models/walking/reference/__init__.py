@@ -1,1 +1,0 @@
-"""Learning a site's reference from its first tracks."""
