@@ -129,7 +129,9 @@ def save_arrival_model(
 ) -> None:
     """Store an arrival model, unless its camera is gone."""
     if session.get(CameraRecord, camera_id) is not None:
-        profile = None if learned is None else _packed(learned)
+        profile = None
+        if learned is not None:
+            profile = {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
         session.merge(
             RhythmRecord(
                 camera_id=camera_id, profile=profile, counts=asdict(counts), learned_at=now
@@ -158,10 +160,6 @@ def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:
 def _cell(hour: int, zone: tzinfo) -> int:
     local = datetime.fromtimestamp(hour * HOUR_S, UTC).astimezone(zone)
     return local.hour + (24 if local.weekday() >= 5 else 0)
-
-
-def _packed(learned: ArrivalModel) -> dict[str, Any]:
-    return {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
 
 
 def _counts(stored: dict[str, Any] | None) -> HourCounts:

@@ -17,7 +17,9 @@ from models.pose import (
     AlarmRate,
     CameraSite,
     Creep,
+    FusedEstimate,
     Observations,
+    PartialFailure,
     SecondLook,
     WarmStart,
     alarm_chart_result,
@@ -25,11 +27,10 @@ from models.pose import (
     count_walks,
     estimate_pose,
     observe_walks,
+    unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
-from models.pose.estimating import PartialFailure, unless_failed
-from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 from models.regression.averaging import (
     FEWEST_TRACKS,

@@ -48,9 +48,8 @@ _NEW_SHARE = 0.25  # of the tracks that the map was learned of
 class GrowthPeriod:
     """All that a map is to be learned of anew, in the order of the tracks' ends.
 
-    `weights` (N,) are what they count for. `kept` is the map that there is, as bytes, where all of
-    it is known to be still. `replaces` is when the map that there is was learned,
-    `spoilt` whether it has tracks in it of a time that is no longer known to be still.
+    `weights` (N,) are what they count for. `kept` is the map that there is, `spoilt` where it has
+    tracks in it of a time that is no longer known to be still.
     """
 
     reference_id: int
@@ -60,11 +59,10 @@ class GrowthPeriod:
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
     weights: Array
-    kept: bytes | None
+    kept: FlowMapRecord | None
+    spoilt: bool
     to_s: float
     taken_at: datetime
-    replaces: datetime | None
-    spoilt: bool
 
 
 def load_growth(
@@ -87,7 +85,11 @@ def load_growth(
         return None
     to_s = found[-1].ended_s if found else reference.to_s
     weights = _faded(to_s - np.array([record.ended_s for record in found]), settings)
-    if kept is not None and not spoilt and weights.sum() < _still_counts(kept, to_s, settings):
+    if (
+        kept is not None
+        and not spoilt
+        and weights.sum() < kept.weight * _faded(to_s - kept.to_s, settings)
+    ):
         return None  # retention has deleted more than has come: the map knows more than they
     intrinsics, unpacked = camera.intrinsics, unpacked or Unpacked()
     return GrowthPeriod(
@@ -98,11 +100,10 @@ def load_growth(
         prior=cameras.prior_pose(session, camera_id).pose,
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
         weights=weights,
-        kept=None if kept is None or spoilt else kept.data,
+        kept=kept,
+        spoilt=spoilt,
         to_s=to_s,
         taken_at=datetime.now(UTC),
-        replaces=None if kept is None else kept.learned_at,
-        spoilt=spoilt,
     )
 
 
@@ -140,10 +141,6 @@ def _still_tracks(
     return windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
 
 
-def _still_counts(kept: FlowMapRecord, to_s: float, settings: Settings) -> float:
-    return kept.weight * float(_faded(np.array(to_s - kept.to_s), settings))
-
-
 def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     """The map and the chart of a period; None where too few of its tracks walk.
 
@@ -158,6 +155,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
         trajectories = tuple(track for track in stood if track is not None)
         weights = weights[[track is not None for track in stood]]
+    known = None if period.kept is None or period.spoilt else period.kept.data
     grown = learn_site(
         observe(trajectories, period.intrinsics, period.prior),
         period.intrinsics,
@@ -165,7 +163,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
         weights=weights,
-        chosen=None if period.kept is None else paths_from_bytes(period.kept).bandwidths,
+        chosen=None if known is None else paths_from_bytes(known).bandwidths,
     )
     return paths_of(grown)
 
@@ -177,8 +175,8 @@ def save_growth(
     reference = references.newest_if_any(session, camera_id)
     if reference is None or reference.id != period.reference_id:
         return False
-    kept = session.get(FlowMapRecord, reference.id)
-    if (None if kept is None else kept.learned_at) != period.replaces:
+    kept, before = session.get(FlowMapRecord, reference.id), period.kept
+    if (kept and kept.learned_at) != (before and before.learned_at):
         return False
     if learned is None and kept is not None and kept.data is not None and not period.spoilt:
         return False
@@ -252,5 +250,5 @@ def _is_spoilt(
     )
 
 
-def _faded(age_s: Array, settings: Settings) -> Array:
-    return np.asarray(0.5 ** (age_s / (settings.flow_half_life_days * DAY_S)))
+def _faded(age_s: Array | float, settings: Settings) -> Array:
+    return np.asarray(0.5 ** (np.asarray(age_s) / (settings.flow_half_life_days * DAY_S)))

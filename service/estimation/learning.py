@@ -9,15 +9,15 @@ from sqlalchemy.orm import Session
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.pose import learn_site, observe
+from models.pose import CameraSite, learn_site, observe
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import SpeedReference, reference_to_bytes
+from models.walking.speed_reference import reference_to_bytes
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
-from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
+from service.estimation.anchoring import keep_anchor, paths_of
 from service.estimation.evidence import Unpacked, until_so_many, walk_of
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
@@ -44,14 +44,6 @@ class ReferencePeriod:
     walk: WalkConfig
     trajectories: tuple[Trajectory, ...]
     to_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LearnedReference:
-    """A reference as learned; `paths` are None where too few people walk."""
-
-    site: SpeedReference
-    paths: LearnedPaths | None
 
 
 def load_reference_period(
@@ -92,14 +84,13 @@ def load_reference_period(
     )
 
 
-def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
+def compute_reference(period: ReferencePeriod, seed: int) -> CameraSite | None:
     """The walkers and paths that are usual at the site; None where too few of the tracks walk."""
     observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
-        site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
+        return learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    return LearnedReference(site=site.speed_reference, paths=paths_of(site))
 
 
 def save_reference(
@@ -107,7 +98,7 @@ def save_reference(
     settings: Settings,
     camera_id: str,
     period: ReferencePeriod,
-    learned: LearnedReference | None,
+    learned: CameraSite | None,
 ) -> None:
     """Make a learned reference the one that counts, unless another has begun meanwhile.
 
@@ -119,7 +110,7 @@ def save_reference(
     if learned is None:
         record.wanted += max(record.wanted, 1)
         return
-    site = learned.site
+    site, paths = learned.speed_reference, paths_of(learned)
     record.to_s = period.to_s
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
@@ -131,15 +122,15 @@ def save_reference(
     session.add(
         FlowMapRecord(
             reference_id=record.id,
-            data=None if learned.paths is None else learned.paths.flow,
-            chart=None if learned.paths is None else learned.paths.chart,
+            data=None if paths is None else paths.flow,
+            chart=None if paths is None else paths.chart,
             tracks=record.tracks,
             weight=float(record.tracks),
             to_s=period.to_s,
             learned_at=record.ready_at,
         )
     )
-    keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
+    keep_anchor(session, record.id, paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.implausible is not None:
         _warn(session, settings, camera_id, site.implausible)
 

@@ -1,6 +1,7 @@
 """The key of a data directory, that is not in the database, and the secrets that it seals."""
 
 import base64
+import contextlib
 import hashlib
 import os
 import secrets
@@ -222,17 +223,13 @@ def _check_file_or_environment(settings: Settings, sealed: list[str]) -> None:
 
 def _stored_secrets(settings: Settings) -> list[tuple[str, str]]:
     """The ids of webhooks with their secrets as they are stored."""
-    store = Store(settings)
-    try:
-        with store.read() as session:
-            return [
-                (record.id, text)
-                for record in webhooks.every(session)
-                for text in (record.secret, record.old_secret)
-                if text is not None
-            ]
-    finally:
-        store.close()
+    with contextlib.closing(Store(settings)) as store, store.read() as session:
+        return [
+            (record.id, text)
+            for record in webhooks.every(session)
+            for text in (record.secret, record.old_secret)
+            if text is not None
+        ]
 
 
 def _purpose(webhook_id: str) -> str:

@@ -34,13 +34,13 @@ class Readiness:
     looked at.
     """
 
-    store_writable: bool
-    worker_alive: bool
-    worker_silent_s: float | None
-    queue_lag_s: float
-    failing_cameras: int
-    ready: bool
     problems: tuple[str, ...]
+    store_writable: bool = False
+    worker_alive: bool = False
+    worker_silent_s: float | None = None
+    queue_lag_s: float = 0.0
+    failing_cameras: int = 0
+    ready: bool = False
 
 
 def check_readiness(store: Store, settings: Settings) -> Readiness:
@@ -85,15 +85,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
 def _unwritable(error: SQLAlchemyError | OverloadedError) -> Readiness:
     known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
     detail = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
-    return Readiness(
-        store_writable=False,
-        worker_alive=False,
-        worker_silent_s=None,
-        queue_lag_s=0.0,
-        failing_cameras=0,
-        ready=False,
-        problems=(detail if detail.startswith("store: ") else f"store: {detail}",),
-    )
+    return Readiness(problems=(detail if detail.startswith("store: ") else f"store: {detail}",))
 
 
 def _disk_problems(settings: Settings, free_mb: float) -> list[str]:
