@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Index, func, select
+from sqlalchemy import ColumnElement, Index, bindparam, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose import PoseParameters
@@ -109,9 +109,13 @@ class EstimateRecord(Record):
         )
 
 
+# Built once: a post of tracks asks for it.
+_NEWEST = newest_first(EstimateRecord, bindparam("camera")).limit(1)
+
+
 def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     """The estimate that is served, or None."""
-    return session.scalars(newest_first(EstimateRecord, camera_id).limit(1)).first()
+    return session.scalars(_NEWEST, {"camera": camera_id}).first()
 
 
 def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> EstimateRecord | None:
