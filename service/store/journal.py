@@ -35,9 +35,9 @@ class ActivityRecord(Record):
     """An act of somebody, or of the service where `by` is None.
 
     `camera_id` refers to nothing, so that it stays when the camera goes; `subject_id` is the
-    alert's, training's or window's, `via` the token's. `kind` and `outcome` are an alert's, `until` of a silence or of
-    maintenance; `note` has the words that were given. Triggers refuse changes, and deletions of
-    what is younger than 30 days.
+    alert's, training's or window's, `via` the token's. `kind` and `outcome` are an alert's, `until`
+    of a silence or of maintenance; `note` has the words that were given. Triggers refuse changes,
+    and deletions of what is younger than 30 days.
     """
 
     __tablename__ = "activity"
