@@ -18,7 +18,7 @@ from service.workers.processes.process import be_private
 from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:
-    from models.simulation.pose_offset import PoseOffset
+    from models.simulation.poses import PoseOffset
 
 app = typer.Typer(
     help="Tells when a fixed camera has moved, by how much, and its pose now.",
@@ -146,7 +146,7 @@ def demo(
 
 
 def _knock(text: str) -> "PoseOffset":
-    from models.simulation.pose_offset import PoseOffset
+    from models.simulation.poses import PoseOffset
 
     try:
         tilt_deg, roll_deg, log_height = (float(part) for part in text.split(","))

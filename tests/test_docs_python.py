@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import surefoot
-from models.simulation.simulated_site import SiteConfig
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, near, tracks_of
 
 DOCS = Path(__file__).parents[1] / "docs"

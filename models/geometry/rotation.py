@@ -14,6 +14,7 @@ from models.errors import ShapeError
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
+Index = npt.NDArray[np.int64]
 
 
 def rotation_from_angles(tilt_rad: Any, roll_rad: Any, heading_rad: Any) -> Array:

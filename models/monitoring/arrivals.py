@@ -16,23 +16,7 @@ import numpy as np
 
 from models.durations import HOUR_S
 from models.geometry.rotation import Array
-from models.monitoring.config import (
-    BURST_UNKNOWN,
-    CHANGES_PER_HOUR,
-    DAY_VARIANCE,
-    DAY_WEIGHT,
-    FEW_GROUPS,
-    FEWEST_GAPS,
-    FEWEST_WEEKDAYS,
-    FEWEST_WEEKEND_DAYS,
-    IMPLAUSIBLE,
-    QUIET_LEVEL,
-    QUIET_SHAPE,
-    QUIET_SHARE,
-    SHAPES,
-    TAIL,
-    TURNS_QUIET,
-)
+from models.monitoring import config
 
 CELLS = 48  # the hours of a weekday, then those of a day of a weekend
 _HOURS_PER_YEAR = 8766.0
@@ -137,7 +121,10 @@ def chance_of_silence(
         expected: tracks expected in these.
     """
     missed, seen, expected = (number / process.burst for number in (missed, seen, expected))
-    levels = ((process.shape, process.shape), (QUIET_SHAPE, QUIET_SHAPE / QUIET_LEVEL))
+    levels = (
+        (process.shape, process.shape),
+        (config.QUIET_SHAPE, config.QUIET_SHAPE / config.QUIET_LEVEL),
+    )
     # Gamma-Poisson: what was seen makes (a, b) into (a + seen, b + expected).
     logs = [
         math.log(share)
@@ -145,13 +132,13 @@ def chance_of_silence(
         - math.lgamma(a)
         + a * math.log(b)
         - (a + seen) * math.log(b + expected)
-        for share, (a, b) in zip((1 - QUIET_SHARE, QUIET_SHARE), levels, strict=True)
+        for share, (a, b) in zip((1 - config.QUIET_SHARE, config.QUIET_SHARE), levels, strict=True)
     ]
     weights = [math.exp(value - max(logs)) for value in logs]
     same = [((b + expected) / (b + expected + missed)) ** (a + seen) for a, b in levels]
     other = [(b / (b + missed)) ** a for a, b in levels]
-    changed = 1 - (1 - CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
-    after_change = (1 - TURNS_QUIET) * other[0] + TURNS_QUIET * other[1]
+    changed = 1 - (1 - config.CHANGES_PER_HOUR) ** (silent_s / HOUR_S)
+    after_change = (1 - config.TURNS_QUIET) * other[0] + config.TURNS_QUIET * other[1]
     unchanged = sum(w * chance for w, chance in zip(weights, same, strict=True)) / sum(weights)
     return float((1 - changed) * unchanged + changed * after_change)
 
@@ -169,7 +156,7 @@ def judge_silence(
     if silent_s < rule.least_s or not is_missed(process, missed):
         return SilenceVerdict.USUAL
     chance = chance_of_silence(process, missed, silent_s, seen, expected)
-    if silent_s > rule.limit_s and chance < IMPLAUSIBLE:
+    if silent_s > rule.limit_s and chance < config.IMPLAUSIBLE:
         return SilenceVerdict.TOO_LONG
     allowed = rule.false_per_year / max(process.arrivals_per_year, 1.0)
     return SilenceVerdict.IMPROBABLE if chance < allowed else SilenceVerdict.USUAL
@@ -177,7 +164,7 @@ def judge_silence(
 
 def is_missed(process: ArrivalProcess, missed: float) -> bool:
     """True where more than a few walking groups should have come: fewer may stay away any day."""
-    return missed > FEW_GROUPS * process.burst
+    return missed > config.FEW_GROUPS * process.burst
 
 
 def delay_of(latest_s: Array) -> float:
@@ -200,7 +187,9 @@ def _rates(counts: Array, cells: np.ndarray, known: np.ndarray) -> Array:
     """Tracks an hour (48,): of each hour of the day, with one more day like the hours beside it."""
     days = np.bincount(cells[known], minlength=CELLS).astype(float)
     sums = np.bincount(cells[known], weights=counts[known], minlength=CELLS)
-    apart = days[:24].max() >= FEWEST_WEEKDAYS and days[24:].max() >= FEWEST_WEEKEND_DAYS
+    apart = (
+        days[:24].max() >= config.FEWEST_WEEKDAYS and days[24:].max() >= config.FEWEST_WEEKEND_DAYS
+    )
     if not apart:
         days, sums = (np.tile(part[:24] + part[24:], 2) for part in (days, sums))
     rates = np.zeros(CELLS)
@@ -224,10 +213,10 @@ def _burst(rates: Array, known: np.ndarray, first_hour: int, times_s: Array) -> 
     rescaled = rescaled[np.diff(unseen[np.minimum(place.astype(int), len(rates))]) == 0]
     found = [
         float(np.quantile(rescaled, share)) / -math.log(1 - share)
-        for share in TAIL
-        if len(rescaled) * (1 - share) >= FEWEST_GAPS
+        for share in config.TAIL
+        if len(rescaled) * (1 - share) >= config.FEWEST_GAPS
     ]
-    return max(1.0, *found) if found else BURST_UNKNOWN
+    return max(1.0, *found) if found else config.BURST_UNKNOWN
 
 
 def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
@@ -240,5 +229,7 @@ def _shape(counts: Array, rates: Array, known: np.ndarray) -> float:
     seen, expected = (part.reshape(-1, 24).sum(axis=1) for part in (counts, rates))
     seen, expected = seen[expected > 0], expected[expected > 0]
     excess = (seen / expected - 1) ** 2 - 1 / expected
-    variance = (DAY_WEIGHT * DAY_VARIANCE + float(excess.sum())) / (DAY_WEIGHT + len(excess))
-    return float(np.clip(1 / max(variance, 1e-6), *SHAPES))
+    variance = (config.DAY_WEIGHT * config.DAY_VARIANCE + float(excess.sum())) / (
+        config.DAY_WEIGHT + len(excess)
+    )
+    return float(np.clip(1 / max(variance, 1e-6), *config.SHAPES))

@@ -13,21 +13,10 @@ is in the ratio, so that no number of new people makes a reference's own error a
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.errors import CheckpointError
-from models.geometry.rotation import Array
-from models.monitoring.config import (
-    FEWEST_GROUPS,
-    HABITS,
-    LEAST_LEVEL,
-    LENGTHS,
-    OFFSET_SIZES,
-    OTHER_PEOPLE,
-    SCORE_BOUND,
-    STRONGEST,
-    SUSPICION,
-)
+from models.geometry.rotation import Array, Index, Mask
+from models.monitoring import config
 from models.monitoring.group_scores import GroupScores
 from models.serialization import Format, flattened, from_bytes, restored, stored_as, to_bytes
 from models.walking.speed_reference import SpeedReference
@@ -57,7 +46,7 @@ class GridOffset:
 
 OFFSET_GRID = tuple(
     GridOffset(parameter=parameter, size=sign * size)
-    for parameter, sizes in enumerate(OFFSET_SIZES)
+    for parameter, sizes in enumerate(config.OFFSET_SIZES)
     for sign in (1, -1)
     for size in sizes
 )
@@ -89,13 +78,13 @@ class DriftChart:
         """Level passed so many times by the statistic in 1000 groups of a still camera."""
         share = -np.expm1(-alarms_a_run)
         learned = self.typical + self.tail * max(float(np.log(0.5 / share)), 0.0)
-        return max(learned, LEAST_LEVEL - float(np.log(share))) * _unsure(
+        return max(learned, config.LEAST_LEVEL - float(np.log(share))) * _unsure(
             self.walking_groups, len(self.mean)
         )
 
     def bounded(self, scores: Array) -> Array:
         """Scores (..., 14) in units of their width, none farther from the middle than 5."""
-        return np.clip((scores - self.middle) / self.width, -SCORE_BOUND, SCORE_BOUND)
+        return np.clip((scores - self.middle) / self.width, -config.SCORE_BOUND, config.SCORE_BOUND)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,9 +140,9 @@ def chart_result(
         calm_ratio: of its level, below which the chart is calm.
         calm_groups: how many walking groups in a row it must be, to have calmed down.
     """
-    if len(scores.values) < FEWEST_GROUPS:
+    if len(scores.values) < config.FEWEST_GROUPS:
         return None
-    most = int(LENGTHS[-1])
+    most = int(config.LENGTHS[-1])
     newest = chart.bounded(scores.values[-most:])
     path = trace(ratios_of(chart), newest - chart.mean)
     level = chart.level(alarms_a_run)
@@ -170,11 +159,11 @@ def chart_result(
         sign=1 if offset.size > 0 else -1,
         walking_groups=walking_groups,
         track_idx=int(scores.last[-most:][at + 1 - walking_groups]),
-        suspicious=statistic > chart.level(SUSPICION * alarms_a_run),
+        suspicious=statistic > chart.level(config.SUSPICION * alarms_a_run),
     )
 
 
-def _last_calm(calm: npt.NDArray[np.bool_], walking_groups: int) -> int:
+def _last_calm(calm: Mask, walking_groups: int) -> int:
     """The last place (T,) at which so many, or all so far, were calm; else the first of them."""
     run = 0
     since = 0
@@ -198,19 +187,21 @@ class Trace:
     """The statistic (T,) after each of groups, the offset and the groups that it is of (T,)."""
 
     statistic: Array
-    offset_idx: npt.NDArray[np.int64]
-    walking_groups: npt.NDArray[np.int64]
+    offset_idx: Index
+    walking_groups: Index
 
 
 def ratios_of(chart: DriftChart) -> Ratios:
     """The weights of a chart for each number of newest walking groups."""
     slopes = np.stack(
-        [slope_of(chart, parameter) for parameter in range(len(OFFSET_SIZES))], axis=1
+        [slope_of(chart, parameter) for parameter in range(len(config.OFFSET_SIZES))], axis=1
     )
-    habits = (slopes * HABITS) @ (slopes * HABITS).T
+    habits = (slopes * config.HABITS) @ (slopes * config.HABITS).T
     weights, strengths = [], []
-    for length in LENGTHS:
-        noise = chart.covariance * (1 / length + OTHER_PEOPLE / chart.walking_groups) + habits
+    for length in config.LENGTHS:
+        noise = (
+            chart.covariance * (1 / length + config.OTHER_PEOPLE / chart.walking_groups) + habits
+        )
         weights.append(np.linalg.solve(noise, chart.responses))
         strengths.append(np.einsum("fk,fk->k", chart.responses, weights[-1]))
     return Ratios(weights=np.array(weights), strengths=np.maximum(strengths, 1e-12))
@@ -222,7 +213,9 @@ def trace(ratios: Ratios, apart: Array) -> Trace:
     sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
     statistic = np.full(count, -np.inf)
     offset_idx, walking_groups = np.zeros((2, count), dtype=np.int64)
-    for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
+    for length, weights, strengths in zip(
+        config.LENGTHS, ratios.weights, ratios.strengths, strict=True
+    ):
         if length > count:
             break
         shown = (sums[length:] - sums[:-length]) @ weights / length
@@ -244,7 +237,9 @@ def highest(ratios: Ratios, apart: Array) -> float:
     """
     sums = np.concatenate([np.zeros((1, apart.shape[1])), np.cumsum(apart, axis=0)])
     found = -np.inf
-    for length, weights, strengths in zip(LENGTHS, ratios.weights, ratios.strengths, strict=True):
+    for length, weights, strengths in zip(
+        config.LENGTHS, ratios.weights, ratios.strengths, strict=True
+    ):
         if length > len(apart):
             break
         shown = (sums[length:] - sums[:-length]) @ weights / length
@@ -254,13 +249,13 @@ def highest(ratios: Ratios, apart: Array) -> float:
 
 def _ratio(shown: Array, strengths: Array) -> Array:
     """Log likelihood ratios of offsets (..., K), each as strong as is likeliest in its reach."""
-    times = np.clip(shown / strengths, 1.0, STRONGEST)
+    times = np.clip(shown / strengths, 1.0, config.STRONGEST)
     return np.asarray(times * shown - times**2 * strengths / 2)
 
 
 def slope_of(chart: DriftChart, parameter: int) -> Array:
     """The response (14,) to a unit of a parameter, by its smallest offsets both ways."""
-    size = OFFSET_SIZES[parameter][0]
+    size = config.OFFSET_SIZES[parameter][0]
     on, back = (
         OFFSET_GRID.index(GridOffset(parameter=parameter, size=sign * size)) for sign in (1, -1)
     )

@@ -3,26 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.pose import CameraPose, array_of
-from models.geometry.rotation import Array
-from models.monitoring.chart import (
-    OFFSET_GRID,
-    DriftChart,
-    highest,
-    ratios_of,
-)
-from models.monitoring.config import (
-    BLOCK,
-    BOOTSTRAP_RUNS,
-    FEWEST_GROUPS,
-    LEAST_BLOCKS,
-    LEAST_SHRINKAGE,
-    RESPONSE_GROUPS,
-    RIDGE,
-    RUN,
-)
+from models.geometry.rotation import Array, Index
+from models.monitoring import config
+from models.monitoring.chart import OFFSET_GRID, DriftChart, highest, ratios_of
 from models.monitoring.group_scores import SCORES, Usual, scores_at
 from models.paths.folds import Fold, Folds
 from models.paths.likelihood import walkers_of
@@ -41,7 +26,7 @@ class _FoldScores:
     """
 
     still: Array
-    times: npt.NDArray[np.int64]
+    times: Index
     before: Array
     offset: Array
 
@@ -72,12 +57,12 @@ def learn_chart(
     """
     check_in_time(observations)
     scored: list[_FoldScores] = []
-    wanted = RESPONSE_GROUPS
+    wanted = config.RESPONSE_GROUPS
     for fold in folds.each:
         scored.append(_fold_scores(observations, prior, site, fold, wanted))
         wanted -= len(scored[-1].before)
     count = sum(len(part.still) for part in scored)
-    if count < FEWEST_GROUPS:
+    if count < config.FEWEST_GROUPS:
         return None
     order = np.argsort(np.concatenate([part.times for part in scored]), kind="stable")
     scores = np.concatenate([part.still for part in scored])[order]
@@ -149,8 +134,8 @@ def _covariance(scores: Array) -> Array:
     variance = products.var(axis=0) * count**2 / (count - 1) ** 3
     beside = ~np.eye(len(sd), dtype=bool)
     shrunk = variance[beside].sum() / max(float((correlation[beside] ** 2).sum()), 1e-9)
-    shrunk = float(np.clip(shrunk, LEAST_SHRINKAGE, 1.0))
-    own = (1 + RIDGE) * np.eye(len(sd))
+    shrunk = float(np.clip(shrunk, config.LEAST_SHRINKAGE, 1.0))
+    own = (1 + config.RIDGE) * np.eye(len(sd))
     return np.asarray(((1 - shrunk) * correlation * beside + own) * np.outer(sd, sd))
 
 
@@ -158,17 +143,17 @@ def _reached(chart: DriftChart, scores: Array, rng: np.random.Generator) -> Arra
     """The highest statistic of each of so many runs of a still camera."""
     ratios = ratios_of(chart)
     count = len(scores)
-    reached = np.empty(BOOTSTRAP_RUNS)
-    for run in range(BOOTSTRAP_RUNS):
+    reached = np.empty(config.BOOTSTRAP_RUNS)
+    for run in range(config.BOOTSTRAP_RUNS):
         taken_for_usual = scores[drawn_blocks(rng, count, count)].mean(axis=0)
         people = scores[drawn_blocks(rng, count, count)]
-        walked = people[drawn_blocks(rng, count, RUN)]
+        walked = people[drawn_blocks(rng, count, config.RUN)]
         reached[run] = highest(ratios, walked - taken_for_usual)
     return reached
 
 
-def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> npt.NDArray[np.int64]:
+def drawn_blocks(rng: np.random.Generator, count: int, wanted: int) -> Index:
     """Indices (wanted,) of walking groups, some after one another at a time."""
-    block = min(BLOCK, -(-count // LEAST_BLOCKS))
+    block = min(config.BLOCK, -(-count // config.LEAST_BLOCKS))
     starts = rng.integers(0, count, -(-wanted // block))
     return np.asarray(((starts[:, None] + np.arange(block)).ravel() % count)[:wanted])

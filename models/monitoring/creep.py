@@ -23,24 +23,11 @@ test with an unknown start; the ramp in the place of a jump is ours.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.durations import DAY_S
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
+from models.monitoring import config
 from models.monitoring.chart import DriftChart, TestStatistic, slope_of
-from models.monitoring.config import (
-    BLOCK_DAYS,
-    CREEP_DAYS,
-    CREEP_RAD,
-    CREEP_TESTS,
-    CREEPING_SHARE,
-    FEWEST_LOGGED,
-    FREE_RAD,
-    HABITS_OF_DAYS,
-    MOST_BLOCKS,
-    OTHER_PEOPLE,
-    SEASON_DAYS,
-)
 from models.monitoring.group_scores import GroupScores
 from models.quantiles import value_below
 from models.serialization import Format, flattened, from_bytes, restored, to_bytes
@@ -57,7 +44,7 @@ class CreepLog:
     the last of them on the day `since_day`.
     """
 
-    day_idx: npt.NDArray[np.int64]
+    day_idx: Index
     groups: Array
     pulls: Array
     information: Array
@@ -114,16 +101,16 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
     """The newest weeks since a time, the newest first; None of too few people."""
     from_day = -np.inf if from_s is None else np.ceil(from_s / DAY_S)
     kept = (log.day_idx >= from_day) & (log.groups > 0)
-    if log.groups[kept].sum() < FEWEST_LOGGED:
+    if log.groups[kept].sum() < config.FEWEST_LOGGED:
         return None
     day_idx, groups = log.day_idx[kept], log.groups[kept]
-    ago, week = np.unique((day_idx[-1] - day_idx) // BLOCK_DAYS, return_inverse=True)
+    ago, week = np.unique((day_idx[-1] - day_idx) // config.BLOCK_DAYS, return_inverse=True)
     people = np.bincount(week, groups)
     pulls = np.zeros((ago.size, NUMBERS))
     np.add.at(pulls, week, log.pulls[kept])
     first = np.full(ago.size, np.inf)
     np.minimum.at(first, week, day_idx.astype(np.float64))
-    newest = slice(0, MOST_BLOCKS)
+    newest = slice(0, config.MOST_BLOCKS)
     moves = np.linalg.solve(_group_information(log), (pulls / people[:, None]).T)
     return Weeks(
         groups=np.asarray(people[newest], dtype=np.float64),
@@ -139,14 +126,14 @@ def noise_of(log: CreepLog, weeks: Weeks) -> Array:
     """The covariance (5 B, 5 B) of the weeks' mean moves if the camera stands."""
     person = np.linalg.inv(_group_information(log))
     apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
-    people = np.diag(1 / weeks.groups) + OTHER_PEOPLE / log.reference_groups
-    habits = np.exp(-apart / SEASON_DAYS) + np.diag(1 / weeks.days)
-    return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(HABITS_OF_DAYS**2)))
+    people = np.diag(1 / weeks.groups) + config.OTHER_PEOPLE / log.reference_groups
+    habits = np.exp(-apart / config.SEASON_DAYS) + np.diag(1 / weeks.days)
+    return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(config.HABITS_OF_DAYS**2)))
 
 
 def _group_information(log: CreepLog) -> Array:
     """Information of a group (5, 5), none of it so small that it cannot be inverted."""
-    return np.asarray(log.information + np.eye(NUMBERS) / FREE_RAD**2)
+    return np.asarray(log.information + np.eye(NUMBERS) / config.FREE_RAD**2)
 
 
 def _slopes(chart: DriftChart) -> Array:
@@ -182,7 +169,7 @@ def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = Non
     scores = ramp_scores(log, from_s)
     if scores is None:
         return None
-    chance = min(alarms_a_year / CREEP_TESTS, 0.5) / 2
+    chance = min(alarms_a_year / config.CREEP_TESTS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
     statistics = scores.score**2 / scores.information
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
@@ -262,11 +249,16 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     scores = ramp_scores(log, from_s)
     if scores is None:
         return turns
-    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / CREEP_DAYS
-    usual = (CREEP_RAD * months) ** 2
+    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / config.CREEP_DAYS
+    usual = (config.CREEP_RAD * months) ** 2
     size = usual * scores.score / (1 + usual * scores.information)
     ratio = 0.5 * (size * scores.score - np.log1p(usual * scores.information))
-    odds = CREEPING_SHARE / (1 - CREEPING_SHARE) / ratio.size * np.exp(np.clip(ratio, -50.0, 50.0))
+    odds = (
+        config.CREEPING_SHARE
+        / (1 - config.CREEPING_SHARE)
+        / ratio.size
+        * np.exp(np.clip(ratio, -50.0, 50.0))
+    )
     probability = odds / (1 + odds.sum())
     turns[:, ANGLES] = ((probability * size) @ scores.ramps.at(np.asarray(days))).T
     return turns

@@ -12,11 +12,10 @@ these tells a move, and how well, is learned of the site (`chart_learning`). The
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.pose import CameraPose, array_of, plane_parameters_of
-from models.geometry.rotation import Array
-from models.monitoring.config import LARGEST_RESIDUAL, PACE_SD, STATURE_SD, STEP_SHARES
+from models.geometry.rotation import Array, Index
+from models.monitoring import config
 from models.paths.config import REACH
 from models.paths.likelihood import PathModel, Walkers, walkers_of
 from models.paths.path_tests import along_paths, groups_in_time, sums_of_groups
@@ -27,7 +26,7 @@ from models.walking.measures import Measured, measure_speeds, measure_statures
 from models.walking.speed_reference import SpeedReference, channels_of
 
 SCORES = 14
-_STEPS = np.concatenate([share * np.diag(REACH) for share in STEP_SHARES])
+_STEPS = np.concatenate([share * np.diag(REACH) for share in config.STEP_SHARES])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +43,7 @@ class GroupScores:
     """Scores (P, 14) of walking groups in the order of their last tracks (P,)."""
 
     values: Array
-    last: npt.NDArray[np.int64]
+    last: Index
 
 
 def score_groups(
@@ -104,10 +103,12 @@ def _bounded(
     """Weighted residuals of paces, and of statures where boxes have them, bounded."""
     heading, speed_reference = usual.prior.heading_rad, usual.speed_reference
     speeds = measure_speeds(walkers.steps, parameters, heading)
-    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / PACE_SD**2
+    scores = _off(speeds, speed_reference.speeds, walkers.tracks) / config.PACE_SD**2
     if speed_reference.statures is not None:
         tops = measure_statures(observations.tops, parameters, heading)
-        scores = scores + _off(tops, speed_reference.statures, walkers.tracks) / STATURE_SD**2
+        scores = (
+            scores + _off(tops, speed_reference.statures, walkers.tracks) / config.STATURE_SD**2
+        )
     return scores
 
 
@@ -116,7 +117,7 @@ def _off(measured: Measured, learned: Learned, tracks: int) -> Array:
     features = learned.field.features(measured)
     residual = np.where(measured.valid, measured.value - features @ learned.mean, 0.0)
     slopes = measured.d_value - learned.field.slopes(measured, features, learned.mean)
-    pull = -np.clip(residual, -LARGEST_RESIDUAL, LARGEST_RESIDUAL)[:, None] * slopes
+    pull = -np.clip(residual, -config.LARGEST_RESIDUAL, config.LARGEST_RESIDUAL)[:, None] * slopes
     sums = np.zeros((tracks, 3))
     np.add.at(sums, measured.rows.owner_idx, pull * measured.valid[:, None])
     number = np.bincount(measured.rows.owner_idx, measured.valid, tracks)

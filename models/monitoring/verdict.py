@@ -8,15 +8,8 @@ from datetime import UTC, datetime
 from models.durations import DAY_S
 from models.geometry.pose import ANGLES, PARAMETERS, PLANE_PARAMETERS, CameraPose, PoseParameters
 from models.geometry.rotation import angle_between
+from models.monitoring import config
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.config import (
-    CLOCK_LEAST_LOG,
-    CLOCK_SIGMAS,
-    GROUPS_FOR_POSE,
-    STILL_RAD,
-    STILL_SIGMAS,
-    USUAL_RATE_HZ,
-)
 from models.monitoring.creep import Creep
 from models.reasons import Reason, TracksCode, Value
 
@@ -269,7 +262,7 @@ def may_be_clock(chart: ChartResult) -> bool:
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < GROUPS_FOR_POSE
+    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < config.GROUPS_FOR_POSE
 
 
 def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
@@ -288,10 +281,10 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
         return None
     factor = 1 + drift.by.height_m / prior.height_m
     relative_sd = drift.sd.height_m / (factor * prior.height_m)
-    if abs(math.log(factor)) <= max(CLOCK_SIGMAS * relative_sd, CLOCK_LEAST_LOG):
+    if abs(math.log(factor)) <= max(config.CLOCK_SIGMAS * relative_sd, config.CLOCK_LEAST_LOG):
         return None
     for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
-        if abs(angle) > min(STILL_SIGMAS * sd, STILL_RAD):
+        if abs(angle) > min(config.STILL_SIGMAS * sd, config.STILL_RAD):
             return None
-    values = {"factor": factor, "rate_hz": frame_rate_hz or USUAL_RATE_HZ}
+    values = {"factor": factor, "rate_hz": frame_rate_hz or config.USUAL_RATE_HZ}
     return Reason(code=TracksCode.SCALE_CHANGED, values=values)

@@ -15,7 +15,7 @@ import numpy as np
 from models.compiled import compiled
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, rotation_from_angles
-from models.paths.config import BLOCK_NODES, DIRECTIONS
+from models.paths import config
 from models.paths.density_map import Grid, PathDensityMap, unseen_at
 
 _NEAREST_M = 0.1
@@ -288,18 +288,22 @@ def _blocks(places: Array, size_m: float) -> Blocks:
 
 def coverage_of(density: PathDensityMap) -> Coverage:
     """The map in blocks of 3 x 3 nodes."""
-    node = density.cell_m**2 * 2 * np.pi / DIRECTIONS
+    node = density.cell_m**2 * 2 * np.pi / config.DIRECTIONS
     slots, rows, columns, _ = density.log_density.shape
-    block_rows, block_columns = -(-rows // BLOCK_NODES), -(-columns // BLOCK_NODES)
-    padded = np.zeros((slots + 1, block_rows * BLOCK_NODES, block_columns * BLOCK_NODES))
+    block_rows, block_columns = -(-rows // config.BLOCK_NODES), -(-columns // config.BLOCK_NODES)
+    padded = np.zeros(
+        (slots + 1, block_rows * config.BLOCK_NODES, block_columns * config.BLOCK_NODES)
+    )
     padded[:slots, :rows, :columns] = np.exp(density.log_density).sum(axis=3) * node
-    padded[slots, :rows, :columns] = np.exp(density.log_level) * density.unseen * node * DIRECTIONS
-    sides = (slots + 1, block_rows, BLOCK_NODES, block_columns, BLOCK_NODES)
+    padded[slots, :rows, :columns] = (
+        np.exp(density.log_level) * density.unseen * node * config.DIRECTIONS
+    )
+    sides = (slots + 1, block_rows, config.BLOCK_NODES, block_columns, config.BLOCK_NODES)
     blocks = padded.reshape(sides).sum(axis=(2, 4))
-    corners = np.indices((block_rows, block_columns)).reshape(2, -1).T * BLOCK_NODES
+    corners = np.indices((block_rows, block_columns)).reshape(2, -1).T * config.BLOCK_NODES
     return Coverage(
-        places=density.corner + (corners + (BLOCK_NODES - 1) / 2) * density.cell_m,
+        places=density.corner + (corners + (config.BLOCK_NODES - 1) / 2) * density.cell_m,
         shares=blocks[:slots].reshape(slots, -1),
         unseen=blocks[slots].ravel(),
-        block_m=BLOCK_NODES * density.cell_m,
+        block_m=config.BLOCK_NODES * density.cell_m,
     )

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from models.compiled import compiled
 from models.durations import DAY_S
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.paths import config
 
 Four = tuple[float, float, float, float]
@@ -159,7 +159,7 @@ def log_density_at(grid: Grid, slot: int, x_m: float, y_m: float, direction: flo
 
 @compiled
 def log_densities_at(
-    grid: Grid, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
+    grid: Grid, place: Array, direction: Array, slot_idx: Index
 ) -> tuple[Array, Array, Array]:
     """Log densities (M,) at places (M, 2), with slopes by place (M, 2) and direction (M,)."""
     count = len(place)
@@ -209,7 +209,7 @@ class PathDensityMap:
         """The number of parts of the day."""
         return int(self.log_density.shape[0])
 
-    def slot_of(self, time_s: Array) -> npt.NDArray[np.int64]:
+    def slot_of(self, time_s: Array) -> Index:
         """The part of the day of each time (M,)."""
         return slot_of(time_s, self.slots)
 
@@ -225,7 +225,7 @@ class PathDensityMap:
         )
 
     def log_density_at(
-        self, place: Array, direction: Array, slot_idx: npt.NDArray[np.int64]
+        self, place: Array, direction: Array, slot_idx: Index
     ) -> tuple[Array, Array, Array]:
         """Log densities (M,) and their derivatives by place (M, 2) and direction (M,)."""
         return log_densities_at(
@@ -243,7 +243,7 @@ class PathDensityMap:
         return unseen_at_places(self.grid, np.ascontiguousarray(place))
 
 
-def slot_of(time_s: Array, slots: int) -> npt.NDArray[np.int64]:
+def slot_of(time_s: Array, slots: int) -> Index:
     """The one of so many equal parts of a UTC day that each time (M,) is in."""
     if slots == 1:
         return np.zeros(time_s.shape, dtype=np.int64)

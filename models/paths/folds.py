@@ -7,18 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.paths import config
 from models.paths.likelihood import PathModel, Walkers, walkers_of
 from models.paths.map_learning import Bandwidths, best_bandwidths, path_model_of
 from models.paths.path_tests import group_fits, group_scores, sums_of_groups
 from models.paths.registration import shape_at
 from models.tracks.observations import Observations, of_tracks
-
-Index = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

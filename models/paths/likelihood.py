@@ -8,11 +8,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.ground import rotation_and_turns
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array, rotation_from_angles
+from models.geometry.rotation import Array, Index, rotation_from_angles
 from models.paths import config
 from models.paths.coverage import Coverage, anchored_shares
 from models.paths.density_map import PathDensityMap
@@ -44,7 +43,7 @@ class Walkers:
 
     steps: Steps
     weight: Array
-    group_idx: npt.NDArray[np.int64]
+    group_idx: Index
     tracks: int
 
     @property

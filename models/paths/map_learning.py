@@ -8,10 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.paths import config
 from models.paths.coverage import coverage_of, in_view
 from models.paths.density_map import PathDensityMap, of_levels, slot_of, to_levels
@@ -84,7 +83,7 @@ def _held_out_log_likelihoods(walkers: Walkers, density: PathDensityMap, at: Arr
     return np.asarray(sums[np.unique(rows.owner_idx)])
 
 
-def _slot_of_people(walkers: Walkers) -> npt.NDArray[np.int64]:
+def _slot_of_people(walkers: Walkers) -> Index:
     rows = walkers.steps.rows
     _, first = np.unique(rows.owner_idx, return_index=True)
     return slot_of(rows.time_s[first], config.SLOTS)
@@ -154,7 +153,7 @@ def learn_map(
     )
 
 
-def _binned(at: Array, direction: Array, weight: Array, size: npt.NDArray[np.int64]) -> Array:
+def _binned(at: Array, direction: Array, weight: Array, size: Index) -> Array:
     """Weights spread linearly over the nodes (X, Y, 16) around each step."""
     turn = (direction % (2 * np.pi)) / (2 * np.pi) * config.DIRECTIONS
     at = np.clip(at, 0, size - 1.001)

@@ -17,9 +17,8 @@ is seen.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.paths import config
 from models.paths.coverage import in_view
 from models.paths.ground_steps import place_steps
@@ -58,9 +57,7 @@ class StillScores:
         return value_below(rate / self.looks / 2, self.walking_groups - 1) ** 2
 
 
-def group_scores(
-    walkers: Walkers, paths: PathModel, at: Array
-) -> tuple[Array, npt.NDArray[np.int64]]:
+def group_scores(walkers: Walkers, paths: PathModel, at: Array) -> tuple[Array, Index]:
     """The mean scores (P, 4) of each walking group, in the order of their last tracks (P,)."""
     sums, people, last = sums_of_groups(
         walkers, along_paths(walkers, paths, at, np.diag(config.REACH)) / 2
@@ -76,9 +73,7 @@ def along_paths(walkers: Walkers, paths: PathModel, at: Array, steps: Array) -> 
     return np.asarray((on - back).T)
 
 
-def sums_of_groups(
-    walkers: Walkers, values: Array
-) -> tuple[Array, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def sums_of_groups(walkers: Walkers, values: Array) -> tuple[Array, Index, Index]:
     """Sums (P, S) of values of tracks (N, S) by walking group, their people, their last tracks."""
     people, group_of, last = groups_in_time(walkers)
     sums = np.zeros((last.size, values.shape[1]))
@@ -88,7 +83,7 @@ def sums_of_groups(
 
 def groups_in_time(
     walkers: Walkers,
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+) -> tuple[Index, Index, Index]:
     """Tracks with a step (N,), the group (N,) of each, and each group's last track (P,), rising."""
     people = np.unique(walkers.steps.rows.owner_idx)
     labels, group_of = np.unique(walkers.group_idx[people], return_inverse=True)
@@ -157,7 +152,7 @@ def moved_within(
     return int(tracks[int(walking_groups) + config.NEWEST_GROUPS])
 
 
-def _highest(along: Array, drawn: npt.NDArray[np.int64], variance: Array) -> Array:
+def _highest(along: Array, drawn: Index, variance: Array) -> Array:
     """The statistics (D,) of windows of groups whose scores lie (P, 4) along the directions.
 
     Of P + W indices (D, P + W), the first P are of a reference, the others of where blocks begin.

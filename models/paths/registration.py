@@ -11,7 +11,6 @@ import numpy as np
 
 from models.geometry.rotation import Array, Mask
 from models.paths import config
-from models.paths.config import ABOUT, AWAY_RAD, CONVERGED, MOSTLY_SEEN
 from models.paths.ground_steps import place_steps
 from models.paths.likelihood import Likelihood, PathModel, Walkers
 from models.tracks.observations import steps_where
@@ -210,7 +209,7 @@ def on_seen_ground(walkers: Walkers, paths: PathModel, candidate: Array) -> bool
     placed = place_steps(walkers.steps, candidate)
     unseen, _ = paths.density.unseen_at(placed.place)
     seen = float((walkers.weight * placed.valid * (1 - unseen)).sum())
-    return seen / max(float(walkers.weight.sum()), 1e-12) >= MOSTLY_SEEN
+    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.MOSTLY_SEEN
 
 
 def variance_of_halves(
@@ -224,7 +223,11 @@ def variance_of_halves(
     most began elsewhere before. It is of one degree of freedom: for telling that
     something is wrong, and not for an interval.
     """
-    sides, least_gain = ((AWAY_RAD, -AWAY_RAD), CONVERGED) if afar else ((0.0, 0.0), ABOUT)
+    sides, least_gain = (
+        ((config.AWAY_RAD, -config.AWAY_RAD), config.CONVERGED)
+        if afar
+        else ((0.0, 0.0), config.ABOUT)
+    )
     ends = [
         replace(posterior, walkers=half).climbed(candidate + away * line, least_gain).candidate[3]
         for half, away in zip(_halves(posterior.walkers), sides, strict=True)

@@ -7,16 +7,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.ground import landing
-from models.geometry.rotation import Array, Mask
-from models.paths.config import NO_GROUND
+from models.geometry.rotation import Array, Index, Mask
+from models.paths import config
 from models.paths.density_map import Grid, LogDensity, log_density_at, unseen_at
 from models.paths.ground_steps import Slope, log_ratio_of, slope_of, step_on_ground
-
-Index = npt.NDArray[np.int64]
 
 
 class StepRows(NamedTuple):
@@ -145,7 +142,7 @@ def likelihood_of_tracks(
         owner, slot, weight = steps.owner_idx[number], steps.slot_idx[number], steps.weight[number]
         own, valid = math.exp(densities.seen[number]), densities.valid[number]
         density = own + extra * densities.unseen[number]
-        value = NO_GROUND
+        value = config.NO_GROUND
         if valid:
             value = math.log(density) + densities.log_ratio[number]
         values[owner] += weight * (value - log_share[slot])

@@ -19,9 +19,9 @@ from models.monitoring.chart import ChartResult, chart_result
 from models.monitoring.config import RUN
 from models.monitoring.creep import CreepLog, add_day, begin_log, posterior_mean_turns
 from models.monitoring.group_scores import score_groups
-from models.pose.config import NO_TURN_RAD
+from models.pose import config
 from models.pose.site import CameraSite
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 
@@ -134,7 +134,7 @@ def without_creep(
     turns = posterior_mean_turns(log, ended_s / DAY_S, from_s)
 
     def seen(track: Trajectory, turn: Array) -> Trajectory | None:
-        if np.abs(turn).max() < NO_TURN_RAD:
+        if np.abs(turn).max() < config.NO_TURN_RAD:
             return track
         tilt, roll, _, heading = (float(angle) for angle in turn)
         stood = PoseOffset(tilt_rad=tilt, roll_rad=roll, heading_rad=heading).apply(prior)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.pose import (
     PARAMETERS,
@@ -16,20 +15,13 @@ from models.geometry.pose import (
     identifiable_of,
     plane_parameters_of,
 )
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.paths.reference import PathReference
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
 from models.quantiles import chi_squared_above, f_above
 from models.tracks.observations import Observations, check_in_time, of_tracks
-from models.walking.fit import (
-    Channel,
-    Fit,
-    FitStart,
-    fit_pose,
-    per_track,
-    track_log_likelihoods,
-)
+from models.walking.fit import Channel, Fit, FitStart, fit_pose, per_track, track_log_likelihoods
 from models.walking.speed_reference import SpeedReference, channels_of
 
 
@@ -166,7 +158,7 @@ def _best_cut(gain: Array) -> int:
 
 def _fit(
     observations: Observations,
-    chosen: npt.NDArray[np.int64],
+    chosen: Index,
     prior: CameraPose,
     reference: SpeedReference,
     start: FitStart,

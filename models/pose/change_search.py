@@ -7,8 +7,8 @@ import numpy as np
 
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
+from models.pose import config
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
-from models.pose.config import SUSPECT_RATE, SUSPECTED
 from models.pose.fusion import fused_estimate
 from models.pose.pose_fit import FullSearch, FusedEstimate, PoseFit, WarmStart, warm_start_of
 from models.pose.site import CameraSite
@@ -114,7 +114,7 @@ def _still_there(
     search, suspected = warm_start.search, _suspicion(tracks, site, found)
     if not warm_start.is_calm(suspected):
         around = found.fused.neighbourhood
-        speeds = None if around is None or suspected > SUSPECTED else around.speeds
+        speeds = None if around is None or suspected > config.SUSPECTED else around.speeds
         if _moved_by_speeds(tracks, site, found.fused, speeds) is not None:
             return None
         search = replace(search, suspicion=suspected)
@@ -158,4 +158,4 @@ def _moved_by_places(tracks: Observations, site: CameraSite, whole: FusedEstimat
         return None
     at = whole.values
     paths = site.paths.model(site.intrinsics)
-    return moved_within(walkers_of(tracks, at), paths, at, site.paths.still, SUSPECT_RATE)
+    return moved_within(walkers_of(tracks, at), paths, at, site.paths.still, config.SUSPECT_RATE)

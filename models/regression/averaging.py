@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.pose import PoseParameters
 from models.geometry.rotation import (
     Array,
+    Index,
     angles_from_rotation,
     mean_quaternion,
     rotation_from_quaternion,
@@ -43,8 +43,8 @@ class PoseEstimate:
 
 
 def average_windows(
-    height_m: Array, quaternion_wxyz: Array, owner_idx: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.int64], TrackPredictions]:
+    height_m: Array, quaternion_wxyz: Array, owner_idx: Index
+) -> tuple[Index, TrackPredictions]:
     """One prediction for each track that has windows: their owners, and the means.
 
     Args:

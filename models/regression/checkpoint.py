@@ -10,11 +10,10 @@ from safetensors.torch import load, save
 
 from models.errors import CheckpointError
 from models.regression.network import PoseRegressor, network_for
-from models.regression.recipe import Recipe
-from models.regression.weights_files import weights_path
+from models.regression.recipe import Recipe, weights_path
 from models.serialization import Format, from_bytes
 
-START = Path(__file__).parent / "start" / "start.safetensors.gz"
+START = Path(__file__).parent / "start.safetensors.gz"
 START_FORMAT = Format(name="regressor_start", version=1)
 
 

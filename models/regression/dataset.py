@@ -4,13 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from models.geometry.rotation import quaternion_from_rotation
-from models.regression.inputs import network_inputs
-from models.regression.network import offsets_of
+from models.geometry.rotation import Index, quaternion_from_rotation
+from models.regression.network import network_inputs, offsets_of
 from models.regression.recipe import TrainingPlan
 from models.simulation.poses import PoseSet, grid_poses, random_poses
 from models.simulation.walkers import simulate_walks
@@ -53,14 +51,12 @@ def held_out_set(plan: TrainingPlan, count: int, rng: np.random.Generator) -> Sy
     return walks_of(plan, poses, rng)
 
 
-def equal_length_batches(
-    lengths: npt.NDArray[np.int64], size: int, rng: np.random.Generator
-) -> Iterator[npt.NDArray[np.int64]]:
+def equal_length_batches(lengths: Index, size: int, rng: np.random.Generator) -> Iterator[Index]:
     """Indices of shuffled batches whose rows all have the same number of points.
 
     Rows of one length need no padding, which halves the time of a step on a CPU.
     """
-    batches: list[npt.NDArray[np.int64]] = []
+    batches: list[Index] = []
     for length in np.unique(lengths):
         rows = rng.permutation(np.flatnonzero(lengths == length))
         batches += np.array_split(rows, max(1, round(rows.size / size)))

@@ -1,6 +1,7 @@
-"""Configuration of a training. Imports no torch: the HTTP process names recipes too."""
+"""Configuration of a training, and the place of its weights; without torch, for other processes."""
 
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 from models.errors import CheckpointError, ShapeError
@@ -46,7 +47,7 @@ class Recipe:
     spread: PoseRange = field(default_factory=PoseRange)
 
 
-# Xu et al. 2020, section 4.1. The scale of the input is not printed: see `dataset.scale_points`.
+# Xu et al. 2020, section 4.1. The scale of the input is not printed: see `network.scale_points`.
 PAPER = Recipe(
     name="paper",
     poses="grid",
@@ -139,3 +140,8 @@ def plan_from_config(config: dict[str, Any]) -> TrainingPlan:
         )
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"config: not of this version: {error}") from error
+
+
+def weights_path(folder: Path, digest: str) -> Path:
+    """The file in a folder for weights with this SHA-256."""
+    return folder / f"{digest}.safetensors"

@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
 from models.errors import CalibrationError
-from models.geometry.rotation import Array, angle_between
+from models.geometry.rotation import Array, Index, angle_between
 from models.regression.checkpoint import starting_network
 from models.regression.dataset import (
     SyntheticSet,
@@ -130,9 +129,7 @@ def train(
     )
 
 
-def batch_loss(
-    network: PoseRegressor, data: SyntheticSet, rows: npt.NDArray[np.int64], recipe: Recipe
-) -> Tensor:
+def batch_loss(network: PoseRegressor, data: SyntheticSet, rows: Index, recipe: Recipe) -> Tensor:
     """The mean loss of some rows of a set, by the recipe's target and arithmetic."""
     with torch.autocast("cpu", torch.bfloat16, enabled=_in_bfloat16(recipe)):
         output = network(data.points[rows], data.lengths[rows])

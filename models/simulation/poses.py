@@ -1,13 +1,16 @@
-"""Camera poses around a prior pose, and sets of them as arrays."""
+"""Camera poses around a prior pose, sets of them as arrays, and what is seen after a move."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from models.geometry.ground import ground_from_pixel, pixel_from_ground
+from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, rotation_from_angles
+from models.geometry.rotation import Array, Index, rotation_from_angles
+from models.geometry.upright import heads_above, heads_seen, statures, tops_seen
+from models.tracks.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +38,7 @@ class PoseSet:
     def __len__(self) -> int:
         return int(self.height_m.size)
 
-    def take(self, indices: npt.NDArray[np.int64]) -> "PoseSet":
+    def take(self, indices: Index) -> "PoseSet":
         """The poses at the given places, in that order."""
         return PoseSet(
             height_m=self.height_m[indices],
@@ -109,3 +112,54 @@ def _around(prior: CameraPose, height: Array, tilt: Array, roll: Array) -> PoseS
 
 def _steps(low: float, high: float, step: float) -> Array:
     return np.asarray(low + step * np.arange(math.floor((high - low) / step + 1e-9) + 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseOffset:
+    """A move of the camera: radians of tilt, roll, heading, and the log of the height ratio."""
+
+    tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    log_height: float = 0.0
+    heading_rad: float = 0.0
+
+    def apply(self, pose: CameraPose) -> CameraPose:
+        """The pose after the move."""
+        return replace(
+            pose,
+            height_m=pose.height_m * math.exp(self.log_height),
+            tilt_rad=pose.tilt_rad + self.tilt_rad,
+            roll_rad=pose.roll_rad + self.roll_rad,
+            heading_rad=pose.heading_rad + self.heading_rad,
+        )
+
+
+def offset_trajectory(
+    trajectory: Trajectory, intrinsics: Intrinsics, pose: CameraPose, moved: CameraPose
+) -> Trajectory | None:
+    """Trajectory of the same people after a move of the camera; the longest run inside the image.
+
+    None where fewer than two points stay in the picture. Exact for the feet, which lie on the
+    ground; the boxes' upper edges are those of upright people of the same height. Heads lean as
+    they did, to the side.
+    """
+    ground, on_ground = ground_from_pixel(intrinsics, pose.rotation, pose.centre_m, trajectory.uv)
+    uv, _ = pixel_from_ground(intrinsics, moved.rotation, moved.centre_m, ground)
+    seen = on_ground & intrinsics.contains(uv)
+    runs = np.split(np.arange(seen.size), np.flatnonzero(np.diff(seen)) + 1)
+    longest = max((run for run in runs if seen[run[0]]), key=len, default=np.arange(0))
+    if longest.size < 2:
+        return None
+    top_v = None
+    if trajectory.top_v is not None:
+        tall, _ = statures(
+            intrinsics, pose.rotation, pose.height_m, trajectory.uv, trajectory.top_v
+        )
+        top_v = tops_seen(intrinsics, moved.rotation, moved.centre_m, ground, tall)
+        top_v = top_v[longest]
+    head_uv = None
+    if trajectory.head_uv is not None:
+        heads_m = heads_above(intrinsics, pose, ground, trajectory.head_uv)
+        head_uv = heads_seen(intrinsics, moved, heads_m)[longest]
+    # What is behind the camera now has no pixels.
+    return replace(trajectory.part(longest), uv=uv[longest], top_v=top_v, head_uv=head_uv)

@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.errors import DegenerateGeometryError
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index, Mask
 from models.simulation.poses import PoseSet
 from models.tracks.trajectory import DEFAULT_STEP_S, WINDOW_MAX_POINTS, WINDOW_MIN_POINTS
 
@@ -39,8 +38,8 @@ class Walks:
     """
 
     uv: Array
-    lengths: npt.NDArray[np.int64]
-    pose_idx: npt.NDArray[np.int64]
+    lengths: Index
+    pose_idx: Index
 
     def __len__(self) -> int:
         return int(self.lengths.size)
@@ -89,10 +88,10 @@ def _draw(
     intrinsics: Intrinsics,
     poses: PoseSet,
     speed_mps: Array,
-    wanted: npt.NDArray[np.int64],
+    wanted: Index,
     config: WalkConfig,
     rng: np.random.Generator,
-) -> tuple[Array, npt.NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Candidate walks (B, T, 2), NaN after the wanted points, and which lie inside the image."""
     count = len(poses)
     rotation, centre = poses.rotation, poses.centre_m

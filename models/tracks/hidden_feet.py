@@ -9,17 +9,16 @@ Source of the line: Koenker and Bassett 1978; of how it is found: Hunter and Lan
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.tracks import config
 
 _SD_OF_MEDIAN_CHANGE = 1.4826 / np.sqrt(2)  # a change is of two boxes
 
 
 @compiled
-def short_boxes(uv: Array, top_v: Array, bounds: npt.NDArray[np.int64]) -> Mask:
+def short_boxes(uv: Array, top_v: Array, bounds: Index) -> Mask:
     """A mask (T,) of points whose box is too short: what it ends at are no feet.
 
     None of a track with fewer than eight boxes; somebody hidden all along the way looks like a
@@ -98,7 +97,7 @@ def _off_the_line(tall: Array, across: Array, down: Array) -> Array:
 
 
 @compiled
-def jumped(time_s: Array, uv: Array, bounds: npt.NDArray[np.int64], image_height: float) -> Mask:
+def jumped(time_s: Array, uv: Array, bounds: Index, image_height: float) -> Mask:
     """A mask (T,) of points above the feet: between a jump up the picture and one back down.
 
     A jump is a change from one point to the next that is unlike those around it, by far more than

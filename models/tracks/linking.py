@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.geometry.upright import statures
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks import config
@@ -44,7 +43,7 @@ class Ends:
 
 def link_pieces(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
-) -> npt.NDArray[np.int64]:
+) -> Index:
     """The piece before (N,) that each of N tracks goes on; -1 for one that begins a walk.
 
     One-to-one, the likeliest pair first. Two that are about as likely are both left alone: a piece
@@ -83,13 +82,13 @@ def count_walks(
     return int((link_pieces(trajectories, intrinsics, pose) < 0).sum())
 
 
-def walks_of(before: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def walks_of(before: Index) -> Index:
     """The first track (N,) of the walk of each, by the pieces before them."""
     later = np.flatnonzero(before >= 0)
     return first_of_component(np.stack([before[later], later], axis=1), before.size)
 
 
-def _pairs(heads: Ends, tails: Ends) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _pairs(heads: Ends, tails: Ends) -> tuple[Index, Index]:
     """Pairs (P,), (P,) of pieces of which one ends shortly before the other begins."""
     order = np.argsort(heads.time_s, kind="stable")
     starts = heads.time_s[order]
@@ -103,9 +102,7 @@ def _pairs(heads: Ends, tails: Ends) -> tuple[npt.NDArray[np.int64], npt.NDArray
     return earlier[kept], later[kept]
 
 
-def _misfit(
-    heads: Ends, tails: Ends, earlier: npt.NDArray[np.int64], later: npt.NDArray[np.int64]
-) -> tuple[Array, Array]:
+def _misfit(heads: Ends, tails: Ends, earlier: Index, later: Index) -> tuple[Array, Array]:
     """Chi squares (P,) of pairs, and twice the log of how much likelier strangers are than each.
 
     Both velocities foretell where the later piece begins: their mean crosses the gap. Strangers are
@@ -160,7 +157,7 @@ def _spread(off: Array, least: float) -> float:
     return 2 * float(np.log(np.maximum(SD_OF_MEDIAN_DEVIATION * middle, least)).sum())
 
 
-def first_of_component(pairs: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+def first_of_component(pairs: Index, count: int) -> Index:
     """The first member (count,) of the component of each, by pairs (K, 2) that join two of them."""
     from scipy.sparse import coo_array  # a third of a second, and the HTTP process never asks
     from scipy.sparse.csgraph import connected_components
@@ -223,7 +220,7 @@ def _noise(uv: Array, intrinsics: Intrinsics, pose: CameraPose) -> tuple[Array, 
 def _log_tall(
     uv: Array,
     top_v: Array,
-    owner: npt.NDArray[np.int64],
+    owner: Index,
     count: int,
     intrinsics: Intrinsics,
     pose: CameraPose,
@@ -240,15 +237,13 @@ def _log_tall(
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
-def _sums(owner: npt.NDArray[np.int64], values: Array, count: int) -> Array:
+def _sums(owner: Index, values: Array, count: int) -> Array:
     columns = [np.bincount(owner, values[:, axis], count) for axis in range(values.shape[1])]
     return np.stack(columns, axis=1)
 
 
 @compiled
-def _points_at_ends(
-    time_s: Array, bounds: npt.NDArray[np.int64], last: bool
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _points_at_ends(time_s: Array, bounds: Index, last: bool) -> tuple[Index, Index]:
     """Some points (K,) within a time of an end of each track, in time order, and the tracks (K,).
 
     The end's own point is among them.

@@ -6,10 +6,9 @@ Nothing here depends on the pose.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.errors import ShapeError
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +20,7 @@ class Rows:
     rows, in units of 10 s. `owners` is the number of tracks, with and without rows.
     """
 
-    owner_idx: npt.NDArray[np.int64]
+    owner_idx: Index
     linked: Mask
     time_s: Array
     when: Array
@@ -72,18 +71,18 @@ class HeadFootPairs:
     column_rays: Array
     from_rays: Array
     to_rays: Array
-    owner_idx: npt.NDArray[np.int64]
+    owner_idx: Index
     owners: int
 
     def __len__(self) -> int:
         return int(self.owner_idx.size)
 
     @property
-    def tracks(self) -> npt.NDArray[np.int64]:
+    def tracks(self) -> Index:
         """The tracks (K,) that have heads, ascending."""
         return np.unique(self.owner_idx)
 
-    def of_tracks(self, chosen: npt.NDArray[np.int64]) -> "HeadFootPairs":
+    def of_tracks(self, chosen: Index) -> "HeadFootPairs":
         """Those of some tracks only, given by ascending indices, which are numbered anew."""
         renumber = np.full(self.owners, -1)
         renumber[chosen] = np.arange(chosen.size)
@@ -134,7 +133,7 @@ def check_in_time(observations: Observations) -> None:
         )
 
 
-def of_tracks(observations: Observations, chosen: npt.NDArray[np.int64]) -> Observations:
+def of_tracks(observations: Observations, chosen: Index) -> Observations:
     """The observations of some tracks only, given by ascending indices."""
     renumber = np.full(observations.tracks, -1)
     renumber[chosen] = np.arange(chosen.size)
@@ -169,7 +168,7 @@ def steps_where(steps: Steps, kept: Mask) -> Steps:
     )
 
 
-def _kept(rows: Rows, kept: Mask, renumber: npt.NDArray[np.int64], owners: int) -> Rows:
+def _kept(rows: Rows, kept: Mask, renumber: Index, owners: int) -> Rows:
     return Rows(
         owner_idx=renumber[rows.owner_idx[kept]],
         linked=rows.linked[kept],

@@ -7,10 +7,9 @@ The points of N tracks stand one track after the other: track n has those from `
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks import config
 
@@ -18,9 +17,7 @@ _LEAST_TOTAL, _LEAST_VARIANCE = 1e-12, 1e-9
 
 
 @compiled
-def runs_of_tracks(
-    time_s: Array, inside: Mask, bounds: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int64]:
+def runs_of_tracks(time_s: Array, inside: Mask, bounds: Index) -> Index:
     """Runs (R, 3) of points inside the image without a gap: the track, the first, one beyond.
 
     `inside` (T,) says which points are in the image.
@@ -47,8 +44,8 @@ def runs_of_tracks(
 
 @compiled
 def nodes_of_runs(
-    time_s: Array, uv: Array, top_v: Array, runs: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.int64], Array, Array, Array]:
+    time_s: Array, uv: Array, top_v: Array, runs: Index
+) -> tuple[Index, Array, Array, Array]:
     """The first node of each run (R + 1,), nodes' times (K,), smooth feet (K, 2) and tops (K,).
 
     A run that is shorter than a step has no nodes. A top is NaN where none is known.
@@ -146,7 +143,7 @@ _OF_BEND = SD_OF_MEDIAN_DEVIATION / math.sqrt(6.0)
 
 
 @compiled
-def steps_of_runs(rays: Array, firsts: npt.NDArray[np.int64]) -> tuple[Array, Array, Array]:
+def steps_of_runs(rays: Array, firsts: Index) -> tuple[Array, Array, Array]:
     """Rays to both ends of steps, and to the ends that noise may make of them: (K, 3) each.
 
     A step is from each node to the next of its run, in that node's place; those of the last nodes

@@ -5,11 +5,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 
 WINDOW_MIN_POINTS = 11
 WINDOW_MAX_POINTS = 31  # N in [11, 31]: Xu et al. 2020, section 4.1
@@ -68,7 +67,7 @@ class Trajectory:
         enough_s = TRACK_MIN_DURATION_S - 1e-6
         return self.time_s.size >= TRACK_MIN_POINTS and self.duration_s >= enough_s
 
-    def part(self, indices: npt.NDArray[np.int64]) -> "Trajectory":
+    def part(self, indices: Index) -> "Trajectory":
         """The points of some indices, in time order."""
         return Trajectory(
             time_s=self.time_s[indices],
@@ -92,8 +91,8 @@ class Windows:
     """
 
     uv: Array
-    lengths: npt.NDArray[np.int64]
-    owner_idx: npt.NDArray[np.int64]
+    lengths: Index
+    owner_idx: Index
 
     def __len__(self) -> int:
         return int(self.lengths.size)
@@ -110,7 +109,7 @@ class Points:
     time_s: Array
     uv: Array
     top_v: Array
-    bounds: npt.NDArray[np.int64]
+    bounds: Index
 
 
 def points_of(trajectories: Sequence[Trajectory]) -> Points:

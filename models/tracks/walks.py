@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.geometry.upright import uncut
 from models.reasons import Reason, TracksCode
-from models.tracks.config import HEAD_POINTS, MANY_PIECES, SHORTEST_HEAD_PX, STEP_S
+from models.tracks import config
 from models.tracks.hidden_feet import jumped, short_boxes
 from models.tracks.linking import link_pieces, walks_of
 from models.tracks.observations import HeadFootPairs, Observations, Rows, Steps, Tops
@@ -32,7 +31,7 @@ class Walks:
     """
 
     observations: Observations
-    walk_idx: npt.NDArray[np.int64]
+    walk_idx: Index
 
     @property
     def pieces(self) -> int:
@@ -43,7 +42,7 @@ class Walks:
     def reason(self) -> Reason | None:
         """A reason that names a tracker which cuts walks; None where it cuts few or none."""
         tracks = self.walk_idx.size
-        if not tracks or self.pieces < MANY_PIECES * tracks:
+        if not tracks or self.pieces < config.MANY_PIECES * tracks:
             return None
         values = {"tracks": float(tracks), "pieces": float(self.pieces)}
         return Reason(code=TracksCode.PIECES, values=values)
@@ -53,7 +52,7 @@ def observe_walks(
     trajectories: Sequence[Trajectory],
     intrinsics: Intrinsics,
     pose: CameraPose,
-    before: npt.NDArray[np.int64] | None = None,
+    before: Index | None = None,
 ) -> Walks:
     """Observe tracks, each walk once.
 
@@ -84,9 +83,7 @@ def observe(
     return observe_walks(trajectories, intrinsics, pose).observations
 
 
-def _last_pieces(
-    trajectories: Sequence[Trajectory], before: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int64]:
+def _last_pieces(trajectories: Sequence[Trajectory], before: Index) -> Index:
     """The last piece (N,) of each track's walk, by the piece before each."""
     first = walks_of(before)
     order = np.argsort([trajectory.time_s[0] for trajectory in trajectories], kind="stable")
@@ -95,7 +92,7 @@ def _last_pieces(
     return last[first]
 
 
-def _walks(pieces: Sequence[Trajectory], walk_idx: npt.NDArray[np.int64]) -> list[Trajectory]:
+def _walks(pieces: Sequence[Trajectory], walk_idx: Index) -> list[Trajectory]:
     """Whole walks in the places of their last pieces; a point, no walk, in those of the others."""
     walks = list(pieces)
     for last in np.unique(walk_idx[walk_idx != np.arange(walk_idx.size)]):
@@ -156,9 +153,7 @@ def observe_each(trajectories: Sequence[Trajectory], intrinsics: Intrinsics) -> 
     )
 
 
-def _rows(
-    owner_idx: npt.NDArray[np.int64], run: npt.NDArray[np.int64], time_s: Array, count: int
-) -> Rows:
+def _rows(owner_idx: Index, run: Index, time_s: Array, count: int) -> Rows:
     linked: Mask = np.zeros(owner_idx.size, dtype=bool)
     linked[1:] = run[1:] == run[:-1]
     number = np.maximum(np.bincount(owner_idx, minlength=count), 1)
@@ -201,21 +196,21 @@ def _of_one(trajectory: Trajectory, intrinsics: Intrinsics) -> Array:
     known = np.asarray(np.isfinite(heads).all(axis=1) & intrinsics.shows_foot(feet))
     up = np.where(known[:, None], feet - heads, 0.0)
     known = known & uncut(intrinsics, np.nan_to_num(heads)) & (up[:, 1] > 0)
-    known = known & (np.hypot(up[:, 0], up[:, 1]) >= SHORTEST_HEAD_PX)
+    known = known & (np.hypot(up[:, 0], up[:, 1]) >= config.SHORTEST_HEAD_PX)
     feet, heads = feet[known], heads[known]
     rays, valid = intrinsics.rays(
         np.stack([feet, heads, np.stack([feet[:, 0], heads[:, 1]], axis=1)], axis=1)
     )
     whole = np.asarray(valid.all(axis=1))
     rays = rays[whole]
-    if len(rays) < HEAD_POINTS:
+    if len(rays) < config.HEAD_POINTS:
         return np.empty((0, 5, 3))
     time_s = trajectory.time_s[known][whole]
-    place = ((time_s - time_s[0]) / STEP_S).astype(np.int64)
+    place = ((time_s - time_s[0]) / config.STEP_S).astype(np.int64)
     firsts = np.flatnonzero(np.diff(place, prepend=-1))
     number = np.diff(np.append(firsts, place.size))
     mean = np.add.reduceat(rays, firsts, axis=0) / number[:, None, None]
-    mean = mean[number >= HEAD_POINTS] if (number >= HEAD_POINTS).any() else mean
+    mean = mean[number >= config.HEAD_POINTS] if (number >= config.HEAD_POINTS).any() else mean
     before = mean[np.maximum(np.arange(len(mean)) - 1, 0), :1]
     after = mean[np.minimum(np.arange(len(mean)) + 1, len(mean) - 1), :1]
     return np.concatenate([mean, before, after], axis=1)

@@ -9,12 +9,11 @@ Source: Bishop 2006, Pattern Recognition and Machine Learning, section 3.3, for 
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.serialization import stored_as
-from models.walking.config import MOST_BUMPS
+from models.walking import config
 from models.walking.measures import Measured
 from models.walking.mixed_model import (
     Normal,
@@ -109,7 +108,7 @@ def field_over(measured: Measured, shape: FieldShape) -> Field:
     places = measured.place[measured.valid]
     length_m = shape.length_m
     centres = _centres(places, length_m)
-    while len(centres) > MOST_BUMPS:
+    while len(centres) > config.MOST_BUMPS:
         length_m *= 1.25
         centres = _centres(places, length_m)
     directional = measured.direction is not None
@@ -204,9 +203,7 @@ def _centres(places: Array, length_m: float) -> Array:
 
 
 @compiled
-def exponents_at(
-    place: Array, centres: Array, length_m: float
-) -> tuple[Array, npt.NDArray[np.int64]]:
+def exponents_at(place: Array, centres: Array, length_m: float) -> tuple[Array, Index]:
     """Logarithms (M, L) of bumps of x or y alone, and which two (K, 2) make each bump.
 
     A bump is one of x times one of y, and centres (K, 2) on a grid share their x and y: there are
@@ -234,9 +231,7 @@ def exponents_at(
 
 
 @compiled
-def features_of(
-    falls: Array, pair: npt.NDArray[np.int64], directional: bool, direction: Array
-) -> Array:
+def features_of(falls: Array, pair: Index, directional: bool, direction: Array) -> Array:
     """A field's features (M, P): 1, four of the direction where it has any, and K bumps.
 
     `falls` (M, L) are bumps of x or y alone, `pair` (K, 2) the two that make each bump.

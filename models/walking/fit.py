@@ -24,11 +24,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
 from models.geometry.pose import CameraPose, plane_parameters_of
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.walking import config
 from models.walking.field import Learned
 from models.walking.measures import Measured
@@ -218,7 +217,7 @@ def corrected_covariance(matrix: Array, noise: Array) -> Array:
 
 @compiled
 def information_of_noise(
-    noise: Array, weight: Array, valid: Mask, owner_idx: npt.NDArray[np.int64], owners: int
+    noise: Array, weight: Array, valid: Mask, owner_idx: Index, owners: int
 ) -> Array:
     """Weighted squares (P, P) of rows (M, P), less what two degrees of freedom of a track take."""
     number = np.zeros(owners)

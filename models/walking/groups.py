@@ -5,10 +5,9 @@ shorter; groups are the connected components of such pairs.
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.tracks.linking import first_of_component
 from models.walking import config
 from models.walking.measures import Measured
@@ -34,8 +33,8 @@ def count_walking_groups(speeds: Measured) -> int:
 
 
 def walking_groups_of(
-    time_s: Array, owner_idx: npt.NDArray[np.int64], place: Array, direction: Array, owners: int
-) -> npt.NDArray[np.int64]:
+    time_s: Array, owner_idx: Index, place: Array, direction: Array, owners: int
+) -> Index:
     """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
 
     Args:
@@ -63,11 +62,11 @@ def walking_groups_of(
 
 @compiled
 def pairs_beside(
-    time_bin: npt.NDArray[np.int64],
-    owner_idx: npt.NDArray[np.int64],
+    time_bin: Index,
+    owner_idx: Index,
     place: Array,
     direction: Array,
-) -> npt.NDArray[np.int64]:
+) -> Index:
     """Pairs of tracks (K, 2), one for each time that the two are beside one another.
 
     Bins of time are ascending (M,), and so are tracks (M,) within a bin.

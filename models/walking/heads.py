@@ -8,18 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Index
 from models.serialization import stored_as
 from models.tracks.observations import HeadFootPairs
 from models.walking import config
 from models.walking.head_angles import LeanComponents, column_share, fit_angles, learn_habit
 from models.walking.mixed_model import Normal
-from models.walking.variance_inflation import (
-    Tracks,
-    shrink_offset,
-    squared_ratio,
-    variance_inflation,
-)
+from models.walking.variance_inflation import shrink_offset, squared_ratio, variance_inflation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +77,7 @@ def learn_heads(pairs: HeadFootPairs | None, at: Array) -> HeadReference | None:
     whole = fit_angles(pairs, at, habit, components)
     offset = whole.mean - at
 
-    def error_ratio(train: Tracks, test: Tracks) -> float:
+    def error_ratio(train: Index, test: Index) -> float:
         usual, _ = learn_habit(pairs.of_tracks(train), at, components, rounds=0)
         fit = fit_angles(pairs.of_tracks(test), at, usual, components)
         return squared_ratio(fit.mean - at - offset, fit.covariance)

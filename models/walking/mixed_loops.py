@@ -6,10 +6,9 @@ The rows of a track stand together. The model is that of `mixed_model`.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from models.compiled import compiled
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array, Index, Mask
 from models.walking import config
 
 _LEAST_ODDS, _MOST_ODDS = math.exp(-30.0), math.exp(30.0)
@@ -21,7 +20,7 @@ def weights_of_tracks(
     residual: Array,
     value: Array,
     valid: Mask,
-    owner_idx: npt.NDArray[np.int64],
+    owner_idx: Index,
     when: Array,
     owners: int,
     components: tuple[float, float, float, float],
@@ -79,7 +78,7 @@ def log_likelihoods_apart(
     residual: Array,
     value: Array,
     valid: Mask,
-    owner_idx: npt.NDArray[np.int64],
+    owner_idx: Index,
     owners: int,
     total_sd: float,
     outliers: tuple[float, float, float],
@@ -155,7 +154,7 @@ def _densities(
 
 
 @compiled
-def _bounds_of(owner_idx: npt.NDArray[np.int64], owners: int) -> npt.NDArray[np.int64]:
+def _bounds_of(owner_idx: Index, owners: int) -> Index:
     """The first row of each track and the one after its last (N, 2); 0, 0 where it has none."""
     bounds = np.zeros((owners, 2), dtype=np.int64)
     for j in range(owner_idx.size):
@@ -172,7 +171,7 @@ def whitened(
     residual: Array,
     weight: Array,
     track: Array,
-    owner_idx: npt.NDArray[np.int64],
+    owner_idx: Index,
     linked: Mask,
     when: Array,
     components: tuple[float, float, float, float],
@@ -226,7 +225,7 @@ def whitened(
 
 
 @compiled
-def moments_of_tracks(white: Array, lost: Array, owner_idx: npt.NDArray[np.int64]) -> Array:
+def moments_of_tracks(white: Array, lost: Array, owner_idx: Index) -> Array:
     """W'W - L'L of each track (N, P + 1, P + 1), of rows (M, P + 1) and what is lost of them."""
     owners, _, width = lost.shape
     moments = np.zeros((owners, width, width))

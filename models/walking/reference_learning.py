@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.geometry.pose import CameraPose, plane_parameters_of
+from models.geometry.rotation import Index
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations, of_tracks
@@ -20,12 +21,7 @@ from models.walking.speed_reference import (
     channels_of,
     learned_at,
 )
-from models.walking.variance_inflation import (
-    Tracks,
-    shrink_offset,
-    squared_ratio,
-    variance_inflation,
-)
+from models.walking.variance_inflation import shrink_offset, squared_ratio, variance_inflation
 
 
 def learn_speed_reference(
@@ -49,7 +45,7 @@ def learn_speed_reference(
     offset = whole.candidate - at
     unlearned = _with_components(blank, learned)
 
-    def error_ratio(train: Tracks, test: Tracks) -> float:
+    def error_ratio(train: Index, test: Index) -> float:
         part = learned_at(of_tracks(observations, train), prior, unlearned, 0)
         fit = fit_pose(channels_of(of_tracks(observations, test), part, prior), start, prior)
         return squared_ratio(fit.candidate - at - offset, fit.covariance)

@@ -8,16 +8,13 @@ large as the offset itself asks for (empirical Bayes: Morris 1983).
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from models.geometry.rotation import Array
-from models.walking.config import ASSUMED_INFLATION_WEIGHT, INFLATION_FOLDS, LARGEST_RATIO
-
-Tracks = npt.NDArray[np.int64]
+from models.geometry.rotation import Array, Index
+from models.walking import config
 
 
 def variance_inflation(
-    tracks: Tracks, error_ratio: Callable[[Tracks, Tracks], float], assumed: float
+    tracks: Index, error_ratio: Callable[[Index, Index], float], assumed: float
 ) -> float:
     """The mean of squared errors over predicted variances, from some times to others; at least 1.
 
@@ -30,14 +27,14 @@ def variance_inflation(
         assumed: the ratio before any are seen.
     """
     ratios = []
-    for fold in range(INFLATION_FOLDS):
+    for fold in range(config.INFLATION_FOLDS):
         odd = np.arange(tracks.size) * 2 ** (fold + 1) // tracks.size % 2 == 1
         parts = (tracks[~odd], tracks[odd])
         for train, test in (parts, parts[::-1]):
             if min(train.size, test.size) >= 2:
-                ratios.append(min(error_ratio(train, test), LARGEST_RATIO))
-    guess = assumed * ASSUMED_INFLATION_WEIGHT
-    return max(1.0, (sum(ratios) + guess) / (len(ratios) + ASSUMED_INFLATION_WEIGHT))
+                ratios.append(min(error_ratio(train, test), config.LARGEST_RATIO))
+    guess = assumed * config.ASSUMED_INFLATION_WEIGHT
+    return max(1.0, (sum(ratios) + guess) / (len(ratios) + config.ASSUMED_INFLATION_WEIGHT))
 
 
 def squared_ratio(error: Array, covariance: Array) -> float:

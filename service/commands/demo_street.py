@@ -15,8 +15,7 @@ from rich.table import Table
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.poses import repeated_pose
+from models.simulation.poses import PoseOffset, repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import SceneTrack
 from models.tracks.trajectory import Trajectory

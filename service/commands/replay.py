@@ -11,7 +11,7 @@ import httpx
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack, load_scene
 from service.formats.degrees import in_degrees
 

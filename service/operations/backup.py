@@ -16,7 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO
 
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.data_dir import (
     DATABASE,
     KEY_FILE,

@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from models.durations import HOUR_S
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.data_dir import (
     StartError,
     held_alone,

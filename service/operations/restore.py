@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.data_dir import (
     COPIES,
     DATABASE,

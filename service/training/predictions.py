@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.references import window_of
 from service.settings import Settings
 from service.store import references, tracks, trainings, windows

@@ -13,7 +13,7 @@ from models.geometry.pose import CameraPose
 from models.monitoring.config import CREEP_SHARE
 from models.monitoring.creep import Creep, creep_result
 from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.tracks.trajectory import Trajectory
 from studies.simulation.habits import HabitConfig, draw_mixes, walk_days
 from studies.simulation.simulated_site import (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 
 DAYS = 365.25
 _REDRAWN = 4000

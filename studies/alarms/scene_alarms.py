@@ -18,7 +18,7 @@ from models.monitoring.group_scores import score_groups
 from models.monitoring.verdict import DriftLimits, judge
 from models.paths.likelihood import walkers_of
 from models.pose import Observations, observe
-from models.simulation.pose_offset import offset_trajectory
+from models.simulation.poses import offset_trajectory
 from models.tracks.observations import of_tracks
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Trajectory, by_end

@@ -17,11 +17,7 @@ from models.geometry.rotation import (
     quaternion_from_rotation,
     rotation_from_angles,
 )
-from models.regression.averaging import (
-    PoseEstimate,
-    average_windows,
-    averaged_estimate,
-)
+from models.regression.averaging import PoseEstimate, average_windows, averaged_estimate
 from models.regression.network import predict_windows
 from models.regression.recipe import TrainingPlan, plan_training
 from models.regression.training import TrainingProgress, train

@@ -12,7 +12,7 @@ TRAINED = (
     "models.regression.training",
     "models.regression.network",
     "models.regression.averaging",
-    "models.simulation.pose_offset",
+    "models.simulation.poses",
 )
 SERVED_BY = ("studies.protocol.flow_runs", "studies.protocol.learned")
 PAPERS_OWN = "town_centre"  # of the paper's scenes the one that can be had

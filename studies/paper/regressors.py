@@ -86,7 +86,7 @@ def run_case(case: PaperCase, folder: Path, on_share: OnShare) -> Figures:
 
 def made_by(case: PaperCase) -> tuple[str, ...]:
     """The modules that make a row's figures."""
-    untrained = {CONSTANT: ("models.simulation.pose_offset",), SERVED: SERVED_BY}
+    untrained = {CONSTANT: ("models.simulation.poses",), SERVED: SERVED_BY}
     return untrained.get(case.variant, TRAINED)
 
 

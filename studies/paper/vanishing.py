@@ -14,11 +14,7 @@ import numpy as np
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.pose import CameraPose
-from models.geometry.rotation import (
-    angle_between,
-    angles_from_rotation,
-    quaternion_from_rotation,
-)
+from models.geometry.rotation import angle_between, angles_from_rotation, quaternion_from_rotation
 from models.tracks.scenes import Scene, load_scene
 from models.tracks.trajectory import Trajectory
 from studies.baselines.vanishing_points import (

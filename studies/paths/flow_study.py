@@ -18,11 +18,11 @@ from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.quantiles import Z90
 from models.reasons import Reason
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
+from models.simulation.poses import PoseOffset
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 from studies.protocol.cases import angle_deg, pose_of_plane_parameters
+from studies.simulation.lanes import BETWEEN_S, Lane, SiteConfig, draw_lanes, walk_site
 from studies.simulation.simulated_site import (
     LearnedSite,
     SimulatedSite,

@@ -21,13 +21,13 @@ from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.pose import learn_site, observe
 from models.quantiles import Z90
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import walk_site
+from models.simulation.poses import PoseOffset
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory, by_end
 from studies.protocol.cases import PANNED, ProtocolCase, angle_deg, draw_case
 from studies.protocol.served import served_pose
 from studies.simulation.heads import HeadConfig, with_box_heads, with_heads
+from studies.simulation.lanes import walk_site
 from studies.simulation.simulated_site import draw_simulated_site
 
 WAYS = ("feet", "heads", "columns")

@@ -10,7 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array, angle_between
 from models.quantiles import Z90
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory, by_end
 from studies.faults.catalogue import Fault

@@ -7,14 +7,7 @@ import numpy as np
 from models.geometry.pose import PLANE_PARAMETERS, array_of, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.likelihood import walkers_of
-from models.paths.registration import (
-    Belief,
-    Peak,
-    Posterior,
-    refined,
-    register,
-    shape_at,
-)
+from models.paths.registration import Belief, Peak, Posterior, refined, register, shape_at
 from models.pose import CameraSite, Observations
 from models.pose.modes import covariance_between
 from studies.protocol.cases import Answer, nothing_identifiable

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.durations import HOUR_S
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import offset_trajectory
+from models.simulation.poses import offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack
 
 _NIGHT_S = 4 * HOUR_S  # without anybody: another day begins

@@ -1,12 +1,6 @@
 """The pose that the service would serve, for studies: nothing that fails is done without."""
 
-from models.pose import (
-    CameraSite,
-    Observations,
-    PoseFinding,
-    SecondLook,
-    estimate_pose,
-)
+from models.pose import CameraSite, Observations, PoseFinding, SecondLook, estimate_pose
 
 
 def served_pose(

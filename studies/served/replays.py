@@ -24,7 +24,7 @@ from models.pose import (
     observe,
 )
 from models.reasons import TracksCode
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import by_end
 from studies.protocol.partings import first_seen

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.pose import CameraSite, learn_site, observe
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene
 from studies.faults.catalogue import FAULTS
 from studies.protocol.cases import PANNED, RANGES, draw_case

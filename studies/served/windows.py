@@ -6,14 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.durations import DAY_S
-from models.pose import (
-    CameraSite,
-    Observations,
-    PoseFinding,
-    SecondLook,
-    Trajectory,
-    observe,
-)
+from models.pose import CameraSite, Observations, PoseFinding, SecondLook, Trajectory, observe
 from models.tracks.observations import of_tracks
 from models.walking.config import FEWEST_WALKERS
 from studies.protocol.served import served_pose

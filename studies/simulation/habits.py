@@ -13,8 +13,8 @@ from models.durations import DAY_S, HOUR_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.tracks.trajectory import Trajectory, by_end
+from studies.simulation.lanes import Lane, SiteConfig, walk_site
 
 _LANE_MIXES = 10  # lanes stand so often in a list as people take them
 

@@ -11,9 +11,9 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import CameraSite, Observations, learn_site, observe
 from models.pose.pose_fit import FusedEstimate
-from models.simulation.simulated_site import Lane, SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import Trajectory, by_end
 from studies.protocol.served import served_pose
+from studies.simulation.lanes import Lane, SiteConfig, draw_lanes, walk_site
 
 # Of the reference: a site's speeds are known by then, and learning them from more is slow.
 SPEED_TRACKS = 400

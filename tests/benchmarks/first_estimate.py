@@ -20,11 +20,11 @@ import numpy as np
 from rich.console import Console
 
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.simulation.poses import PoseOffset
 from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.benchmarks.parts.cloned import APART_S, as_posted
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for

@@ -7,11 +7,11 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.simulation.poses import PoseOffset
 from models.tracks.observations import Observations
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import observe_each
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(height_m=6.0, tilt_rad=math.radians(18), roll_rad=math.radians(1))

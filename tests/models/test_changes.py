@@ -12,9 +12,9 @@ from models.paths.path_tests import moved_within
 from models.pose import estimate_pose, learn_site
 from models.pose.change_point import least_covariance
 from models.pose.change_search import pose_fit_of
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)

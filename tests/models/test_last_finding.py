@@ -16,11 +16,11 @@ from models.pose import (
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from studies.recordings import load_recording
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 

@@ -22,7 +22,6 @@ from models.pose import (
 )
 from models.pose.change_point import find_change
 from models.pose.pose_fit import by_speeds_alone
-from models.simulation.simulated_site import SiteConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
@@ -30,6 +29,7 @@ from studies.protocol.cases import ProtocolCase
 from studies.protocol.flow_runs import fused
 from studies.protocol.learned import Learned
 from studies.protocol.served import served_pose
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)

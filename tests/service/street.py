@@ -12,13 +12,13 @@ from models.geometry.pose import CameraPose
 from models.geometry.upright import statures, tops_of_boxes, tops_seen
 from models.pose import observe
 from models.simulation.poses import repeated_pose
-from models.simulation.simulated_site import Lane, SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.trajectory import Trajectory
 from service.job_queue import JobQueue
 from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.estimate import run_estimate
+from studies.simulation.lanes import Lane, SiteConfig, draw_lanes, walk_site
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(

@@ -11,7 +11,6 @@ from models.geometry.ground import ground_from_pixel
 from models.monitoring.chart import OFFSET_GRID, DriftChart, GridOffset, ratios_of
 from models.monitoring.group_scores import SCORES
 from models.monitoring.verdict import DriftLimits
-from models.simulation.simulated_site import SiteConfig, draw_lanes
 from models.tracks.scenes import load_scene
 from studies.alarms.camera_years import live_year
 from studies.alarms.results import (
@@ -25,6 +24,7 @@ from studies.alarms.results import (
 from studies.alarms.scene_alarms import judge_scene
 from studies.alarms.watch import Watch, first_alarm
 from studies.simulation.habits import HabitConfig, walk_days
+from studies.simulation.lanes import SiteConfig, draw_lanes
 from tests.conftest import SCENES
 from tests.models.sites import LENS, PRIOR
 

@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.scenes import Scene, SceneTrack
 from studies.base_model.base_study import BaseOutcome, report_lines, together
 from studies.protocol.cases import (
@@ -18,6 +17,7 @@ from studies.protocol.cases import (
 )
 from studies.protocol.estimators import base_model
 from studies.protocol.learned import Learned
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.simulation.simulated_site import SiteConfig
 from models.tracks.scenes import Scene, SceneTrack
 from studies.protocol import flow_curves
 from studies.protocol.cases import PANNED, draw_case
 from studies.protocol.flow_curves import CurvePoint, flow_errors
 from studies.protocol.flow_plots import curve_of, plot_flow, plot_flow_errors
 from studies.protocol.learned import learn_case
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import LENS, PRIOR, tracks_of
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
@@ -16,6 +15,7 @@ from studies.protocol.cases import ProtocolCase, judge_answer
 from studies.protocol.estimators import joint, joint_feet
 from studies.protocol.flow_runs import fused, registration
 from studies.protocol.learned import learn_case
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))

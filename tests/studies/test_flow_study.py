@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.geometry.ground import ground_from_pixel
-from models.simulation.simulated_site import (
+from studies.paths.flow_study import draw_new_lane, study_site, walk_changed
+from studies.simulation.lanes import (
     Lane,
     SiteConfig,
     draw_lanes,
 )
-from studies.paths.flow_study import draw_new_lane, study_site, walk_changed
 from studies.simulation.simulated_site import draw_simulated_site
 from tests.models.sites import LENS, PRIOR
 

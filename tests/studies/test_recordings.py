@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from models.errors import ShapeError
 from models.geometry.ground import ground_from_pixel
 from models.geometry.pose import CameraPose
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from studies.recordings import load_recording
 
 LENS = {

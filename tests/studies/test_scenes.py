@@ -8,8 +8,7 @@ import pytest
 
 from models.errors import ShapeError
 from models.geometry.ground import pixel_from_ground
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
-from models.simulation.poses import repeated_pose
+from models.simulation.poses import PoseOffset, offset_trajectory, repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from models.monitoring.chart import OFFSET_GRID, DriftChart
 from models.monitoring.group_scores import SCORES
 from models.pose import assume_site, observe
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.scenes import Scene, SceneTrack
 from studies.alarms import still_days as study
 from studies.alarms.still_days import MOVES, StillDay, habits_of, report_lines
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import LENS, PRIOR
 
 A_UNIT = 50.0  # of scores, for a radian and for a log

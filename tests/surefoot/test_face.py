@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import surefoot
-from models.simulation.simulated_site import SiteConfig
+from studies.simulation.lanes import SiteConfig
 from tests.conftest import ROOT, SCENES
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 

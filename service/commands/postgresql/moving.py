@@ -9,7 +9,7 @@ from typing import Any
 
 import psycopg
 
-from models.regression.weights_files import weights_path
+from models.regression.recipe import weights_path
 from service.commands.postgresql.migrating import migrate_server
 from service.data_dir import DATABASE, StartError, held_alone, require_stopped
 from service.settings import Settings

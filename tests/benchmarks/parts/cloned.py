@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from sqlalchemy import Column, Table
 
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
 from service.store.engines.files import connected
 from service.store.record import Record
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.conftest import CAMERA
 from tests.running import RunningService, wait_for
 from tests.service.street import LENS, PRIOR

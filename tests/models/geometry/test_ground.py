@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from models.geometry.ground import (
-    LOWEST_SINE,
-    ground_from_pixel,
-    ground_of_rays,
-    pixel_from_ground,
-)
+from models.geometry.ground import LOWEST_SINE, ground_from_pixel, ground_of_rays, pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from tests.strategies import image_points, intrinsics, poses

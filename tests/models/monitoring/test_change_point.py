@@ -7,7 +7,7 @@ import pytest
 
 from models.pose.change_point import find_change
 from models.pose.config import FEWEST_BESIDE
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end

@@ -24,7 +24,7 @@ from models.monitoring.creep import (
 from models.monitoring.group_scores import score_groups
 from models.pose import begin_creep_log, learn_site, log_creep, observe, without_creep
 from models.serialization import flattened
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.trajectory import by_end
 from tests.models.sites import LENS, PRIOR, tracks_of
 

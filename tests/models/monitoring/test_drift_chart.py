@@ -27,12 +27,12 @@ from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_gro
 from models.monitoring.verdict import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe_each
 from models.walking.reference_learning import learn_speed_reference
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import LENS, PRIOR
 
 AT = array_of(PRIOR)

@@ -15,11 +15,11 @@ from models.paths.likelihood import walkers_of
 from models.paths.reference import learn_paths
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
-from models.simulation.simulated_site import SiteConfig
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Steps
 from models.walking.estimate import joint_estimate
 from models.walking.reference_learning import learn_speed_reference
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))

@@ -13,18 +13,18 @@ from models.paths.reference import learn_paths
 from models.pose.fusion import fused_estimate
 from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
-from models.simulation.simulated_site import (
-    Lane,
-    SiteConfig,
-    draw_lanes,
-    walk_site,
-)
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe_each
 from models.walking.estimate import joint_estimate
 from models.walking.reference_learning import learn_speed_reference
 from studies.paths.flow_study import draw_new_lane, walk_changed
+from studies.simulation.lanes import (
+    Lane,
+    SiteConfig,
+    draw_lanes,
+    walk_site,
+)
 from tests.models.sites import LENS, PRIOR
 
 AT = array_of(PRIOR)

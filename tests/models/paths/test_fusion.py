@@ -13,10 +13,10 @@ from models.pose.fusion import fused_estimate
 from models.pose.modes import birge_ratio
 from models.pose.site import CameraSite
 from models.reasons import TracksCode
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_at_heading, joint_estimate
 from models.walking.reference_learning import learn_speed_reference
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import LENS, PRIOR, seen
 
 SLOW = SiteConfig(aside_m=0.8, standing_share=0.0, speed_mean_mps=1.1)

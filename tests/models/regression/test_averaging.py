@@ -5,11 +5,7 @@ import pytest
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.rotation import quaternion_from_rotation, rotation_from_angles
-from models.regression.averaging import (
-    TrackPredictions,
-    average_windows,
-    averaged_estimate,
-)
+from models.regression.averaging import TrackPredictions, average_windows, averaged_estimate
 
 
 def quaternions(tilts, rolls=0.0, heading=0.0):

@@ -7,13 +7,7 @@ import torch
 from models.errors import CheckpointError
 from models.regression.checkpoint import load_weights, save_weights, weights_path
 from models.regression.network import network_for
-from models.regression.recipe import (
-    DEFAULT,
-    PAPER,
-    TrainingPlan,
-    plan_from_config,
-    plan_to_config,
-)
+from models.regression.recipe import DEFAULT, PAPER, TrainingPlan, plan_from_config, plan_to_config
 from models.regression.training import train
 from models.simulation.walkers import WalkConfig
 

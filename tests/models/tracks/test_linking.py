@@ -8,7 +8,7 @@ import pytest
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.upright import tops_seen
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.tracks.linking import count_walks, link_pieces, walks_of
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory

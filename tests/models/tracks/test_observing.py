@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.simulation.simulated_site import SiteConfig
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import observe_each
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
 

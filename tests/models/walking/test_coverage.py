@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.geometry.pose import plane_parameters_of
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_estimate
 from models.walking.reference_learning import learn_speed_reference

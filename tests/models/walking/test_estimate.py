@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.geometry.pose import CameraPose, plane_parameters_of
 from models.reasons import TracksCode
-from models.simulation.simulated_site import Lane, SiteConfig, walk_site
 from models.simulation.walkers import WalkConfig
 from models.walking.config import PLAUSIBLE_OFFSET
 from models.walking.estimate import joint_estimate
@@ -21,6 +20,7 @@ from models.walking.speed_reference import (
     reference_to_bytes,
 )
 from models.walking.variance_inflation import shrink_offset
+from studies.simulation.lanes import Lane, SiteConfig, walk_site
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
 FAR = CameraPose(

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.pose import estimate_pose, learn_site, observe
 from models.quantiles import Z90
-from models.simulation.pose_offset import PoseOffset, offset_trajectory
+from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.trajectory import by_end
 from models.tracks.walks import observe_heads
 from models.walking.heads import HeadEstimate, head_estimate, joined, learn_heads

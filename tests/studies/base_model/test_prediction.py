@@ -11,12 +11,12 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.ground import pixel_from_ground
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose, plane_parameters_of
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from models.simulation.poses import PoseOffset
 from studies.base_model.network import SetNetwork
 from studies.base_model.prediction import base_estimate
 from studies.base_model.segments import Segments, segments_of
 from studies.base_model.stored import load_base_model
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 
 KNOCK = PoseOffset(tilt_rad=radians(4), roll_rad=radians(-5), log_height=0.1)
 

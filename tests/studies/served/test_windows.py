@@ -8,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from models.pose import CameraSite, DriftLimits, Trajectory, learn_site, observe
-from models.simulation.pose_offset import PoseOffset
-from models.simulation.simulated_site import SiteConfig
+from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import by_end
 from studies.protocol.cases import ProtocolCase
 from studies.served.outcomes import parameters_beside, serve_case
 from studies.served.replays import ReplayPlan, replay
 from studies.served.windows import Window, looks
+from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from models.reasons import Reason, TracksCode
-from models.simulation.pose_offset import PoseOffset
+from models.simulation.poses import PoseOffset
 from studies.paths.flow_study import ChangedResult, OffsetResult, SiteResults
 from studies.paths.flow_tables import changed_table, knocked_table
 from tests.service.commands.test_replay import surefoot

@@ -10,7 +10,7 @@ from models.errors import DegenerateGeometryError
 from models.geometry.ground import ground_from_pixel
 from models.geometry.pose import CameraPose
 from models.geometry.upright import statures
-from models.simulation.simulated_site import SiteConfig, draw_lanes, walk_site
+from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 
 QUIET = SiteConfig(

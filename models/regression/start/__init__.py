@@ -1,1 +1,0 @@
-"""Weights that the training of a camera's regressor starts from, learned on many cameras."""
