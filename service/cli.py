@@ -13,7 +13,7 @@ from service.commands.settings_given import WrongSettingsError, begin
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.workers.processes.collector import importing
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:

@@ -98,7 +98,7 @@ def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = access.find(session, token_id)
+    record = session.get(TokenRecord, token_id)
     if record is None:
         raise NotFoundError(f"token_id: there is no token {token_id!r:.80}")
     if record.revoked_at is None:
@@ -113,7 +113,7 @@ def caller_of_token(session: Session, text: str) -> Caller | None:
     """The caller with a token; None where nobody is let in with it."""
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
-    record = access.find(session, token_id) if prefix == _PREFIX else None
+    record = session.get(TokenRecord, token_id) if prefix == _PREFIX else None
     # The same work for a token that is unknown: its id is no secret, but need not be told.
     kept = _NO_SECRET if record is None else record.secret_sha256
     matches = hmac.compare_digest(kept, hash_of(secret))

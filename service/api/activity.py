@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from service.api.middleware.dependencies import AppState, StateDep
 from service.api.schemas import Out, Text
 from service.enums import Activity, AlertKind, Outcome
-from service.store import activity
+from service.store import journal
 
 
 class EntryOut(Out):
@@ -83,5 +83,5 @@ def _lines(state: AppState, camera_id: str | None, after: int, limit: int | None
 
 def _page(state: AppState, camera_id: str | None, after: int, limit: int) -> list[EntryOut]:
     with state.store.read() as session:
-        records = activity.after(session, camera_id, after, limit)
+        records = journal.activity_after(session, camera_id, after, limit)
         return [EntryOut.model_validate(record) for record in records]

@@ -11,7 +11,7 @@ from service.api.schemas import Body, Moment, Out, Who
 from service.cameras import maintenance
 from service.enums import WindowState
 from service.store.access import name_in
-from service.store.maintenance import MaintenanceRecord
+from service.store.references import MaintenanceRecord
 
 
 class WindowBody(Body):

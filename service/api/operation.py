@@ -23,7 +23,7 @@ from service.api.middleware.hosts import auth_on
 from service.api.schemas import Out
 from service.enums import AlertKind, Health, PoseState, Readiness, Severity, TrainingState
 from service.operations import health as checks
-from service.operations.metrics import Metrics, load_metrics
+from service.operations.health import Metrics, load_metrics
 
 
 class HealthOut(BaseModel):

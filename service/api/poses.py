@@ -28,8 +28,7 @@ from service.job_queue import JobQueue
 from service.reasons import code_of, values_of
 from service.settings import Settings
 from service.store.access import name_in
-from service.store.estimates import EstimateRecord
-from service.store.serialization import identifiable_drift, identifiable_sd
+from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
 from service.wording.times import from_seconds
 
 _FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}

@@ -10,9 +10,9 @@ from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Out, ReasonCode
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
-from service.notifications.webhooks import DeliveryView, WebhookSpec, WebhookView
+from service.notifications.webhooks import WebhookSpec, WebhookView
 from service.reasons import code_of
-from service.store.webhooks import WebhookRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
@@ -115,9 +115,12 @@ class DeliveryOut(Out):
     finished_at: datetime | None
 
     @classmethod
-    def from_value(cls, view: DeliveryView) -> Self:
+    def from_record(cls, record: DeliveryRecord) -> Self:
         """The body of a delivery."""
-        return cls.of(view.record, attempts=view.attempts)
+        attempts = [
+            AttemptOut.model_validate(each, from_attributes=True) for each in record.requests
+        ]
+        return cls.of(record, attempts=attempts)
 
 
 class DeliveryList(BaseModel):
@@ -201,7 +204,7 @@ def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
 @router.post("/webhooks/{webhook_id}/test", status_code=202)
 def test(webhook_id: str, session: WriteDep) -> DeliveryOut:
     """Queue a message of the type `test`."""
-    return DeliveryOut.from_value(webhooks.test_webhook(session, webhook_id))
+    return DeliveryOut.from_record(webhooks.test_webhook(session, webhook_id))
 
 
 @router.get("/webhooks/{webhook_id}/deliveries")
@@ -212,20 +215,20 @@ def list_deliveries(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> DeliveryList:
     """What was sent or is to be, newest first, with every attempt."""
-    views = webhooks.list_deliveries(session, webhook_id, state, limit)
-    return DeliveryList(items=[DeliveryOut.from_value(view) for view in views])
+    records = webhooks.list_deliveries(session, webhook_id, state, limit)
+    return DeliveryList(items=[DeliveryOut.from_record(record) for record in records])
 
 
 @router.get("/deliveries/{delivery_id}")
 def show_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
     """A delivery with its attempts."""
-    return DeliveryOut.from_value(webhooks.show_delivery(session, delivery_id))
+    return DeliveryOut.from_record(webhooks.show_delivery(session, delivery_id))
 
 
 @router.post("/deliveries/{delivery_id}/replay", status_code=202)
 def replay(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
     """Send a delivery anew, at once and under the same `webhook-id`."""
-    return DeliveryOut.from_value(webhooks.replay_delivery(session, state.queue, delivery_id))
+    return DeliveryOut.from_record(webhooks.replay_delivery(session, state.queue, delivery_id))
 
 
 def _shown(view: WebhookView) -> WebhookOut:

@@ -26,7 +26,6 @@ from service.store import cameras, references, tracks, trainings
 from service.store.access import name_in
 from service.store.alerts import AlertFilter
 from service.store.cameras import CameraRecord, PriorPoseRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
 from service.training import stop_trainings, train_by_itself
 
 _MANY = 1000  # more alerts than a camera has kinds
@@ -85,7 +84,7 @@ def register_camera(
         TooManyCamerasError: as many are registered as may be.
     """
     camera_id = spec.camera_id or f"camera-{secrets.token_hex(4)}"
-    if cameras.find(session, camera_id) is not None:
+    if session.get(CameraRecord, camera_id) is not None:
         raise ConflictError(f"id: {camera_id!r} is taken")
     if cameras.count(session) >= settings.max_cameras:
         raise TooManyCamerasError(
@@ -205,7 +204,7 @@ def require_camera(session: Session, camera_id: str) -> CameraRecord:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = cameras.find(session, camera_id)
+    record = session.get(CameraRecord, camera_id)
     if record is None:
         raise no_camera(camera_id)
     return record
@@ -258,8 +257,8 @@ def _view(session: Session, record: CameraRecord) -> CameraView:
     model = trainings.newest_model(session, record.id)
     return CameraView(
         record=record,
-        intrinsics=intrinsics_of(record),
-        prior_pose=pose_of_prior(cameras.prior_pose(session, record.id)),
+        intrinsics=record.intrinsics,
+        prior_pose=cameras.prior_pose(session, record.id).pose,
         tracks=tracks.count(session, record.id),
         model_id=None if model is None else model.id,
     )

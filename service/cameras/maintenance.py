@@ -15,8 +15,8 @@ from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
 from service.references import forget_streak
 from service.settings import Settings
-from service.store import alerts, maintenance
-from service.store.maintenance import MaintenanceRecord
+from service.store import alerts, references
+from service.store.references import MaintenanceRecord
 
 _FARTHEST = timedelta(days=366)
 
@@ -70,7 +70,7 @@ def list_windows(session: Session, camera_id: str) -> Sequence[MaintenanceRecord
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    return maintenance.of_camera(session, camera_id)
+    return references.maintenance_of(session, camera_id)
 
 
 def change_window(
@@ -126,7 +126,7 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
 
 def note_ends(session: Session, camera_id: str, now: datetime) -> bool:
     """Note the end of windows that came to it by themselves; says whether there was any."""
-    over = maintenance.just_over(session, camera_id, now)
+    over = references.maintenance_just_over(session, camera_id, now)
     for record in over:
         record.ended_at = record.to_at
         _note(session, Activity.MAINTENANCE_OVER, record, None)
@@ -149,7 +149,7 @@ def _note(session: Session, what: Activity, record: MaintenanceRecord, by: str |
 
 def _require(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord:
     require_camera(session, camera_id)
-    record = maintenance.find(session, camera_id, window_id)
+    record = references.find_maintenance(session, camera_id, window_id)
     if record is None:
         raise NotFoundError(f"window_id: camera {camera_id!r} has no window {window_id!r}")
     return record

@@ -18,10 +18,9 @@ from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import tracks_so_far, wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, fleet, maintenance, windows
+from service.store import cameras, estimates, fleet, references, windows
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
 
 
@@ -70,7 +69,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         counts = fleet.learning_counts(session, (camera_id,), attended)
     so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
     reasons = _reasons_of(session, settings, status, so_far)
-    pose = pose_of_prior(prior)
+    pose = prior.pose
     estimate = status.estimate
     if estimate is not None:
         pose = replace(pose, **asdict(estimate.pose))
@@ -83,7 +82,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
-    why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
+    why, lens = (reasons, in_words(reasons)), camera.intrinsics
     served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         status=status,
@@ -125,7 +124,7 @@ def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_f
     now = datetime.now(UTC)
     found: list[Reason] = []
     if status.attended.under_way(now):
-        window = maintenance.under_way(session, status.camera_id, now)
+        window = references.maintenance_under_way(session, status.camera_id, now)
         if window is not None:
             found.append(_window(window))
     estimate = status.estimate

@@ -18,11 +18,10 @@ from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
-from service.store import fleet, metrics
+from service.store import fleet
 from service.store.alerts import POSE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +63,7 @@ def camera_statuses(
 ) -> dict[str, CameraStatus]:
     """The status of all cameras, or some, in order of their ids, by a handful of statements."""
     now = datetime.now(UTC)
-    newest = metrics.newest(session, ids)
+    newest = fleet.newest(session, ids)
     windows: dict[str, list[MaintenanceRecord]] = {}
     if any(each.attended for each in newest.values()):
         windows = fleet.maintenance_windows(session, ids)
@@ -80,7 +79,7 @@ def camera_statuses(
         and (estimate := newest[camera_id].estimate) is not None
         and not estimate.identifiable
     ]
-    before = metrics.newest_identifiable_estimates(session, without) if without else {}
+    before = fleet.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, each in newest.items():
         arrivals = None if each.rhythm is None else unpacked(each.rhythm)
@@ -96,7 +95,7 @@ def camera_statuses(
 
 
 def _status_of(
-    newest: metrics.Newest,
+    newest: fleet.Newest,
     last_identifiable: EstimateRecord | None,
     attended: Attendance,
     alerts: Sequence[AlertRecord],
@@ -143,7 +142,7 @@ def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
     ]
 
 
-def _counting(newest: metrics.Newest, attended: Attendance, now: datetime) -> EstimateRecord | None:
+def _counting(newest: fleet.Newest, attended: Attendance, now: datetime) -> EstimateRecord | None:
     """The newest estimate; None where it says nothing of how the camera stands now."""
     reference, estimate = newest.reference, newest.estimate
     if estimate is None or estimate.reference_id != reference.id:
@@ -187,7 +186,7 @@ def alert_since(alert: AlertRecord) -> datetime:
 
 
 def _since(
-    state: PoseState, newest: metrics.Newest, alerts: Sequence[AlertRecord], cause: Cause
+    state: PoseState, newest: fleet.Newest, alerts: Sequence[AlertRecord], cause: Cause
 ) -> datetime:
     reference = newest.reference
     if alerts:

@@ -17,7 +17,7 @@ from service.settings import Settings
 from service.store import cameras, references, tracks
 from service.store.cameras import Picture
 from service.store.engines.store import Store, joined
-from service.store.serialization import pack
+from service.store.tracks import pack
 
 _MOST_PICTURES = 10_000
 _BEYOND = 1.5  # times `keep_mb` that may lie there until the next retention
@@ -51,14 +51,14 @@ class Pictures:
             NotFoundError: there is no such camera.
         """
         with store.look() as connection:
-            found = cameras.picture(connection, camera_id)
+            found = cameras.awaited(connection, camera_id)
         if found is None:
             self._known.pop(camera_id, None)
             raise no_camera(camera_id)
         if len(self._known) >= _MOST_PICTURES:
             self._known.clear()
-        self._known[camera_id] = found
-        return found
+        self._known[camera_id] = found.picture
+        return found.picture
 
 
 @dataclass(slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from typer import echo
 
 from service.commands.settings_given import begin
 from service.data_dir import StartError
-from service.workers.processes.signals import end_like_ctrl_c
+from service.workers.processes.process import end_like_ctrl_c
 
 if TYPE_CHECKING:
     from service.settings import Settings

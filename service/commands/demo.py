@@ -41,7 +41,7 @@ from service.commands.settings_given import settings_given
 from service.data_dir import StartError, running_in
 from service.enums import AlertState, ReferenceState
 from service.settings import Settings
-from service.workers.processes.signals import end_like_ctrl_c
+from service.workers.processes.process import end_like_ctrl_c
 
 _PREFIX, _LOCK = "surefoot-demo-", "demo.lock"
 _HOST = "127.0.0.1"

@@ -22,8 +22,8 @@ from service.store import access
 from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
-from service.workers.processes.local_workers import local_workers
-from service.workers.processes.resources import settle_allocator
+from service.workers.processes.local_workers import LocalWorkers
+from service.workers.processes.process import settle_allocator
 
 log = logging.getLogger("surefoot.serve")
 
@@ -67,7 +67,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         def give_up() -> None:
             server.should_exit = True
 
-        with local_workers(settings, give_up) as workers:
+        with LocalWorkers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             settle_collector()

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from service.logs import configure_logs
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 
 if TYPE_CHECKING:
     from service.settings import Settings

@@ -16,7 +16,7 @@ from service.commands.data import DataDir
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.errors import ServiceError
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 
 if TYPE_CHECKING:
     from service.store.access import TokenRecord

@@ -15,10 +15,10 @@ from service.settings import Settings
 from service.store.engines.sqlite import FileLock
 from service.store.engines.store import Store
 from service.workers import engine
-from service.workers.context import JobContext
+from service.workers.context import UPKEEP, JobContext, RunningJobs
 from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
-from service.workers.processes.resources import (
+from service.workers.processes.process import (
     give_back,
     resident_mb,
     settle_allocator,
@@ -32,9 +32,7 @@ from service.workers.processes.workers import (
     register_worker,
     worker_name,
 )
-from service.workers.running_jobs import UPKEEP, RunningJobs
-from service.workers.upkeep.clock import follow_clock_since_last_run
-from service.workers.upkeep.periodic import start_periodic_work
+from service.workers.upkeep.periodic import follow_clock_since_last_run, start_periodic_work
 
 log = logging.getLogger("surefoot.worker")
 

@@ -13,7 +13,7 @@ from service.cameras.cameras import CameraView
 from service.cameras.poses import PoseView
 from service.pages.drawings.ground_plan import ground_plan_svg
 from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
-from service.store.snapshots import SnapshotFacts
+from service.store.cameras import SnapshotRecord
 
 _POINTS = 24
 
@@ -35,7 +35,7 @@ def draw_camera(
     served: PoseView,
     tracks: Sequence[Trajectory],
     misplaced: Sequence[Misplacement],
-    still: SnapshotFacts | None,
+    still: SnapshotRecord | None,
 ) -> CameraDrawings:
     """The picture plane and the ground from above, with the newest tracks.
 

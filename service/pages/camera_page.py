@@ -16,26 +16,17 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import CHARTS_URL, render
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
+from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.pages.camera_drawings import draw_camera
 from service.settings import Settings
-from service.store import (
-    activity,
-    alerts,
-    cameras,
-    events,
-    maintenance,
-    snapshots,
-    tracks,
-    trainings,
-)
-from service.store.activity import ActivityRecord
+from service.store import cameras, journal, references, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
-from service.store.cameras import PriorPoseRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import trajectory_of
-from service.store.snapshots import SnapshotFacts
+from service.store.cameras import PriorPoseRecord, SnapshotRecord
+from service.store.journal import ActivityRecord
+from service.store.references import MaintenanceRecord
+from service.store.tracks import trajectory_of
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
 from service.wording import camera as camera_words
@@ -81,7 +72,7 @@ class CameraPage:
     trainings: tuple[TrainingRecord, ...]
     activity: tuple[ActivityRecord, ...]
     sources: tuple[SourceView, ...]
-    snapshot: SnapshotFacts | None
+    snapshot: SnapshotRecord | None
     snapshots_allowed: bool
     newest_event_id: int
 
@@ -130,13 +121,13 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     """
     now = datetime.now(UTC)
     # Taken first: what happens while the rest is read is told again, and not missed.
-    newest_event_id = events.newest_id(session)
+    newest_event_id = journal.newest_event_id(session)
     camera = view_camera(session, camera_id)
     pose = view_pose(session, settings, camera_id)
     estimate = pose.status.estimate
     ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)
     found = [*pose.status.alerts, *list_alerts(session, ended, _ALERTS)]
-    windows = maintenance.of_camera(session, camera_id)
+    windows = references.maintenance_of(session, camera_id)
     over = sum(window.until <= now for window in windows)
     priors = cameras.prior_poses(session, camera_id, _PRIORS)
     shown = tracks.newest(
@@ -161,16 +152,18 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         alerts=tuple(
             AlertStory(
                 record=record,
-                group=None if record.group_id is None else alerts.find(session, record.group_id),
+                group=None
+                if record.group_id is None
+                else session.get(AlertRecord, record.group_id),
             )
             for record in found
         ),
         priors=tuple(priors),
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
-        activity=tuple(activity.newest(session, camera_id, _ACTIVITY)),
+        activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
-        snapshot=snapshots.facts(session, camera_id) if settings.snapshots else None,
+        snapshot=snapshot_facts(session, settings, camera_id),
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,
     )

@@ -17,11 +17,10 @@ from service.api.middleware.pages import render
 from service.api.schemas import Text
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, Severity
-from service.estimation.limits import drift_limits
 from service.pages.drawings.sparkline import sparkline
-from service.references import tracks_so_far, wanted_tracks
+from service.references import drift_limits, tracks_so_far, wanted_tracks
 from service.settings import Settings
-from service.store import events, fleet
+from service.store import fleet, journal
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.trainings import TrainingRecord
@@ -213,7 +212,7 @@ router = APIRouter(include_in_schema=False)
 def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Every camera, what needs a person first."""
     # What happens from here on is an event that the page asks for, even if it is in here too.
-    newest = events.newest_id(session)
+    newest = journal.newest_event_id(session)
     cameras = list_fleet(session, state.settings)
     count = Counter(camera.state for camera in cameras)
     return render(

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from service.enums import Activity, AlertKind, Outcome
-from service.store.activity import ActivityRecord
+from service.store.journal import ActivityRecord
 from service.wording.times import Clock
 
 KINDS = {

@@ -20,8 +20,8 @@ from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store.access import set_actor
+from service.store.engines.sqlite import Turns
 from service.store.engines.store import Store
-from service.store.engines.turns import Turns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,9 +16,9 @@ import anyio.to_thread
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.api.middleware.admission import STREAM_POLLS
-from service.store import events
+from service.store import journal
 from service.store.engines.store import Store
-from service.store.events import EventRecord
+from service.store.journal import EventRecord
 
 Answer = TypeVar("Answer")
 log = logging.getLogger("surefoot.http")
@@ -51,11 +51,11 @@ class Feed:
 
     async def newest(self) -> int:
         """The id of the newest event."""
-        return await self.ask(self._read, events.newest_id)
+        return await self.ask(self._read, journal.newest_event_id)
 
     async def after(self, seen: int) -> Sequence[EventRecord]:
         """The stored events after one, oldest first, as many as are read at once."""
-        return await self.ask(self._read, events.after, seen, _BATCH)
+        return await self.ask(self._read, journal.events_after, seen, _BATCH)
 
     async def join(self) -> None:
         """Follow."""

@@ -8,8 +8,8 @@ from sqlalchemy import event
 
 from models.monitoring.verdict import DriftLimits
 from service.cameras.poses import view_pose
-from service.estimation.limits import drift_limits
 from service.pages import fleet as use_cases
+from service.references import drift_limits
 from service.store import fleet as statements
 from service.store.estimates import EstimateRecord
 from service.wording.moves import height_change
