@@ -4,7 +4,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TypedDict
 
-import anyio
 from fastapi import FastAPI
 
 from service.api import (
@@ -14,33 +13,31 @@ from service.api import (
     documented,
     events,
     maintenance,
-    metrics,
     operation,
     poses,
     snapshots,
     sources,
+    tokens,
     tracks,
     trainings,
     webhooks,
 )
 from service.api.middleware import pages
-from service.api.middleware.authentication import GuardMiddleware
-from service.api.middleware.bodies import BodyMiddleware
-from service.api.middleware.concurrency import (
-    STREAM_POLLS,
-    LaneMiddleware,
-    Lanes,
+from service.api.middleware.admission import (
+    AdmissionMiddleware,
     sessions_at_once,
     start_threads,
 )
+from service.api.middleware.authentication import GuardMiddleware
 from service.api.middleware.dependencies import AppState
+from service.api.middleware.event_feed import Feed
 from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
-from service.api.middleware.problems import ProblemMiddleware, add_problem_handlers
+from service.api.middleware.problems import FORESEEN, ProblemMiddleware, answer_of
 from service.api.middleware.rate_limits import RateMiddleware
-from service.cameras.posts import Quota
+from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
-from service.pages.routes import api_docs, camera_page, fleet, login, registration, tokens
+from service.pages import access, api_docs, camera_page, fleet, registration
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -63,15 +60,13 @@ def create_app(settings: Settings) -> FastAPI:
         # A request is in one thread at a time; some are left for what needs no turn.
         await start_threads(at_once + _SPARE_THREADS)
         store = Store(settings, settings.http_wait_s, at_once)
-        stream_polls = anyio.CapacityLimiter(STREAM_POLLS)
         state = AppState(
             settings=settings,
             store=store,
             queue=JobQueue(store.engine),
             instruments=instruments,
             quota=Quota(settings),
-            stream_polls=stream_polls,
-            feed=events.feed_of(store, stream_polls),
+            feed=Feed(store),
         )
         yield {"app": state}
         state.stopping.set()
@@ -85,6 +80,7 @@ def create_app(settings: Settings) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # FastAPI's own fetch their viewers from a public host
         redoc_url=None,
+        exception_handlers=dict.fromkeys(FORESEEN, answer_of),
     )
     # A path is looked for in one after another: what is asked for most comes first.
     for module in (
@@ -100,26 +96,22 @@ def create_app(settings: Settings) -> FastAPI:
         events,
         activity,
         operation,
-        metrics,
         api_docs,
         fleet,
-        login,
         camera_page,
         registration,
         tokens,
+        access,
     ):
         app.include_router(module.router)
     documented.document_errors(app)
     pages.mount_static(app)
-    lanes = Lanes(settings)
     # The last one is outermost.
-    app.add_middleware(LaneMiddleware, lanes=lanes)
-    app.add_middleware(BodyMiddleware, settings=settings, lanes=lanes)
+    app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(RateMiddleware, settings=settings)
     app.add_middleware(GuardMiddleware, settings=settings)
     app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(ProblemMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.state.instruments = instruments
-    add_problem_handlers(app)
     return app

@@ -9,12 +9,11 @@ import typer
 from rich.console import Console
 
 from service.commands.data import DATA_COMMANDS, DataDir
-from service.commands.settings_given import WrongSettingsError, settings_given
+from service.commands.settings_given import WrongSettingsError, begin
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
-from service.logs import configure_logs
 from service.workers.processes.collector import importing
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 from service.workers.processes.workers import WorkKind
 
 if TYPE_CHECKING:
@@ -44,11 +43,7 @@ def serve(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Serve the API and run the local workers, until SIGTERM."""
-    configure_logs()
-    be_private()
-    settings = settings_given(
-        data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe
-    )
+    settings = begin(data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe)
     with importing():
         from service.commands.serve import run_service
 
@@ -67,9 +62,7 @@ def worker(
     follow_stdin: FollowStdin = False,
 ) -> None:
     """Run a worker alone, beside an API that runs elsewhere: on this machine, with a file."""
-    configure_logs()
-    be_private()
-    settings = settings_given(data_dir=data_dir)
+    settings = begin(data_dir=data_dir)
     with importing():
         from service.commands.migrate import migrate as run_migrations
         from service.commands.worker import WorkerRunningError, run_worker

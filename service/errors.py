@@ -1,6 +1,7 @@
 """Errors that the service answers with a problem document (RFC 9457)."""
 
 from dataclasses import dataclass
+from typing import Self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +101,11 @@ class MalformedError(ServiceError):
     """A body that cannot be read at all, or lacks or breaks a field."""
 
     status, code = 422, "malformed"
+
+    @classmethod
+    def of_field(cls, name: str, reason: str) -> Self:
+        """The error of one field, or parameter, alone."""
+        return cls(f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),))
 
 
 class NothingTakenError(ServiceError):

@@ -1,13 +1,12 @@
 """The estimate queue: cameras that are due, were looked at up to a track, or cool down."""
 
-from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
 from service.job_queue import JobQueue
 from service.reasons import Reasons
-from service.store import cameras, tracks
+from service.store import estimates, tracks
 from service.store.cameras import CameraRecord
 
 LONGEST_COOLDOWN_S = 600.0
@@ -24,33 +23,27 @@ def request_estimate(
     Before others where somebody has `watched` it, or it may have moved. One that cools down, or is
     being looked at, is queued by the upkeep when its time has come.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None and camera.estimate_due_at is None:
         now = _now()
         camera.estimate_due_at = now
         if not is_cooling(camera.estimate_after, now):
-            queue.enqueue_estimate(session, camera_id, now, urgent=watched or camera.urgent)
+            urgent = watched or _may_have_moved(session, camera_id)
+            queue.enqueue_estimate(session, camera_id, now, urgent=urgent)
 
 
-def overlooked(session: Session, queue: JobQueue) -> list[str]:
-    """Cameras that are due and may be looked at, without a job that waits or runs.
+def queue_overlooked(session: Session, queue: JobQueue) -> list[str]:
+    """Queue a look at cameras that are due and may be looked at, without a job; the longest first.
 
     They were posted to while they were looked at or cooled down, or the engine has lost their job.
     """
-    now = _now()
-    return [
-        camera_id
-        for camera_id, until in queue.due_without_job(session)
-        if not is_cooling(until, now)
-    ]
-
-
-def queue_overlooked(session: Session, queue: JobQueue, camera_ids: Sequence[str]) -> None:
-    """Queue a look at each of some cameras; those first that have been due for longest."""
-    for camera_id in camera_ids:
-        camera = cameras.find(session, camera_id)
-        if camera is not None and camera.estimate_due_at is not None:
-            queue.enqueue_estimate(session, camera_id, camera.estimate_due_at, urgent=camera.urgent)
+    now, found = _now(), []
+    for camera_id, due_at, until in queue.due_without_job(session):
+        if not is_cooling(until, now):
+            urgent = _may_have_moved(session, camera_id)
+            queue.enqueue_estimate(session, camera_id, due_at, urgent=urgent)
+            found.append(camera_id)
+    return found
 
 
 def is_cooling(until: datetime | None, now: datetime) -> bool:
@@ -73,7 +66,7 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
 
     The engine runs the job of a dead worker again at once, whatever it died of.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is None or camera.estimate_tries < 2 or not is_cooling(camera.estimate_after, _now()):
         return False
     camera.estimate_due_at = camera.estimate_due_at or _now()
@@ -84,7 +77,7 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
 
 def begin_look(session: Session, camera_id: str) -> int | None:
     """Take the mark "due" off a camera; returns the track that was stored last."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         now = _now()
         if camera.estimate_tries and camera.estimate_error is None:
@@ -109,7 +102,7 @@ def end_look(
     The camera cools down for `rest_s`, so that others have their turn. `failures` are of what
     stands beside the served estimate.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         camera.looked_at_pk = newest_pk
         camera.estimate_tries = 0
@@ -120,19 +113,24 @@ def end_look(
 
 def note_partial_failures(session: Session, camera_id: str, failures: Reasons) -> None:
     """Note what failed beside an estimate after that was stored."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         camera.lacks = (*camera.lacks, *failures)
 
 
 def fail_look(session: Session, camera_id: str, error: str) -> None:
     """Note that a look failed: the camera stays due, and cools down longer each time."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         now = _now()
         _note_failure(camera, error, now)
         camera.estimate_due_at = camera.estimate_due_at or now
         camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
+
+
+def _may_have_moved(session: Session, camera_id: str) -> bool:
+    last = estimates.newest(session, camera_id)
+    return last is not None and last.suspects_move
 
 
 def _note_failure(camera: CameraRecord, error: str, now: datetime) -> None:

@@ -1,11 +1,11 @@
 """The service's own reasons, beside those of the tracks, and all of them as JSON."""
 
-import math
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
 from models.reasons import Reason, TracksCode
+from service.degrees import in_degrees
 
 # Of one thing, in the order in which they are said.
 Reasons = tuple[Reason, ...]
@@ -58,7 +58,7 @@ def code_of(reasons: Sequence[Reason]) -> str | None:
 
 def values_of(reasons: Sequence[Reason]) -> dict[str, Any]:
     """The numbers and names of the first for clients, who take angles in degrees."""
-    return _in_degrees(reasons[0].values) if reasons else {}
+    return in_degrees(reasons[0].values) if reasons else {}
 
 
 def to_json(reasons: Sequence[Reason]) -> list[dict[str, Any]]:
@@ -73,15 +73,3 @@ def from_json(kept: Sequence[Mapping[str, Any]]) -> Reasons:
         KeyError: a code that is none.
     """
     return tuple(Reason(code=_CODES[each["code"]], values=each["values"]) for each in kept)
-
-
-def _in_degrees(values: Mapping[str, Any]) -> dict[str, Any]:
-    found = {}
-    for name, value in values.items():
-        if name.endswith("_rad"):
-            many = isinstance(value, list | tuple)
-            turn = [math.degrees(each) for each in value] if many else math.degrees(value)
-            found[f"{name.removesuffix('_rad')}_deg"] = turn
-        else:
-            found[name] = value
-    return found

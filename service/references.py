@@ -1,4 +1,4 @@
-"""References: when one begins, which tracks are of it or after it, and when somebody was there."""
+"""References: when one begins, what is of it; when somebody was there, or a move was suspected."""
 
 import math
 from collections.abc import Sequence
@@ -7,12 +7,15 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from service.enums import Answer, Origin
+from models.durations import DAY_S
+from models.monitoring.verdict import DriftLimits
+from service.enums import Answer, Origin, Outcome
 from service.settings import Settings
-from service.store import cameras, estimates, maintenance, references, tracks
+from service.store import alerts, cameras, estimates, references, tracks
+from service.store.alerts import AlertRecord
+from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 from service.store.windows import WindowBounds
 
 
@@ -45,7 +48,7 @@ class Attendance:
 
 def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
     """The times in which somebody was at a camera."""
-    return attendance_by(maintenance.of_camera(session, camera_id), now)
+    return attendance_by(references.maintenance_of(session, camera_id), now)
 
 
 def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:
@@ -78,7 +81,7 @@ def begin_reference(
 
     Those of a source; of the one that has counted so far, if none is said.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     assert camera is not None
     last = references.newest_if_any(session, camera_id)
     if source is None and last is not None:
@@ -178,3 +181,65 @@ def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: i
     if reference.ready_at is not None:
         return reference.tracks
     return min(counted, wanted_tracks(reference, settings))
+
+
+def drift_limits(settings: Settings) -> DriftLimits:
+    """The limits from which on a drift counts, by the settings."""
+    return DriftLimits(
+        sigmas=settings.drift_sigmas,
+        floor_rad=math.radians(settings.drift_floor_deg),
+        floor_m=settings.drift_floor_m,
+        people=settings.drift_people,
+        clear_ratio=settings.drift_clear_ratio,
+    )
+
+
+_SAME_S = 1e-3  # times in the store are whole microseconds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SuspectedMove:
+    """A time, from `from_s` to `to_s`, in which an alert took a camera for moved.
+
+    It is `excluded` from what is known to be still unless a person called it a false alarm;
+    `by_person` says whether anybody said what it was.
+    """
+
+    from_s: float
+    to_s: float
+    resolved_at: datetime
+    excluded: bool
+    by_person: bool
+
+
+def suspected_moves(
+    session: Session, settings: Settings, reference: SiteReferenceRecord
+) -> tuple[SuspectedMove, ...]:
+    """The ended ones of a camera that reach beyond the period of a reference."""
+    found = [_move_of(record, settings) for record in alerts.ended(session, reference.camera_id)]
+    return tuple(move for move in found if move and _concerns(move, reference))
+
+
+def _move_of(record: AlertRecord, settings: Settings) -> SuspectedMove | None:
+    if record.resolved_at is None:
+        return None
+    if record.changed_at is not None:
+        from_s = record.changed_at.timestamp() - _SAME_S
+    else:  # it was fired by a window of tracks
+        from_s = record.opened_at.timestamp() - settings.window_days * DAY_S
+    return SuspectedMove(
+        from_s=from_s,
+        to_s=record.resolved_at.timestamp(),
+        resolved_at=record.resolved_at,
+        excluded=record.outcome != Outcome.FALSE_ALARM,
+        by_person=record.outcome in (Outcome.PUT_BACK, Outcome.FALSE_ALARM),
+    )
+
+
+def _concerns(move: SuspectedMove, reference: SiteReferenceRecord) -> bool:
+    if move.to_s <= (reference.to_s or 0.0):
+        return False
+    # A reset or a new prior pose has answered it, for whatever comes after; tracks may be posted
+    # long after they were walked, so that their times alone do not show it.
+    answered = move.resolved_at <= reference.created_at
+    return not (answered and move.from_s < (reference.from_s or 0.0))

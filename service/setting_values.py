@@ -2,11 +2,12 @@
 
 import base64
 import os
+from collections.abc import Callable
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import ValidationError
+from pydantic import AfterValidator, ValidationError
 
 _SECRETS = ("secret_key", "proxy_secret", "database_url")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
@@ -32,6 +33,16 @@ def wrong_settings(error: ValidationError) -> list[str]:
     return lines
 
 
+def readable(read: Callable[[str], object]) -> AfterValidator:
+    """The check of a text that it can be read so; it stays text."""
+
+    def check(text: str) -> str:
+        read(text)
+        return text
+
+    return AfterValidator(check)
+
+
 def read_key(text: str) -> bytes:
     """The 32 bytes of a key in base64, the plain alphabet or the one for URLs.
 
@@ -52,9 +63,16 @@ def read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
     return tuple(ip_network(part.strip()) for part in text.split(",") if part.strip())
 
 
-def read_numbers(text: str) -> tuple[float, ...]:
-    """The numbers of a text, with commas."""
-    return tuple(float(part) for part in text.split(","))
+def read_delays(text: str) -> tuple[float, ...]:
+    """The times in seconds of a text, with commas.
+
+    Raises:
+        ValueError: one of them is none, or not above 0.
+    """
+    delays = tuple(float(part) for part in text.split(","))
+    if not all(delay > 0 for delay in delays):
+        raise ValueError(f"numbers above 0, with commas, are needed, got {text!r}")
+    return delays
 
 
 def read_zone(text: str) -> str:

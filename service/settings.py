@@ -13,6 +13,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from service import setting_values as values
 from service.data_dir import DATABASE, WEIGHTS
 
+Networks = Annotated[str, values.readable(values.read_networks)]
+
 
 class Settings(BaseSettings):
     """Everything that an operator can set; each field is also `SUREFOOT_<FIELD>`."""
@@ -43,7 +45,7 @@ class Settings(BaseSettings):
         repr=False,
         description="what a proxy that logs people in says in X-Surefoot-Proxy",
     )
-    proxy_from: str = Field("", description="CIDRs, with commas, that such a proxy asks from")
+    proxy_from: Networks = Field("", description="CIDRs, with commas, that such a proxy asks from")
     proxy_user_header: str = Field("X-Forwarded-User", description="its header of the person")
     proxy_role_header: str = Field(
         "X-Forwarded-Role", description="its header of what that may: read, operate or admin"
@@ -53,7 +55,7 @@ class Settings(BaseSettings):
         ge=0,
         description="local worker processes that `serve` starts: one a core, four at the most",
     )
-    secret_key: str | None = Field(
+    secret_key: Annotated[str, values.readable(values.read_key)] | None = Field(
         None,
         repr=False,
         description="32 bytes in base64 that seal webhooks' secrets; unset: secret.key in data_dir",
@@ -156,10 +158,10 @@ class Settings(BaseSettings):
         False, description="keep a still image of a camera that somebody uploads for its page"
     )
 
-    webhook_allow: str = Field(
+    webhook_allow: Networks = Field(
         "", description="CIDRs, with commas, of private addresses that webhooks may go to"
     )
-    webhook_retry_s: str = Field(
+    webhook_retry_s: Annotated[str, values.readable(values.read_delays)] = Field(
         "5,30,120,600,3600,10800,21600,43200",
         description="seconds from a failed delivery to its next attempt; the last one repeats",
     )
@@ -228,36 +230,16 @@ class Settings(BaseSettings):
     )
     worker_lost_s: float = Field(20.0, gt=1, description="silence after which a worker is lost")
 
-    @field_validator("secret_key")
-    @classmethod
-    def _key_of_32_bytes(cls, value: str | None) -> str | None:
-        if value is not None:
-            values.read_key(value)
-        return value
-
     @property
     def zone(self) -> tzinfo:
         """The cameras' zone; UTC needs no zone database."""
         return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
-
-    @field_validator("webhook_allow", "proxy_from")
-    @classmethod
-    def _networks(cls, value: str) -> str:
-        values.read_networks(value)
-        return value
 
     @field_validator("proxy_from")
     @classmethod
     def _proxies_prove_themselves(cls, value: str, info: ValidationInfo) -> str:
         if value and info.data.get("proxy_secret") is None:
             raise ValueError("SUREFOOT_PROXY_SECRET is needed, too: an address alone proves little")
-        return value
-
-    @field_validator("webhook_retry_s")
-    @classmethod
-    def _delays(cls, value: str) -> str:
-        if not all(delay > 0 for delay in values.read_numbers(value)):
-            raise ValueError(f"numbers above 0, with commas, are needed, got {value!r}")
         return value
 
     @property
@@ -273,7 +255,7 @@ class Settings(BaseSettings):
     @property
     def webhook_delays_s(self) -> tuple[float, ...]:
         """Seconds from each failed attempt to the next; the last one repeats."""
-        return values.read_numbers(self.webhook_retry_s)
+        return values.read_delays(self.webhook_retry_s)
 
     @property
     def database_path(self) -> Path:

@@ -14,10 +14,7 @@ from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
 
-# As the service has them unless its settings say otherwise.
-_LIMITS = DriftLimits(
-    certainty=0.99, floor_rad=math.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
-)
+_LIMITS = DriftLimits()
 _YEAR_S = 365.25 * DAY_S
 _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 
@@ -71,19 +68,16 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     observed = observe(ordered, model.intrinsics, model.prior)
     found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
-    offset = found.drift
-    verdict = judge(offset, _LIMITS, (), chart)
-    drift = {_field(name): _in_unit(name, offset.of(name)[0]) for name in PARAMETERS}
-    sd = {_field(name): _in_unit(name, offset.of(name)[1]) for name in PARAMETERS}
-    estimated = tuple(_field(name) for name in offset.identifiable)
+    verdict = judge(found.drift, _LIMITS, (), chart)
+    known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
     return Result(
         moved=verdict.drifting,
-        probability=offset.move.moved,
-        why=_why(offset, chart),
+        probability=found.drift.move.moved,
+        why=_why(found.drift, chart),
         pose=Pose.of(found.pose),
-        estimated=estimated,
-        sd={name: sd[name] for name in estimated},
-        drift={name: drift[name] for name in estimated},
+        estimated=tuple(_field(name) for name in known),
+        sd={_field(name): sd for name, (_, sd) in known.items()},
+        drift={_field(name): by for name, (by, _) in known.items()},
     )
 
 
@@ -100,11 +94,8 @@ def _rate(tracks: Sequence[Track], alarms_a_year: float) -> AlarmRate:
 
 def _why(drift: Drift, chart: ChartResult | None) -> str:
     """The drift in words: each number with its standard deviation, and what the chart says."""
-    parts = [
-        f"{name} {_in_unit(name, drift.of(name)[0]):+.2f} {_UNITS[name]} "
-        f"(sd {_in_unit(name, drift.of(name)[1]):.2f})"
-        for name in drift.identifiable
-    ]
+    known = {name: _in_unit(name, drift) for name in drift.identifiable}
+    parts = [f"{n} {by:+.2f} {_UNITS[n]} (sd {sd:.2f})" for n, (by, sd) in known.items()]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
     words = f"moved with a probability of {drift.move.moved:.0%}: {words}"
     if chart is not None and chart.suspicious:
@@ -120,5 +111,7 @@ def _field(name: str) -> str:
     return f"{name}_{_UNITS[name]}"
 
 
-def _in_unit(name: str, value: float) -> float:
-    return value if name == "height" else math.degrees(value)
+def _in_unit(name: str, drift: Drift) -> tuple[float, float]:
+    """The drift of a parameter and its standard deviation, in degrees or metres."""
+    by, sd = drift.of(name)
+    return (by, sd) if name == "height" else (math.degrees(by), math.degrees(sd))

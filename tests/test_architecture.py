@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
-    {"data_dir", "setting_values", "enums"},
+    {"data_dir", "setting_values", "enums", "degrees"},
     {"settings", "errors", "logs", "reasons"},
     {"formats", "store"},
     {"wording", "job_queue"},
@@ -40,6 +40,31 @@ MODEL_ROOMS = [
     {"monitoring"},
     {"pose"},
 ]
+# What the service asks of models, and nothing deeper: by module, what for.
+PUBLIC_MODELS = {
+    "models.durations": "hours and days in seconds",
+    "models.errors": "what a calibration may fail by",
+    "models.geometry.ground": "feet, horizons and people who are placed wrong",
+    "models.geometry.intrinsics": "the lens",
+    "models.geometry.pose": "the pose, its parameters and their names",
+    "models.geometry.rotation": "arrays; forms of a rotation that people register",
+    "models.geometry.upright": "upper edges of boxes, as they are stored",
+    "models.monitoring.arrivals": "rhythms of people, and silences",
+    "models.monitoring.verdict": "the drift and its limits, without what estimates it",
+    "models.pose": "a site, an estimate, an alarm: all that they take, give and keep",
+    "models.quantiles": "the 90 % interval, for words",
+    "models.reasons": "reasons, which are told and stored",
+    "models.regression.averaging": "the regressor's estimate beside the served one",
+    "models.regression.checkpoint": "weights, safely read and written",
+    "models.regression.network": "predictions of a trained regressor",
+    "models.regression.recipe": "the recipe of a training, weights by their hash; without torch",
+    "models.regression.training": "a training",
+    "models.simulation.poses": "a knock; the demo's camera, as often as people pass it",
+    "models.simulation.walkers": "the demo's people; how fast a site's walk",
+    "models.tracks.scenes": "recorded scenes, to replay",
+    "models.tracks.trajectory": "the track, and how long one must be",
+    "models.walking.config": "how few people tell something",
+}
 TORCH_ROOMS = {"models/regression", "service/workers"}
 
 
@@ -68,6 +93,18 @@ def test_models_and_the_python_face_import_nothing_above_them(top, below):
     ours = {"models", "surefoot", "service", "studies", "migrations", "tests"}
     for path in sources(top):
         assert {name.split(".")[0] for name in imports(path)} & ours <= below, path
+
+
+def test_the_service_asks_nothing_deeper_than_the_public_modules_of_models():
+    asked = set()
+    for path in sources("service"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("models"):
+                asked.add(node.module)
+            elif isinstance(node, ast.Import):
+                asked |= {alias.name for alias in node.names if alias.name.startswith("models")}
+    assert asked == set(PUBLIC_MODELS)
+    assert list(PUBLIC_MODELS) == sorted(PUBLIC_MODELS)
 
 
 def test_nothing_that_is_shipped_imports_a_study():
@@ -104,7 +141,7 @@ def test_only_routes_and_the_application_see_schemas():
     for path in sources("service"):
         api = {name for name in imports(path) if name.startswith("service.api.")}
         if any(not name.startswith("service.api.middleware") for name in api):
-            assert {"api", "routes", "app.py"} & set(path.parts), path
+            assert {"api", "pages", "app.py"} & set(path.parts), path
         if "middleware" in path.parts:
             assert all(name.startswith("service.api.middleware") for name in api), path
 

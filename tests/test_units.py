@@ -6,22 +6,19 @@ from tests.conftest import ROOT
 
 # Who may turn radians into degrees by themselves.
 EDGES = (
-    "service/api/geometry_schemas.py",
-    "service/api/poses.py",
-    "service/api/trainings.py",
+    "service/api/",
+    "service/commands/demo",  # a terminal
+    "service/degrees.py",
     "service/pages/",
-    "service/formats/degrees.py",
     "service/wording/",
-    "service/reasons.py",  # as they are told to clients
 )
-# Who tells people otherwise than by schemas and pages: by events and webhooks, and on a
-# terminal. They take the words of `service/formats/degrees.py`.
+# Who tells people otherwise than by schemas and pages: by requests, events and webhooks. They take
+# the words of `service/degrees.py`.
 TELLING = {
-    "service/commands/demo.py",
-    "service/commands/demo_street.py",
+    "service/commands/replay.py",
     "service/estimation/estimates.py",
     "service/notifications/outbox.py",
-    "service/commands/replay.py",
+    "service/reasons.py",
 }
 
 
@@ -54,7 +51,7 @@ def test_who_tells_people_is_listed():
         place
         for place, tree in sources()
         for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module == "service.formats.degrees"
+        if isinstance(node, ast.ImportFrom) and node.module == "service.degrees"
     }
     assert told == TELLING
 

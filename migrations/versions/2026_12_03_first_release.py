@@ -100,7 +100,6 @@ table(
     *optional(String, "estimate_error"),
     *optional(DateTime, "estimate_failing_since", "estimate_after"),
     *needed(JSON, "lacks"),
-    Column("urgent", Boolean, nullable=False, server_default=sa.false()),
     *needed(DateTime, "created_at", "updated_at"),
 )
 table(

@@ -65,14 +65,15 @@ class DriftLimits:
     """Limits of a drift: how certain a move has to be, and floors of its size.
 
     A drift ends below `clear_ratio` of the floor. Once a person has said how the camera stands, so
-    many `people` have to come before anything else is said.
+    many `people` have to come before anything else is said. The defaults are those of the service's
+    settings.
     """
 
-    certainty: float
-    floor_rad: float
-    floor_m: float
-    people: int
-    clear_ratio: float
+    certainty: float = 0.99
+    floor_rad: float = math.radians(1.0)
+    floor_m: float = 0.3
+    people: int = 12
+    clear_ratio: float = 0.7
 
     def floor(self, name: str) -> float:
         """The least drift of a parameter that counts: metres, or radians."""

@@ -26,7 +26,7 @@ from models.paths.step_log_density import (
     values_of_tracks,
 )
 from models.tracks.observations import Observations, Steps, steps_where
-from models.walking.groups import walking_groups_of
+from models.walking.measures import walking_groups_of
 
 _AROUND = config.VIEW_STEP * np.concatenate([np.eye(4), -np.eye(4)])
 _BUSY = np.exp(config.BUSY_LOG)

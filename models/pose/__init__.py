@@ -1,13 +1,21 @@
 """Learn a site, estimate a pose, read the alarm chart: recalibration, values in and values out.
 
-All that these three take and give can be imported from here.
+All that these three take and give can be imported from here, and what keeps it as bytes.
 """
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep, CreepLog, creep_result
+from models.monitoring.chart import CLOCK, ChartResult, chart_from_bytes, chart_to_bytes
+from models.monitoring.config import CREEP_SHARE
+from models.monitoring.creep import (
+    Creep,
+    CreepLog,
+    creep_log_from_bytes,
+    creep_log_to_bytes,
+    creep_result,
+)
 from models.monitoring.verdict import Drift, DriftLimits
+from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose.alarms import (
     AlarmRate,
     alarm_chart_result,
@@ -15,6 +23,7 @@ from models.pose.alarms import (
     log_creep,
     without_creep,
 )
+from models.pose.config import FEWEST_BESIDE
 from models.pose.estimating import (
     PartialFailure,
     PoseFinding,
@@ -34,8 +43,23 @@ from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import Walks, observe, observe_walks
+from models.walking.estimate import JointEstimate
+from models.walking.speed_reference import SpeedReference, reference_from_bytes, reference_to_bytes
 
 __all__ = [
+    "CLOCK",
+    "CREEP_SHARE",
+    "FEWEST_BESIDE",
+    "JointEstimate",
+    "SpeedReference",
+    "chart_from_bytes",
+    "chart_to_bytes",
+    "creep_log_from_bytes",
+    "creep_log_to_bytes",
+    "paths_from_bytes",
+    "paths_to_bytes",
+    "reference_from_bytes",
+    "reference_to_bytes",
     "AlarmRate",
     "CameraPose",
     "CameraSite",

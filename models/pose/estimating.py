@@ -1,18 +1,36 @@
-"""The pose of a camera whose site is known, by its tracks: by speeds, places and since when."""
+"""The pose of a camera whose site is known, by its tracks: by speeds, places and since when.
 
-from collections.abc import Callable
+Since when: whether a camera moved within a window is searched for by how people walk and where.
+"""
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
+import numpy as np
+
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import Drift, pose_after
-from models.pose.change_search import search_change
+from models.paths.likelihood import walkers_of
+from models.paths.path_tests import moved_within
+from models.pose import config
+from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
+from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
-from models.pose.pose_fit import FusedEstimate, WarmStart, by_speeds_alone
+from models.pose.pose_fit import (
+    FullSearch,
+    FusedEstimate,
+    PoseFit,
+    WarmStart,
+    by_speeds_alone,
+    warm_start_of,
+)
 from models.pose.site import CameraSite
-from models.tracks.observations import Observations, check_in_time
+from models.tracks.observations import Observations, check_in_time, of_tracks
+from models.walking.config import FEWEST_WALKERS
 from models.walking.estimate import JointEstimate, joint_estimate
+from models.walking.fit import FitStart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,3 +138,146 @@ def unless_failed(
     except Exception as error:
         failures.append(PartialFailure(part=part, error=error))
         return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeSearch:
+    """The tracks of a window from its newest change on, and their pose.
+
+    `change_idx` is the first track after the change; None where there was none. `first` is the
+    first that ended with it or later: `tracks` are from there on. `warm_start` is where a next
+    search may begin; None where this one suspects something.
+    """
+
+    change_idx: int | None
+    first: int
+    tracks: Observations
+    fit: PoseFit
+    warm_start: WarmStart | None = None
+
+
+def pose_fit_of(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart | None = None
+) -> PoseFit:
+    """The pose of tracks that are of one: by speeds, and by places where these are known."""
+    starts = () if warm_start is None else warm_start.speed_starts
+    joint = joint_estimate(tracks, site.prior, site.speed_reference, starts)
+    return PoseFit(joint=joint, fused=fused_estimate(tracks, site, joint, warm_start))
+
+
+def search_change(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart | None = None
+) -> ChangeSearch:
+    """The newest change of the camera that is beyond doubt, and the pose from there on.
+
+    Where people walk another way than before, or elsewhere, a window is suspected; it is cut
+    where the parts before and after, each estimated alone, are of two poses beyond doubt.
+
+    Args:
+        tracks: of the window, in the order of their ends.
+        site: how people walk, and where, if that is known.
+        warm_start: the pose of almost the same tracks: where nothing speaks against it, no others
+            are searched, and no change is.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    if warm_start is not None and warm_start.suits(tracks):
+        found = _still_there(tracks, site, warm_start)
+        if found is not None:
+            return found
+    whole = pose_fit_of(tracks, site)
+    suspected = False
+    for change_idx in _suspects(tracks, site, whole.fused):
+        suspected = True
+        found = _confirmed(tracks, site, change_idx)
+        if found is not None:
+            return found
+    begin = None
+    if not suspected and tracks.tracks:
+        search = FullSearch(
+            ended_s=tracks.ended_s,
+            suspicion=_suspicion(tracks, site, whole),
+            path_fit=whole.mean_path_fit,
+        )
+        begin = warm_start_of(whole, site.prior, search)
+    return ChangeSearch(change_idx=None, first=0, tracks=tracks, fit=whole, warm_start=begin)
+
+
+def _confirmed(tracks: Observations, site: CameraSite, change_idx: int) -> ChangeSearch | None:
+    """The pose after a change; None where it is not beyond doubt, or too few walk on either side.
+
+    Tracks that ended at the same time are on the same side.
+    """
+    first = int(np.searchsorted(tracks.ended_s, tracks.ended_s[change_idx], side="left"))
+    earlier = of_tracks(tracks, np.arange(first))
+    later = of_tracks(tracks, np.arange(first, tracks.tracks))
+    if min(earlier.walkers, later.walkers) < FEWEST_WALKERS:
+        return None
+    before, after = pose_fit_of(earlier, site), pose_fit_of(later, site)
+    groups = after.joint.walking_groups
+    if not moved_beyond_doubt(before.fused, before.joint.walking_groups, after.fused, groups):
+        return None
+    fused = widened(before.fused, after.fused, groups, site.speed_reference, site.paths)
+    return ChangeSearch(
+        change_idx=change_idx, first=first, tracks=later, fit=replace(after, fused=fused)
+    )
+
+
+def _still_there(
+    tracks: Observations, site: CameraSite, warm_start: WarmStart
+) -> ChangeSearch | None:
+    """The pose that is refined from a warm start; None where anything speaks against it."""
+    found = pose_fit_of(tracks, site, warm_start)
+    if not warm_start.is_refined_by(found):
+        return None
+    if _moved_by_places(tracks, site, found.fused) is not None:
+        return None
+    search, suspected = warm_start.search, _suspicion(tracks, site, found)
+    if not warm_start.is_calm(suspected):
+        around = found.fused.neighbourhood
+        speeds = None if around is None or suspected > config.SUSPECTED else around.speeds
+        if _moved_by_speeds(tracks, site, found.fused, speeds) is not None:
+            return None
+        search = replace(search, suspicion=suspected)
+    begin = warm_start_of(found, site.prior, search)
+    return ChangeSearch(change_idx=None, first=0, tracks=tracks, fit=found, warm_start=begin)
+
+
+def _suspicion(tracks: Observations, site: CameraSite, whole: PoseFit) -> float:
+    """The gain of two poses over one in explaining the speeds, where the camera looks by now."""
+    turned = replace(site.prior, heading_rad=whole.fused.parameters.heading_rad)
+    return suspicion(tracks, turned, site.speed_reference, whole.joint.raw)
+
+
+def _suspects(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> Iterator[int]:
+    """The first tracks after a possible move of the camera, by speeds and by places.
+
+    Both look from where the camera stands by all tracks together. From the prior pose, a
+    camera that moved long ago seems to move with every change of the crowd.
+    """
+    for look in (_moved_by_speeds, _moved_by_places):
+        moved = look(tracks, site, whole)
+        if moved is not None:
+            yield moved
+
+
+def _moved_by_speeds(
+    tracks: Observations,
+    site: CameraSite,
+    whole: FusedEstimate,
+    warm_start: FitStart | None = None,
+) -> int | None:
+    """The first track after a possible move by speeds; None where there is none."""
+    turned = replace(site.prior, heading_rad=whole.parameters.heading_rad)
+    found = find_change(tracks, turned, site.speed_reference, warm_start)
+    return None if found is None else found.track_idx
+
+
+def _moved_by_places(tracks: Observations, site: CameraSite, whole: FusedEstimate) -> int | None:
+    """The first track after a possible move by places; None where there is none, or no paths."""
+    if site.paths is None:
+        return None
+    at = whole.values
+    paths = site.paths.model(site.intrinsics)
+    return moved_within(walkers_of(tracks, at), paths, at, site.paths.still, config.SUSPECT_RATE)

@@ -14,7 +14,6 @@ import numpy as np
 from models.geometry.pose import (
     PLANE_PARAMETERS,
     CameraPose,
-    PlaneEstimate,
     PoseParameters,
     identifiable_of,
     plane_parameters_of,
@@ -24,8 +23,9 @@ from models.reasons import Reason, TracksCode, Value
 from models.tracks.observations import Observations, of_tracks
 from models.walking import config
 from models.walking.fit import Channel, Fit, FitStart, fit_pose, starts
-from models.walking.groups import count_walking_groups
 from models.walking.heads import HeadEstimate, head_estimate, joined
+from models.walking.measures import count_walking_groups
+from models.walking.mixed_model import Normal
 from models.walking.speed_reference import SpeedReference, channels_of
 
 
@@ -54,7 +54,7 @@ class JointEstimate:
     reason: Reason | None
     others: tuple[Array, ...] = ()
     heads: HeadEstimate | None = None
-    by_speeds: PlaneEstimate | None = None
+    by_speeds: Normal | None = None
     means: tuple[Array, ...] = ()
 
     @property
@@ -70,7 +70,7 @@ class JointEstimate:
     @property
     def modes(self) -> tuple[Array, ...]:
         """The ends (3,) of the search, the best first; as `raw`."""
-        offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.values)
+        offset = self.raw - (self.values if self.by_speeds is None else self.by_speeds.mean)
         return self.raw, *(other + offset for other in self.others)
 
     def beside_strangers(self) -> tuple[Array, Array]:
@@ -81,7 +81,7 @@ class JointEstimate:
         if self.heads is None or self.by_speeds is None:
             return self.values, self.covariance + np.diag(config.PLAUSIBLE_OFFSET**2)
         wide = self.by_speeds.covariance + np.diag(config.PLAUSIBLE_OFFSET**2)
-        return joined(self.by_speeds.values, wide, self.heads)
+        return joined(self.by_speeds.mean, wide, self.heads)
 
 
 def joint_estimate(
@@ -153,7 +153,7 @@ def _estimate_of(
     covariance = covariance + reference.offset_covariance
     by_speeds = None
     if heads is not None:
-        by_speeds = PlaneEstimate(values=values, covariance=covariance, tracks=observations.walkers)
+        by_speeds = Normal(mean=values, covariance=covariance)
         values, covariance = joined(values, covariance, heads)
     sd = np.sqrt(np.diag(covariance))
     identifiable = identifiable_of(PLANE_PARAMETERS, sd)

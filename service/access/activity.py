@@ -6,9 +6,9 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
-from service.store import activity
+from service.store import journal
 from service.store.access import actor_of
-from service.store.activity import ActivityRecord
+from service.store.journal import ActivityRecord
 
 
 def note(
@@ -56,4 +56,4 @@ def note(
         note=text,
         details=details or {},
     )
-    activity.add(session, record)
+    journal.append(session, record)

@@ -1,6 +1,5 @@
 """Sessions of pages: who logs in with a token is known by a cookie until the session ends."""
 
-import hashlib
 import secrets
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -8,8 +7,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy.orm import Session
 
 from service.access.activity import note
-from service.access.callers import Caller
-from service.access.tokens import caller_of, caller_of_token, is_valid
+from service.access.tokens import Caller, caller_of, caller_of_token, hash_of, is_valid
 from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, UnauthorizedError
 from service.settings import Settings
@@ -42,19 +40,13 @@ def log_in(session: Session, settings: Settings, caller: Caller) -> str:
     cookie = secrets.token_urlsafe(_ID_BYTES)
     session.add(
         SessionRecord(
-            id_sha256=_hash(cookie),
+            id_sha256=hash_of(cookie),
             token_id=caller.token_id,
             created_at=now,
             expires_at=now + timedelta(hours=settings.session_hours),
         )
     )
-    note(
-        session,
-        Activity.SESSION_BEGAN,
-        by=caller.name,
-        via=caller.token_id,
-        subject_id=caller.token_id,
-    )
+    _note(session, Activity.SESSION_BEGAN, caller)
     return cookie
 
 
@@ -63,23 +55,12 @@ def log_out(session: Session, caller: Caller) -> None:
     if caller.session_hash is None:
         return
     access.end_session(session, caller.session_hash)
-    note(
-        session,
-        Activity.SESSION_ENDED,
-        by=caller.name,
-        via=caller.token_id,
-        subject_id=caller.token_id,
-    )
-
-
-def note_refused(session: Session, address: str) -> None:
-    """Keep that somebody was not let in; never with what."""
-    note(session, Activity.LOGIN_REFUSED, by=None, details={"address": address})
+    _note(session, Activity.SESSION_ENDED, caller)
 
 
 def caller_of_session(session: Session, cookie: str) -> Caller | None:
     """The caller whose page asks; None where its session, or the token behind it, is over."""
-    id_sha256 = _hash(cookie)
+    id_sha256 = hash_of(cookie)
     found = access.session_with_token(session, id_sha256)
     now = datetime.now(UTC)
     if found is None or found[0].expires_at <= now or not is_valid(found[1], now):
@@ -87,5 +68,6 @@ def caller_of_session(session: Session, cookie: str) -> Caller | None:
     return replace(caller_of(found[1]), session_hash=id_sha256)
 
 
-def _hash(cookie: str) -> str:
-    return hashlib.sha256(cookie.encode("utf-8", "replace")).hexdigest()
+def _note(session: Session, what: Activity, caller: Caller) -> None:
+    token_id = caller.token_id
+    note(session, what, by=caller.name, via=token_id, subject_id=token_id)

@@ -1,25 +1,49 @@
-"""Make, list and revoke tokens, and tell whose a token is."""
+"""Make and revoke tokens, and tell whose a token is."""
 
 import hashlib
 import hmac
 import secrets
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
 from service.access.activity import note
-from service.access.callers import Caller
 from service.enums import Activity, TokenScope
-from service.errors import FieldError, MalformedError, NotFoundError
+from service.errors import MalformedError, NotFoundError
 from service.store import access
-from service.store.access import TokenRecord
+from service.store.access import Actor, TokenRecord
 
 _PREFIX = "sf"
 _SECRET_BYTES = 32
 _NO_SECRET = hashlib.sha256(b"").hexdigest()
 MAX_NAME = 200
+# Each of these holds those before it; posting tracks is apart, so that a tracker's token reads
+# nothing and an operator's invents no people.
+_LADDER = (TokenScope.READ, TokenScope.OPERATE, TokenScope.ADMIN)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller(Actor):
+    """Somebody who was let in.
+
+    `token_id` is None where a proxy vouches for a person, `session_hash` where no page is logged
+    in. `cameras` are those that tracks may be posted for; None: all.
+    """
+
+    scopes: frozenset[str]
+    token_id: str | None = None
+    session_hash: str | None = None
+    cameras: frozenset[str] | None = None
+
+    def may(self, scope: TokenScope) -> bool:
+        """True if what needs a scope is allowed."""
+        holding = _LADDER[_LADDER.index(scope) :] if scope in _LADDER else (scope,)
+        return not self.scopes.isdisjoint(holding)
+
+    def may_post(self, camera_id: str) -> bool:
+        """True if tracks of a camera may be posted, as far as the camera goes."""
+        return self.cameras is None or camera_id in self.cameras
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +76,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     record = TokenRecord(
         id=token_id,
         name=spec.name.strip(),
-        secret_sha256=_hash(secret),
+        secret_sha256=hash_of(secret),
         scopes=[scope for scope in TokenScope if scope in spec.scopes],
         cameras=None if spec.cameras is None else sorted(set(spec.cameras)),
         created_at=now,
@@ -68,23 +92,13 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     return MadeToken(record=record, text=f"{_PREFIX}_{token_id}_{secret}")
 
 
-def list_tokens(session: Session) -> Sequence[TokenRecord]:
-    """All tokens, oldest first, revoked ones too."""
-    return access.every(session)
-
-
-def count_tokens(session: Session) -> int:
-    """The number of tokens that would be let in now."""
-    return access.count_valid(session, datetime.now(UTC))
-
-
 def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord:
     """Let a token in no more, and log out its pages; one that was revoked stays so.
 
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = access.find(session, token_id)
+    record = session.get(TokenRecord, token_id)
     if record is None:
         raise NotFoundError(f"token_id: there is no token {token_id!r:.80}")
     if record.revoked_at is None:
@@ -99,10 +113,10 @@ def caller_of_token(session: Session, text: str) -> Caller | None:
     """The caller with a token; None where nobody is let in with it."""
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
-    record = access.find(session, token_id) if prefix == _PREFIX else None
+    record = session.get(TokenRecord, token_id) if prefix == _PREFIX else None
     # The same work for a token that is unknown: its id is no secret, but need not be told.
     kept = _NO_SECRET if record is None else record.secret_sha256
-    matches = hmac.compare_digest(kept, _hash(secret))
+    matches = hmac.compare_digest(kept, hash_of(secret))
     if record is None or not matches or not is_valid(record, datetime.now(UTC)):
         return None
     return caller_of(record)
@@ -123,30 +137,23 @@ def is_valid(record: TokenRecord, now: datetime) -> bool:
     return record.revoked_at is None and (record.expires_at is None or now < record.expires_at)
 
 
-def note_use(session: Session, token_id: str) -> None:
-    """Keep that a token was used now."""
-    access.note_use(session, token_id, datetime.now(UTC))
-
-
-def _hash(secret: str) -> str:
+def hash_of(secret: str) -> str:
+    """The SHA-256 that stands for a secret of ours."""
     # 32 random bytes need no slow hash: nobody guesses them.
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 
 
 def _check(spec: TokenSpec, now: datetime) -> None:
     unknown = [scope for scope in spec.scopes if scope not in list(TokenScope)]
+    refuse = MalformedError.of_field
     if not 0 < len(spec.name.strip()) <= MAX_NAME:
-        _refuse("name", f"1 to {MAX_NAME} characters are needed, got {len(spec.name.strip())}")
+        raise refuse("name", f"1 to {MAX_NAME} characters are needed, got {len(spec.name.strip())}")
     if not spec.name.isprintable():
-        _refuse("name", "letters that can be printed, on one line, are needed")
+        raise refuse("name", "letters that can be printed, on one line, are needed")
     if unknown or not spec.scopes:
         got = ", ".join(unknown) or "none"
-        _refuse("scopes", f"some of {', '.join(TokenScope)} are needed, got {got:.80}")
+        raise refuse("scopes", f"some of {', '.join(TokenScope)} are needed, got {got:.80}")
     if spec.cameras is not None and (TokenScope.INGEST not in spec.scopes or not spec.cameras):
-        _refuse("cameras", "cameras are named for the scope ingest alone, one at least")
+        raise refuse("cameras", "cameras are named for the scope ingest alone, one at least")
     if spec.expires_at is not None and spec.expires_at <= now:
-        _refuse("expires_at", f"a time after now is needed, got {spec.expires_at.isoformat()}")
-
-
-def _refuse(name: str, reason: str) -> None:
-    raise MalformedError(f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),))
+        raise refuse("expires_at", f"a time after now is needed, got {spec.expires_at.isoformat()}")

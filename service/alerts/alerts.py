@@ -24,9 +24,9 @@ from service.errors import ConflictError, NotFoundError
 from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import activity, alerts, events, maintenance, tracks
-from service.store.activity import ActivityRecord
+from service.store import alerts, journal, references, tracks
 from service.store.alerts import AlertFilter, AlertRecord
+from service.store.journal import ActivityRecord
 from service.wording.reasons import in_words
 
 # What of an alert's body an event has.
@@ -62,7 +62,7 @@ def open_alert(
     What a reference doubts does not overwrite what estimates have found; they take over its alert.
     """
     now = datetime.now(UTC)
-    attended = maintenance.under_way(session, camera_id, now) is not None
+    attended = references.maintenance_under_way(session, camera_id, now) is not None
     if attended and kind not in alerts.SERVICE_KINDS:
         return None  # an open one stays as it was told, so that what is news later is told then
     record = alerts.firing(session, camera_id, kind)
@@ -141,7 +141,7 @@ def close_alert(
     _keep_activity(session, record, AlertActivity.RESOLVED, by, outcome=outcome, note=note)
     session.flush()
     _tell(session, record, MessageType.ALERT_RESOLVED)
-    group = None if record.group_id is None else alerts.find(session, record.group_id)
+    group = None if record.group_id is None else session.get(AlertRecord, record.group_id)
     over = group is not None and not alerts.firing_members(session, group.id)
     if group is not None and group.state == AlertState.FIRING and over:
         close_alert(session, group, outcome, note, by)
@@ -164,7 +164,7 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = alerts.find(session, alert_id)
+    record = session.get(AlertRecord, alert_id)
     if record is None:
         raise NotFoundError(f"alert_id: there is no alert {alert_id!r}")
     return record
@@ -172,7 +172,7 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
 
 def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecord]:
     """Everything that was done with an alert since it opened, oldest first."""
-    entries = activity.of_subject(session, alert_id)
+    entries = journal.activity_of_subject(session, alert_id)
     return [entry for entry in entries if entry.what != Activity.ALERT_OPENED]
 
 
@@ -257,5 +257,5 @@ def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
     record.notified = True
     body = alert_body(record)
     event = {name: body[name] for name in _EVENT_FIELDS}
-    events.add(session, EventType.ALERT, event, datetime.now(UTC))
+    journal.add_event(session, EventType.ALERT, event, datetime.now(UTC))
     queue_alert(session, record, body, message)

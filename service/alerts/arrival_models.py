@@ -13,7 +13,8 @@ from models.durations import DAY_S, HOUR_S
 from models.monitoring.arrivals import ArrivalProcess, delay_of, learn_arrivals
 from service.enums import AlertKind, Outcome
 from service.settings import Settings
-from service.store import alerts, cameras, rhythms, tracks
+from service.store import alerts, cameras, tracks
+from service.store.cameras import CameraRecord, RhythmRecord
 
 _PAST_DAYS = 28
 _NOT_AGAIN_WITHIN = timedelta(minutes=50)
@@ -53,8 +54,8 @@ class Arrivals:
 
 def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals | None:
     """The data of a camera's arrival model; None where it was learned within the hour."""
-    kept = rhythms.find(session, camera_id)
-    if cameras.find(session, camera_id) is None:
+    kept = session.get(RhythmRecord, camera_id)
+    if session.get(CameraRecord, camera_id) is None:
         return None
     if kept is not None and now - kept.learned_at < _NOT_AGAIN_WITHIN:
         return None
@@ -127,14 +128,20 @@ def save_arrival_model(
     now: datetime,
 ) -> None:
     """Store an arrival model, unless its camera is gone."""
-    if cameras.find(session, camera_id) is not None:
-        profile = None if learned is None else _packed(learned)
-        rhythms.put(session, camera_id, profile, asdict(counts), now)
+    if session.get(CameraRecord, camera_id) is not None:
+        profile = None
+        if learned is not None:
+            profile = {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
+        session.merge(
+            RhythmRecord(
+                camera_id=camera_id, profile=profile, counts=asdict(counts), learned_at=now
+            )
+        )
 
 
 def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
     """The arrival model of a camera; None where too little of it is known."""
-    profile = rhythms.profile(session, camera_id)
+    profile = cameras.arrival_profile(session, camera_id)
     return None if profile is None else unpacked(profile)
 
 
@@ -153,10 +160,6 @@ def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:
 def _cell(hour: int, zone: tzinfo) -> int:
     local = datetime.fromtimestamp(hour * HOUR_S, UTC).astimezone(zone)
     return local.hour + (24 if local.weekday() >= 5 else 0)
-
-
-def _packed(learned: ArrivalModel) -> dict[str, Any]:
-    return {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
 
 
 def _counts(stored: dict[str, Any] | None) -> HourCounts:

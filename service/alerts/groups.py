@@ -60,7 +60,6 @@ def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
     now = datetime.now(UTC)
     group = AlertRecord(
         id=secrets.token_hex(16),
-        camera_id=None,
         camera_ids=[],
         track_source=source,
         kind=kind,
@@ -71,7 +70,6 @@ def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
         drift={},
         notified=False,
         opened_at=now,
-        changed_at=None,
         updated_at=now,
     )
     session.add(group)

@@ -1,7 +1,6 @@
 """The alert `stale` of cameras whose estimate is not being made."""
 
 import time
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
@@ -19,14 +18,6 @@ from service.wording.alerts import ESTIMATED_AGAIN
 _ANSWERED = timedelta(hours=1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Waiting:
-    """The oldest track of a camera that nothing has looked at, and since when it is watched."""
-
-    track_pk: int
-    since_s: float
-
-
 class StaleWatch:
     """Opens and ends the alerts `stale`; how long a track waits is measured here.
 
@@ -35,18 +26,20 @@ class StaleWatch:
     """
 
     def __init__(self) -> None:
-        self._waiting: dict[str, _Waiting] = {}
+        # The oldest track of a camera that nothing has looked at, and since when it is watched.
+        self._waiting: dict[str, tuple[int, float]] = {}
 
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
         """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
         now_s = time.monotonic()
-        oldest = tracks.unseen_since(session)
-        self._waiting = {
-            camera_id: self._watched(camera_id, pk, now_s) for camera_id, (pk, _) in oldest.items()
-        }
+        waiting = {}
+        for camera_id, (pk, _) in tracks.unseen_since(session).items():
+            known_pk, since_s = self._waiting.get(camera_id, (pk, now_s))
+            waiting[camera_id] = pk, since_s if known_pk == pk else now_s
+        self._waiting = waiting
         firing = alerts.firing_cameras(session, AlertKind.STALE)
         found: dict[str, str] = {}
-        waits = {camera_id: now_s - each.since_s for camera_id, each in self._waiting.items()}
+        waits = {camera_id: now_s - since_s for camera_id, (_, since_s) in self._waiting.items()}
         long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}
         # Of hundreds, twelve times a minute: nothing can be wrong with any other.
         for camera in cameras.failing(session, besides=firing | long):
@@ -60,12 +53,6 @@ class StaleWatch:
                 _open(session, settings, camera, reason, waits_s)
                 found[camera.id] = AlertActivity.OPENED
         return found
-
-    def _watched(self, camera_id: str, track_pk: int, now_s: float) -> _Waiting:
-        known = self._waiting.get(camera_id)
-        if known is not None and known.track_pk == track_pk:
-            return known
-        return _Waiting(track_pk=track_pk, since_s=now_s)
 
 
 def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reason | None:

@@ -6,18 +6,16 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query
 from fastapi.responses import Response, StreamingResponse
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
-from service.api.fields import Text
 from service.api.middleware.dependencies import AppState, StateDep
+from service.api.schemas import Out, Text
 from service.enums import Activity, AlertKind, Outcome
-from service.store import activity
+from service.store import journal
 
 
-class EntryOut(BaseModel):
+class EntryOut(Out):
     """What somebody did; without a name, the service by itself."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     id: int
     at: datetime
@@ -85,5 +83,5 @@ def _lines(state: AppState, camera_id: str | None, after: int, limit: int | None
 
 def _page(state: AppState, camera_id: str | None, after: int, limit: int) -> list[EntryOut]:
     with state.store.read() as session:
-        records = activity.after(session, camera_id, after, limit)
+        records = journal.activity_after(session, camera_id, after, limit)
         return [EntryOut.model_validate(record) for record in records]

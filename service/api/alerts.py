@@ -1,20 +1,19 @@
 """`/alerts`: list, show, acknowledge, silence, resolve."""
 
-from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
-from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Text, Who
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Moment, Out, ReasonCode, ReasonValues, Text, Who
 from service.cameras import decisions
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.notifications.outbox import alert_body
-from service.store.activity import ActivityRecord
+from service.store.access import name_in
 from service.store.alerts import AlertFilter, AlertRecord
 
 
@@ -73,40 +72,26 @@ class AlertOut(BaseModel):
     camera_ids: list[str] | None
     group_id: str | None
 
-    @classmethod
-    def from_record(cls, record: AlertRecord) -> Self:
-        """The body of a stored alert."""
-        return cls.model_validate(alert_body(record))
+
+# Of an activity, `alert.silenced` say, the act alone.
+Act = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
 
 
-class ActOut(BaseModel):
+class ActOut(Out):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: AlertActivity
+    act: Act = Field(validation_alias="what")
     by: str | None
     until: datetime | None
     outcome: Outcome | None
     note: str | None
-
-    @classmethod
-    def from_record(cls, record: ActivityRecord) -> Self:
-        """The body of an entry of the log."""
-        values = {name: getattr(record, name) for name in cls.model_fields if name != "act"}
-        return cls.model_validate({**values, "act": record.what.partition(".")[2]})
 
 
 class AlertDetail(AlertOut):
     """An alert, and what was done with it, oldest first."""
 
     acts: list[ActOut] = []
-
-    @classmethod
-    def from_records(cls, record: AlertRecord, acts: Sequence[ActivityRecord]) -> Self:
-        """The body of a stored alert with its acts."""
-        body = cls.from_record(record)
-        body.acts = [ActOut.from_record(act) for act in acts]
-        return body
 
 
 class AlertList(BaseModel):
@@ -137,7 +122,7 @@ def list_all(
         silenced=silenced,
     )
     records = alerts.list_alerts(session, wanted, limit)
-    return AlertList(items=[AlertOut.from_record(record) for record in records])
+    return AlertList.model_validate({"items": [alert_body(record) for record in records]})
 
 
 @router.get("/{alert_id}")
@@ -148,30 +133,28 @@ def show(alert_id: str, session: ReadDep) -> AlertDetail:
 
 @router.post("/{alert_id}/acknowledge")
 def acknowledge(
-    alert_id: str, session: WriteDep, actor: ActorDep, body: AcknowledgeBody | None = None
+    alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
 ) -> AlertDetail:
     """Note who has seen an alert."""
-    by = name_of(actor, None if body is None else body.by)
+    by = name_in(session, None if body is None else body.by)
     return _with_acts(session, alerts.acknowledge_alert(session, alert_id, by))
 
 
 @router.post("/{alert_id}/silence")
 def silence_one(
-    alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep, actor: ActorDep
+    alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep
 ) -> AlertDetail:
     """Silence an alert until a time, in place of the silence it may have; null ends that."""
     record = silence.silence_alert(
-        session, state.settings, alert_id, body.until, body.reason, name_of(actor, body.by)
+        session, state.settings, alert_id, body.until, body.reason, name_in(session, body.by)
     )
     return _with_acts(session, record)
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(
-    alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep, actor: ActorDep
-) -> AlertDetail:
+def resolve(alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep) -> AlertDetail:
     """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
-    by = name_of(actor, body.by)
+    by = name_in(session, body.by)
     record = decisions.resolve_alert(
         session, state.queue, state.settings, alert_id, body.outcome, body.note, by
     )
@@ -179,4 +162,5 @@ def resolve(
 
 
 def _with_acts(session: Session, record: AlertRecord) -> AlertDetail:
-    return AlertDetail.from_records(record, alerts.activity_of_alert(session, record.id))
+    acts = alerts.activity_of_alert(session, record.id)
+    return AlertDetail.model_validate({**alert_body(record), "acts": acts})

@@ -1,15 +1,24 @@
 """`/cameras`: register, list, show, change, remove."""
 
 import re
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Self
 
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field, StringConstraints
 
-from service.api.fields import Body, CameraId, Finite, Text
-from service.api.geometry_schemas import IntrinsicsBody, PoseOut, PriorPoseBody
 from service.api.middleware.dependencies import EtagDep, ReadDep, StateDep, WriteDep
+from service.api.schemas import (
+    Body,
+    CameraId,
+    Finite,
+    IntrinsicsBody,
+    Out,
+    PoseOut,
+    PriorPoseBody,
+    Text,
+)
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 
@@ -61,7 +70,7 @@ class CameraPatch(Body):
     reference_tracks: ReferenceTracks | None = None
 
 
-class CameraOut(BaseModel):
+class CameraOut(Out):
     """A registered camera."""
 
     id: str
@@ -80,20 +89,15 @@ class CameraOut(BaseModel):
     def from_value(cls, view: CameraView) -> Self:
         """The body of a camera."""
         record = view.record
-        return cls(
-            id=record.id,
-            name=record.name,
-            intrinsics=IntrinsicsBody.from_value(view.intrinsics),
+        return cls.of(
+            record,
+            intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose),
-            frame_rate_hz=record.frame_rate_hz,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
-            reference_tracks=record.reference_tracks,
             tracks=view.tracks,
             model_id=view.model_id,
-            created_at=record.created_at,
-            updated_at=record.updated_at,
         )
 
 

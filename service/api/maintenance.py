@@ -6,12 +6,12 @@ from typing import Self
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.api.fields import Body, Moment, Who
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Moment, Out, Who
 from service.cameras import maintenance
-from service.cameras.maintenance import WindowChange
 from service.enums import WindowState
-from service.store.maintenance import MaintenanceRecord
+from service.store.access import name_in
+from service.store.references import MaintenanceRecord
 
 
 class WindowBody(Body):
@@ -31,7 +31,7 @@ class WindowPatch(Body):
     reason: str | None = Field(None, max_length=2000)
 
 
-class WindowOut(BaseModel):
+class WindowOut(Out):
     """A maintenance window: `to` as planned, `ended_at` when it really ended."""
 
     model_config = ConfigDict(serialize_by_alias=True)
@@ -55,8 +55,7 @@ class WindowOut(BaseModel):
         if record.until <= now:
             state = WindowState.OVER
         ends = {"from_": record.from_at, "to": record.to_at, "by": record.requested_by}
-        same = {name: getattr(record, name) for name in cls.model_fields.keys() - {*ends, "state"}}
-        return cls(**same, **ends, state=state)
+        return cls.of(record, **ends, state=state)
 
 
 class WindowList(BaseModel):
@@ -74,7 +73,6 @@ def begin(
     body: WindowBody,
     state: StateDep,
     session: WriteDep,
-    actor: ActorDep,
     response: Response,
 ) -> WindowOut:
     """Say that somebody is at a camera: it is not judged, and opens no alert."""
@@ -86,7 +84,7 @@ def begin(
         from_at=body.from_,
         to_at=body.to,
         reason=body.reason,
-        by=name_of(actor, body.by),
+        by=name_in(session, body.by),
     )
     response.headers["Location"] = f"/cameras/{camera_id}/maintenance/{record.id}"
     return WindowOut.from_record(record)
@@ -104,12 +102,17 @@ def change(
     camera_id: str, window_id: str, body: WindowPatch, state: StateDep, session: WriteDep
 ) -> WindowOut:
     """Move a window's ends."""
-    wanted = WindowChange(from_at=body.from_, to_at=body.to, reason=body.reason)
-    return WindowOut.from_record(
-        maintenance.change_window(
-            session, state.queue, state.settings, camera_id, window_id, wanted
-        )
+    record = maintenance.change_window(
+        session,
+        state.queue,
+        state.settings,
+        camera_id,
+        window_id,
+        from_at=body.from_,
+        to_at=body.to,
+        reason=body.reason,
     )
+    return WindowOut.from_record(record)
 
 
 @router.delete("/{window_id}", status_code=204)

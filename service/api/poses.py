@@ -1,33 +1,35 @@
 """`/cameras/{id}/pose`, `/reference`: the served pose, its history, accepting and resetting."""
 
-import math
-from datetime import UTC, datetime
+from collections.abc import Callable
+from dataclasses import asdict
+from datetime import datetime
 from typing import Annotated, Any, Self
 
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
+from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
-from service.api.fields import Body, Moment, ReasonCode, ReasonValues, Who
-from service.api.geometry_schemas import PoseOut
 from service.api.middleware.dependencies import (
-    ActorDep,
+    AppState,
     ReadDep,
     StateDep,
     WriteDep,
-    name_of,
 )
+from service.api.schemas import Body, Moment, Out, PoseOut, ReasonCode, ReasonValues, Who
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
+from service.degrees import in_degrees
 from service.enums import PoseState, ReferenceState
-from service.errors import FieldError, MalformedError
-from service.formats.degrees import in_degrees
+from service.errors import MalformedError
 from service.formats.opencv_yaml import opencv_yaml
+from service.job_queue import JobQueue
 from service.reasons import code_of, values_of
-from service.store.access import Actor
-from service.store.estimates import EstimateRecord
-from service.store.serialization import identifiable_drift, identifiable_sd
+from service.settings import Settings
+from service.store.access import name_in
+from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
+from service.wording.times import from_seconds
 
 _FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 
@@ -63,16 +65,12 @@ class SdOut(BaseModel):
         return cls(**in_degrees(identifiable_sd(drift))) if drift.identifiable else None
 
 
-class DriftOut(BaseModel):
+class DriftOut(SdOut):
     """Estimate against prior pose; null where the tracks leave it open.
 
     `angle_deg` is the whole rotation that the identifiable angles make.
     """
 
-    height_m: float | None
-    tilt_deg: float | None
-    roll_deg: float | None
-    heading_deg: float | None
     angle_deg: float | None
 
     @classmethod
@@ -81,7 +79,7 @@ class DriftOut(BaseModel):
         return cls(**in_degrees(identifiable_drift(drift))) if drift.identifiable else None
 
 
-class ReferenceOut(BaseModel):
+class ReferenceOut(Out):
     """How much of the reference period has been seen."""
 
     state: ReferenceState
@@ -115,24 +113,20 @@ class ServedPoseOut(BaseModel):
     @classmethod
     def from_value(cls, view: PoseView) -> Self:
         """The body of a served pose."""
-        estimate = view.estimate
+        status, estimate = view.status, view.status.estimate
+        learned = ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING
         return cls(
-            camera_id=view.camera_id,
-            state=view.state,
+            camera_id=status.camera_id,
+            state=status.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[field for name, field in _FIELDS.items() if name in view.identifiable],
+            estimated=[field for name, field in _FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             estimates={} if estimate is None else in_degrees(estimate.raw),
-            reference=ReferenceOut(
-                state=ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING,
-                tracks=view.reference.tracks,
-                wanted=view.reference.wanted,
-                walking_speed_mps=view.reference.walking_speed_mps,
-            ),
+            reference=ReferenceOut.of(view.reference, state=learned),
             tracks=0 if estimate is None else estimate.tracks,
-            from_=None if estimate is None else moment(estimate.from_s),
-            to=None if estimate is None else moment(estimate.to_s),
+            from_=None if estimate is None else from_seconds(estimate.from_s),
+            to=None if estimate is None else from_seconds(estimate.to_s),
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
             reason=view.reason,
@@ -141,7 +135,7 @@ class ServedPoseOut(BaseModel):
         )
 
 
-class HistoryPoint(BaseModel):
+class HistoryPoint(Out):
     """One estimate of the history."""
 
     at: datetime
@@ -158,17 +152,13 @@ class HistoryPoint(BaseModel):
     @classmethod
     def from_record(cls, record: EstimateRecord) -> Self:
         """The body of a stored estimate."""
-        return cls(
+        return cls.of(
+            record,
             at=record.created_at,
-            state=record.state,
-            height_m=record.pose.height_m,
-            tilt_deg=math.degrees(record.pose.tilt_rad),
-            roll_deg=math.degrees(record.pose.roll_rad),
-            heading_deg=math.degrees(record.pose.heading_rad),
+            **in_degrees(asdict(record.pose)),
             sd=SdOut.from_value(record.drift),
             drift=DriftOut.from_value(record.drift),
-            tracks=record.tracks,
-            to=moment(record.to_s),
+            to=from_seconds(record.to_s),
         )
 
 
@@ -176,11 +166,6 @@ class History(BaseModel):
     """Estimates, oldest first."""
 
     items: list[HistoryPoint]
-
-
-def moment(seconds: float) -> datetime:
-    """The aware UTC time of seconds since the epoch."""
-    return datetime.fromtimestamp(seconds, UTC)
 
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
@@ -212,7 +197,7 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextRespo
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
     lens = cameras.view_camera(session, camera_id).intrinsics
-    words = (f"state: {view.state}", f"why: {view.reason}")
+    words = (f"state: {view.status.state}", f"why: {view.reason}")
     return _YamlResponse(
         opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
         headers={
@@ -236,62 +221,44 @@ def history(
     With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
     """
     if points is not None and limit is not None:
-        reason = "either limit or points is taken"
-        raise MalformedError(f"points: {reason}", (FieldError(pointer="/points", reason=reason),))
-    if points is not None:
-        records = poses.thinned_history(session, camera_id, from_, to, points)
-    else:
-        records = poses.pose_history(session, camera_id, from_, to, limit or 1000)
+        raise MalformedError.of_field("points", "either limit or points is taken")
+    records = poses.pose_history(
+        session, camera_id, from_, to, newest=limit or 1000, thinned=points
+    )
     return History(items=[HistoryPoint.from_record(record) for record in records])
 
 
 @router.post("/pose/accept")
 def accept(
-    camera_id: str,
-    state: StateDep,
-    session: WriteDep,
-    actor: ActorDep,
-    body: AcceptBody | None = None,
+    camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
 ) -> ServedPoseOut:
     """Make the served pose the new prior pose and close its alerts; a new reference begins."""
-    decision = _decision(camera_id, actor, body)
-    return ServedPoseOut.from_value(
-        decisions.accept_pose(session, state.queue, state.settings, decision)
-    )
+    return _decide(decisions.accept_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/put-back")
 def put_back(
-    camera_id: str,
-    state: StateDep,
-    session: WriteDep,
-    actor: ActorDep,
-    body: PutBackBody | None = None,
+    camera_id: str, state: StateDep, session: WriteDep, body: PutBackBody | None = None
 ) -> ServedPoseOut:
     """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
-    decision = _decision(camera_id, actor, body)
-    return ServedPoseOut.from_value(
-        decisions.put_back(session, state.queue, state.settings, decision)
-    )
+    return _decide(decisions.put_back, state, session, camera_id, body)
 
 
 @router.post("/reference/reset")
 def reset(
-    camera_id: str,
-    state: StateDep,
-    session: WriteDep,
-    actor: ActorDep,
-    body: ResetBody | None = None,
+    camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
 ) -> ServedPoseOut:
     """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
-    decision = _decision(camera_id, actor, body)
-    return ServedPoseOut.from_value(
-        decisions.learn_anew(session, state.queue, state.settings, decision)
-    )
+    return _decide(decisions.learn_anew, state, session, camera_id, body)
 
 
-def _decision(
-    camera_id: str, actor: Actor | None, body: _DecisionBody | None
-) -> decisions.Decision:
+def _decide(
+    use_case: Callable[[Session, JobQueue, Settings, decisions.Decision], PoseView],
+    state: AppState,
+    session: Session,
+    camera_id: str,
+    body: _DecisionBody | None,
+) -> ServedPoseOut:
     said = body or _DecisionBody()
-    return decisions.Decision(camera_id=camera_id, by=name_of(actor, said.by), note=said.note)
+    decision = decisions.Decision(camera_id=camera_id, by=name_in(session, said.by), note=said.note)
+    return ServedPoseOut.from_value(use_case(session, state.queue, state.settings, decision))

@@ -4,15 +4,22 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Request, Response
-from pydantic import BaseModel
 
-from service.api.middleware.dependencies import ActorDep, BodyDep, ReadDep, StateDep, WriteDep
+from service.api.middleware.dependencies import (
+    BodyDep,
+    CallerDep,
+    ReadDep,
+    StateDep,
+    WriteDep,
+    media_type_of,
+)
+from service.api.schemas import Out
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
 from service.store.access import set_actor
 
 
-class SnapshotOut(BaseModel):
+class SnapshotOut(Out):
     """What is known of a still image."""
 
     sha256: str
@@ -34,9 +41,8 @@ def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) 
     with state.store.read() as session:
         cameras.require_camera(session, camera_id)
     snapshots.require_snapshots(state.settings)
-    media_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
     with state.large_bodies.turn(state.settings.http_wait_s):
-        return read_still(body, media_type)
+        return read_still(body, media_type_of(request))
 
 
 @router.put("", openapi_extra=_DESCRIBED_BODY)
@@ -44,13 +50,13 @@ def put(
     camera_id: str,
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
-    actor: ActorDep,
+    caller: CallerDep,
 ) -> SnapshotOut:
     """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
     with state.store.write(camera_id) as session:
-        set_actor(session, actor)
+        set_actor(session, caller)
         facts = snapshots.put_snapshot(session, camera_id, still)
-    return SnapshotOut.model_validate(facts, from_attributes=True)
+    return SnapshotOut.model_validate(facts)
 
 
 @router.get("", response_class=Response, responses={200: {"content": {"image/jpeg": _IMAGE}}})

@@ -1,15 +1,14 @@
 """`/cameras/{id}/sources`: whose tracks a camera is judged by."""
 
 from datetime import datetime
-from typing import Self
 
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from service.api.fields import Body, Text, Who
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Out, Text, Who
 from service.cameras import sources
-from service.cameras.sources import SourceView
+from service.store.access import name_in
 
 
 class UseBody(Body):
@@ -18,7 +17,7 @@ class UseBody(Body):
     by: Who | None = None
 
 
-class SourceOut(BaseModel):
+class SourceOut(Out):
     """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it."""
 
     name: str
@@ -28,19 +27,6 @@ class SourceOut(BaseModel):
     wanted_tracks: int
     first_seen_at: datetime
     last_seen_at: datetime
-
-    @classmethod
-    def from_value(cls, value: SourceView) -> Self:
-        """The body of a source."""
-        return cls(
-            name=value.record.name,
-            counts=value.counts,
-            tracks=value.record.tracks,
-            usable_tracks=value.usable,
-            wanted_tracks=value.wanted,
-            first_seen_at=value.record.first_seen_at,
-            last_seen_at=value.record.last_seen_at,
-        )
 
 
 class SourceList(BaseModel):
@@ -56,7 +42,13 @@ router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
 def list_all(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
     """Who has posted tracks of a camera, and whose count."""
     found = sources.list_sources(session, state.settings, camera_id)
-    return SourceList(items=[SourceOut.from_value(value) for value in found])
+    items = [
+        SourceOut.of(
+            each.record, counts=each.counts, usable_tracks=each.usable, wanted_tracks=each.wanted
+        )
+        for each in found
+    ]
+    return SourceList(items=items)
 
 
 @router.post("/{source:path}/use")
@@ -65,19 +57,15 @@ def use(
     source: str,
     state: StateDep,
     session: WriteDep,
-    actor: ActorDep,
     body: UseBody | None = None,
 ) -> SourceList:
     """Say that a source is to count: the reference is learned anew, of its tracks."""
-    by = name_of(actor, None if body is None else body.by)
+    by = name_in(session, None if body is None else body.by)
     sources.use_source(session, state.queue, state.settings, camera_id, source, by)
-    found = sources.list_sources(session, state.settings, camera_id)
-    return SourceList(items=[SourceOut.from_value(value) for value in found])
+    return list_all(camera_id, state, session)
 
 
 @router.delete("/{source:path}", status_code=204)
-def remove(
-    camera_id: str, source: str, session: WriteDep, actor: ActorDep, by: Text | None = None
-) -> None:
+def remove(camera_id: str, source: str, session: WriteDep, by: Text | None = None) -> None:
     """Delete a source that does not count, with its tracks."""
-    sources.remove_source(session, camera_id, source, name_of(actor, by))
+    sources.remove_source(session, camera_id, source, name_in(session, by))

@@ -2,17 +2,18 @@
 
 import time
 from collections.abc import Callable, Coroutine
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from service.api.middleware.dependencies import AppState, BodyDep, StateDep
+from service.api.middleware.dependencies import AppState, BodyDep, StateDep, media_type_of
+from service.api.schemas import Out
 from service.cameras import tracks
-from service.cameras.posts import StalePictureError
 from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
@@ -48,7 +49,7 @@ DESCRIBED_TRACK: dict[str, Any] = {
 }
 
 
-class RejectionOut(BaseModel):
+class RejectionOut(Out):
     """Why a track was not stored."""
 
     index: int
@@ -57,7 +58,7 @@ class RejectionOut(BaseModel):
     detail: str
 
 
-class ReceiptOut(BaseModel):
+class ReceiptOut(Out):
     """What became of the posted tracks; where it stands, `left_out` of them were of no person."""
 
     accepted: int
@@ -114,16 +115,12 @@ async def posted(
     """A request, to be read in the route's own thread."""
     return Posted(
         body=body,
-        media_type=_media_type(request),
+        media_type=media_type_of(request),
         source=source,
         frame_rate_hz=frame_rate_hz,
         started_at=started_at,
         classes=classes,
     )
-
-
-def _media_type(request: Request) -> str:
-    return request.headers.get("content-type", "").split(";")[0].strip().lower()
 
 
 def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
@@ -133,7 +130,7 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         UnsupportedMediaTypeError: neither JSON, NDJSON nor CSV.
         OverloadedError: other large bodies are being read all the time.
     """
-    source = formats.read_source(came.source, "/source")
+    source = formats.read_source(came.source)
     people = None if came.classes is None else read_classes(came.classes)
     limits = Limits(
         width=camera.width,
@@ -143,33 +140,21 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
     )
     started_at_s = None
     if came.started_at is not None:
-        started_at_s = formats.read_time(came.started_at, "/started_at")
+        started_at_s = formats.read_time(came.started_at)
     clock = Clock(
         frame_rate_hz=came.frame_rate_hz or camera.frame_rate_hz, started_at_s=started_at_s
     )
-    if len(came.body) > _LARGE:
-        with state.large_bodies.turn(state.settings.http_wait_s):
-            return _read(came.media_type, came.body, source, clock, limits, people)
-    return _read(came.media_type, came.body, source, clock, limits, people)
-
-
-def _read(
-    media_type: str,
-    body: bytes,
-    source: str,
-    clock: Clock,
-    limits: Limits,
-    people: frozenset[int] | None,
-) -> Batch:
-    if media_type == "application/json":
-        return formats.read_json(body, clock, limits)
-    if media_type == "application/x-ndjson":
-        return formats.read_ndjson(body, source, clock, limits)
-    if media_type == "text/csv":
-        return read_mot(body, source, clock, limits, people)
+    large = len(came.body) > _LARGE
+    with state.large_bodies.turn(state.settings.http_wait_s) if large else nullcontext():
+        if came.media_type == "application/json":
+            return formats.read_json(came.body, clock, limits)
+        if came.media_type == "application/x-ndjson":
+            return formats.read_ndjson(came.body, source, clock, limits)
+        if came.media_type == "text/csv":
+            return read_mot(came.body, source, clock, limits, people)
     raise UnsupportedMediaTypeError(
         "Content-Type: application/json, application/x-ndjson or text/csv is needed, "
-        f"got {media_type or 'none'}"
+        f"got {came.media_type or 'none'}"
     )
 
 
@@ -179,15 +164,13 @@ def _take(state: AppState, camera_id: str, came: Posted) -> Response:
         try:
             receipt = _store(state, camera_id, camera, came)
             break
-        except (MalformedError, StalePictureError) as error:
+        except (MalformedError, tracks.StalePictureError) as error:
             # It may be that the picture is another than when it was last asked for.
             now = state.pictures.again(state.store, camera_id)
             if now == camera and isinstance(error, MalformedError):
                 raise
             camera = now
-    body = ReceiptOut.model_validate(receipt, from_attributes=True).model_dump_json(
-        exclude_defaults=True
-    )
+    body = ReceiptOut.model_validate(receipt).model_dump_json(exclude_defaults=True)
     return Response(body, 202, media_type="application/json")
 
 
@@ -220,7 +203,7 @@ class _PostRoute(APIRoute):
         async def handle(request: Request) -> Response:
             if request.scope["query_string"]:
                 return await declared(request)
-            came = Posted(body=await request.body(), media_type=_media_type(request))
+            came = Posted(body=await request.body(), media_type=media_type_of(request))
             camera_id = request.path_params["camera_id"]
             return await run_in_threadpool(_take, request.state.app, camera_id, came)
 

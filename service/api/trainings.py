@@ -7,10 +7,11 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from service import training
-from service.api.fields import Body, Who
-from service.api.middleware.dependencies import ActorDep, ReadDep, StateDep, WriteDep, name_of
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Out, Who
+from service.degrees import in_degrees
 from service.enums import TrainingState
-from service.formats.degrees import in_degrees
+from service.store.access import name_in
 from service.store.trainings import TrainingRecord
 
 
@@ -22,7 +23,7 @@ class TrainingBody(Body):
     by: Who | None = None
 
 
-class ProgressOut(BaseModel):
+class ProgressOut(Out):
     """How far a training is."""
 
     step: int
@@ -39,7 +40,7 @@ class CentreOut(BaseModel):
     roll_deg: float
 
 
-class TrainingOut(BaseModel):
+class TrainingOut(Out):
     """A training."""
 
     id: str
@@ -58,10 +59,8 @@ class TrainingOut(BaseModel):
     @classmethod
     def from_record(cls, record: TrainingRecord) -> Self:
         """The body of a stored training."""
-        own = {name: getattr(record, name) for name in cls.model_fields if name != "progress"}
         around = record.around and CentreOut(**in_degrees(record.around))
-        progress = ProgressOut.model_validate(record, from_attributes=True)
-        return cls.model_validate({**own, "around": around, "progress": progress})
+        return cls.of(record, around=around, progress=record)
 
 
 class TrainingList(BaseModel):
@@ -78,12 +77,11 @@ def request(
     camera_id: str,
     state: StateDep,
     session: WriteDep,
-    actor: ActorDep,
     body: TrainingBody | None = None,
 ) -> TrainingOut:
     """Queue a training at the camera's prior pose."""
     body = body or TrainingBody()
-    by = name_of(actor, body.by)
+    by = name_in(session, body.by)
     record = training.request_training(
         session, state.queue, state.settings, camera_id, body.recipe, body.seed, by
     )

@@ -6,13 +6,13 @@ from typing import Annotated, Any, Self
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field, field_validator
 
-from service.api.fields import Body, ReasonCode
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
+from service.api.schemas import Body, Out, ReasonCode
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.notifications import webhooks
-from service.notifications.webhooks import DeliveryView, SecretMade, WebhookSpec, WebhookView
+from service.notifications.webhooks import WebhookSpec, WebhookView
 from service.reasons import code_of
-from service.store.webhooks import WebhookRecord
+from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 Kinds = Annotated[list[AlertKind], Field(min_length=1, max_length=10)]
@@ -44,7 +44,7 @@ class WebhookPatch(Body):
         return value
 
 
-class WebhookOut(BaseModel):
+class WebhookOut(Out):
     """A webhook, without its secret."""
 
     id: str
@@ -65,9 +65,11 @@ class WebhookOut(BaseModel):
     updated_at: datetime
 
     @classmethod
-    def from_value(cls, view: WebhookView) -> Self:
-        """The body of a webhook."""
-        return cls.model_validate({**_fields(view.record), "pending": view.pending})
+    def from_record(cls, record: WebhookRecord, **more: Any) -> Self:
+        """The body of a webhook, with how many messages are pending, and a secret just made."""
+        why = record.disabled_reasons
+        words, code = in_words(why) or None, code_of(why)
+        return cls.of(record, disabled_reason=words, disabled_reason_code=code, **more)
 
 
 class WebhookMade(WebhookOut):
@@ -75,13 +77,8 @@ class WebhookMade(WebhookOut):
 
     secret: str | None
 
-    @classmethod
-    def from_made(cls, made: SecretMade) -> Self:
-        """The body of a new webhook."""
-        return cls.model_validate({**_fields(made.record), "pending": 0, "secret": made.secret})
 
-
-class SecretOut(BaseModel):
+class SecretOut(Out):
     """A new secret; until `old_secret_until` messages are signed with the old one, too."""
 
     secret: str
@@ -94,7 +91,7 @@ class WebhookList(BaseModel):
     items: list[WebhookOut]
 
 
-class AttemptOut(BaseModel):
+class AttemptOut(Out):
     """One request of a delivery."""
 
     started_at: datetime
@@ -103,7 +100,7 @@ class AttemptOut(BaseModel):
     error: str | None
 
 
-class DeliveryOut(BaseModel):
+class DeliveryOut(Out):
     """A delivery; `id` is the `webhook-id` that the receiver sees, at every attempt."""
 
     id: str
@@ -118,29 +115,18 @@ class DeliveryOut(BaseModel):
     finished_at: datetime | None
 
     @classmethod
-    def from_value(cls, view: DeliveryView) -> Self:
+    def from_record(cls, record: DeliveryRecord) -> Self:
         """The body of a delivery."""
         attempts = [
-            AttemptOut.model_validate(attempt, from_attributes=True) for attempt in view.attempts
+            AttemptOut.model_validate(each, from_attributes=True) for each in record.requests
         ]
-        own = {name: getattr(view.record, name) for name in cls.model_fields if name != "attempts"}
-        return cls(**own, attempts=attempts)
+        return cls.of(record, attempts=attempts)
 
 
 class DeliveryList(BaseModel):
     """Deliveries, newest first."""
 
     items: list[DeliveryOut]
-
-
-def _fields(record: WebhookRecord) -> dict[str, Any]:
-    names = WebhookOut.model_fields.keys() - {"pending", "disabled_reason", "disabled_reason_code"}
-    why = record.disabled_reasons
-    return {
-        **{name: getattr(record, name) for name in names},
-        "disabled_reason": in_words(why) or None,
-        "disabled_reason_code": code_of(why),
-    }
 
 
 router = APIRouter(tags=["webhooks"])
@@ -180,28 +166,26 @@ def create(
         ),
     )
     response.headers["Location"] = f"/webhooks/{made.record.id}"
-    return WebhookMade.from_made(made)
+    return WebhookMade.from_record(made.record, pending=0, secret=made.secret)
 
 
 @router.get("/webhooks")
 def list_all(session: ReadDep) -> WebhookList:
     """Webhooks, oldest first."""
-    return WebhookList(
-        items=[WebhookOut.from_value(view) for view in webhooks.list_webhooks(session)]
-    )
+    return WebhookList(items=[_shown(view) for view in webhooks.list_webhooks(session)])
 
 
 @router.get("/webhooks/{webhook_id}")
 def show(webhook_id: str, session: ReadDep) -> WebhookOut:
     """A webhook, and how it fares."""
-    return WebhookOut.from_value(webhooks.show_webhook(session, webhook_id))
+    return _shown(webhooks.show_webhook(session, webhook_id))
 
 
 @router.patch("/webhooks/{webhook_id}")
 def change(webhook_id: str, body: CheckedPatch, state: StateDep, session: WriteDep) -> WebhookOut:
     """Change a webhook; with another URL, or enabled again, it is sent what waits for it."""
     changes = body.model_dump(exclude_unset=True)
-    return WebhookOut.from_value(webhooks.change_webhook(session, state.queue, webhook_id, changes))
+    return _shown(webhooks.change_webhook(session, state.queue, webhook_id, changes))
 
 
 @router.delete("/webhooks/{webhook_id}", status_code=204)
@@ -214,15 +198,13 @@ def remove(webhook_id: str, session: WriteDep) -> None:
 def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
     """Give a webhook a new secret; for a day, messages are signed with the old one, too."""
     made = webhooks.rotate_secret(session, state.settings, webhook_id)
-    return SecretOut.model_validate(
-        {"secret": made.secret, "old_secret_until": made.record.old_secret_until}
-    )
+    return SecretOut.of(made.record, secret=made.secret)
 
 
 @router.post("/webhooks/{webhook_id}/test", status_code=202)
 def test(webhook_id: str, session: WriteDep) -> DeliveryOut:
     """Queue a message of the type `test`."""
-    return DeliveryOut.from_value(webhooks.test_webhook(session, webhook_id))
+    return DeliveryOut.from_record(webhooks.test_webhook(session, webhook_id))
 
 
 @router.get("/webhooks/{webhook_id}/deliveries")
@@ -233,17 +215,21 @@ def list_deliveries(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> DeliveryList:
     """What was sent or is to be, newest first, with every attempt."""
-    views = webhooks.list_deliveries(session, webhook_id, state, limit)
-    return DeliveryList(items=[DeliveryOut.from_value(view) for view in views])
+    records = webhooks.list_deliveries(session, webhook_id, state, limit)
+    return DeliveryList(items=[DeliveryOut.from_record(record) for record in records])
 
 
 @router.get("/deliveries/{delivery_id}")
 def show_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
     """A delivery with its attempts."""
-    return DeliveryOut.from_value(webhooks.show_delivery(session, delivery_id))
+    return DeliveryOut.from_record(webhooks.show_delivery(session, delivery_id))
 
 
 @router.post("/deliveries/{delivery_id}/replay", status_code=202)
 def replay(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
     """Send a delivery anew, at once and under the same `webhook-id`."""
-    return DeliveryOut.from_value(webhooks.replay_delivery(session, state.queue, delivery_id))
+    return DeliveryOut.from_record(webhooks.replay_delivery(session, state.queue, delivery_id))
+
+
+def _shown(view: WebhookView) -> WebhookOut:
+    return WebhookOut.from_record(view.record, pending=view.pending)

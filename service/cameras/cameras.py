@@ -1,8 +1,9 @@
 """Register, change and remove cameras."""
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -25,7 +26,6 @@ from service.store import cameras, references, tracks, trainings
 from service.store.access import name_in
 from service.store.alerts import AlertFilter
 from service.store.cameras import CameraRecord, PriorPoseRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
 from service.training import stop_trainings, train_by_itself
 
 _MANY = 1000  # more alerts than a camera has kinds
@@ -84,7 +84,7 @@ def register_camera(
         TooManyCamerasError: as many are registered as may be.
     """
     camera_id = spec.camera_id or f"camera-{secrets.token_hex(4)}"
-    if cameras.find(session, camera_id) is not None:
+    if session.get(CameraRecord, camera_id) is not None:
         raise ConflictError(f"id: {camera_id!r} is taken")
     if cameras.count(session) >= settings.max_cameras:
         raise TooManyCamerasError(
@@ -95,6 +95,7 @@ def register_camera(
     record = CameraRecord(
         id=camera_id,
         name=spec.name or camera_id,
+        **_columns(spec.intrinsics),
         frame_rate_hz=spec.frame_rate_hz,
         walking_speed_mean_mps=spec.walking_speed_mean_mps,
         walking_speed_sd_mps=spec.walking_speed_sd_mps,
@@ -105,7 +106,6 @@ def register_camera(
         created_at=now,
         updated_at=now,
     )
-    _set_intrinsics(record, spec.intrinsics)
     session.add(record)
     session.flush()
     add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
@@ -146,36 +146,36 @@ def change_camera(
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
     record = view.record
-    if change.intrinsics is not None:
-        _set_intrinsics(record, change.intrinsics)
-    for name in (
-        "name",
-        "frame_rate_hz",
-        "walking_speed_mean_mps",
-        "walking_speed_sd_mps",
-        "reference_tracks",
-    ):
-        if getattr(change, name) is not None:
-            setattr(record, name, getattr(change, name))
+    changed = {
+        field.name: getattr(change, field.name)
+        for field in fields(change)
+        if getattr(change, field.name) is not None
+    }
+    lens = {} if change.intrinsics is None else _columns(change.intrinsics)
+    for name, value in {**changed, **lens}.items():
+        if name not in ("intrinsics", "prior_pose"):
+            setattr(record, name, value)
     record.version += 1
     record.updated_at = datetime.now(UTC)
-    if change.reference_tracks is not None:
-        _change_wanted(session, queue, camera_id, change.reference_tracks)
+    reference = references.newest(session, camera_id)
+    if change.reference_tracks is not None and reference.ready_at is None:
+        reference.wanted = change.reference_tracks
+        request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, None))
         # Tracks seen so far may be of another pose or lens, but not of other people.
-        from_s = references.newest(session, camera_id).from_s
+        from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
         pose = change.prior_pose or view.prior_pose
         renew_prior_pose(
             session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
         )
-    fields = [field for field in change.__slots__ if getattr(change, field) is not None]
-    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details={"fields": fields})
+    details = {"fields": list(changed)}
+    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
     session.flush()
     return view_camera(session, camera_id)
 
@@ -204,7 +204,7 @@ def require_camera(session: Session, camera_id: str) -> CameraRecord:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = cameras.find(session, camera_id)
+    record = session.get(CameraRecord, camera_id)
     if record is None:
         raise no_camera(camera_id)
     return record
@@ -244,12 +244,7 @@ def add_prior_pose(
     session.add(
         PriorPoseRecord(
             camera_id=camera_id,
-            height_m=pose.height_m,
-            tilt_rad=pose.tilt_rad,
-            roll_rad=pose.roll_rad,
-            heading_rad=pose.heading_rad,
-            x_m=pose.x_m,
-            y_m=pose.y_m,
+            **asdict(pose),
             origin=origin,
             trusted_by=name_in(session, by),
             created_at=datetime.now(UTC),
@@ -258,20 +253,12 @@ def add_prior_pose(
     session.flush()
 
 
-def _change_wanted(session: Session, queue: JobQueue, camera_id: str, wanted: int) -> None:
-    """Let a reference that is being learned wait for another number of tracks."""
-    reference = references.newest(session, camera_id)
-    if reference.ready_at is None:
-        reference.wanted = wanted
-        request_estimate(session, queue, camera_id)
-
-
 def _view(session: Session, record: CameraRecord) -> CameraView:
     model = trainings.newest_model(session, record.id)
     return CameraView(
         record=record,
-        intrinsics=intrinsics_of(record),
-        prior_pose=pose_of_prior(cameras.prior_pose(session, record.id)),
+        intrinsics=record.intrinsics,
+        prior_pose=cameras.prior_pose(session, record.id).pose,
         tracks=tracks.count(session, record.id),
         model_id=None if model is None else model.id,
     )
@@ -282,7 +269,6 @@ def _check_etag(view: CameraView, etag: str) -> None:
         raise PreconditionFailedError(f"If-Match: the camera is at {view.etag}, got {etag}")
 
 
-def _set_intrinsics(record: CameraRecord, lens: Intrinsics) -> None:
-    record.width, record.height = lens.width, lens.height
-    record.fx, record.fy, record.cx, record.cy = lens.fx, lens.fy, lens.cx, lens.cy
-    record.distortion = list(lens.distortion)
+def _columns(lens: Intrinsics) -> dict[str, Any]:
+    """A lens as the columns of a camera."""
+    return {**asdict(lens), "distortion": list(lens.distortion)}

@@ -40,7 +40,7 @@ def accept_pose(
         ConflictError: no pose has been estimated yet.
     """
     view = view_pose(session, settings, decision.camera_id)
-    if not view.identifiable:
+    if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     _close(session, decision, Outcome.ACCEPTED, Activity.POSE_ACCEPTED)
     from_s = tracks.newest_end_s(session, decision.camera_id)

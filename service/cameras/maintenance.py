@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
@@ -10,25 +9,16 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.enums import Activity
-from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
+from service.errors import ConflictError, MalformedError, NotFoundError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
 from service.references import forget_streak
 from service.settings import Settings
-from service.store import alerts, maintenance
-from service.store.maintenance import MaintenanceRecord
+from service.store import alerts, references
+from service.store.references import MaintenanceRecord
 
 _FARTHEST = timedelta(days=366)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WindowChange:
-    """Changes to a window; None stays."""
-
-    from_at: datetime | None = None
-    to_at: datetime | None = None
-    reason: str | None = None
 
 
 def open_window(
@@ -80,7 +70,7 @@ def list_windows(session: Session, camera_id: str) -> Sequence[MaintenanceRecord
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    return maintenance.of_camera(session, camera_id)
+    return references.maintenance_of(session, camera_id)
 
 
 def change_window(
@@ -89,9 +79,12 @@ def change_window(
     settings: Settings,
     camera_id: str,
     window_id: str,
-    change: WindowChange,
+    *,
+    from_at: datetime | None,
+    to_at: datetime | None,
+    reason: str | None,
 ) -> MaintenanceRecord:
-    """Move a window's ends: to end it now, or to have it end when somebody really left.
+    """Move a window's ends: to end it now, or to have it end when somebody really left; None stays.
 
     Raises:
         NotFoundError: the camera has no such window.
@@ -99,12 +92,11 @@ def change_window(
     """
     record = _require(session, camera_id, window_id)
     now = datetime.now(UTC)
-    from_at, to_at = change.from_at or record.from_at, change.to_at or record.to_at
-    _check(from_at, to_at, now, settings)
-    if change.to_at is not None:
-        record.ended_at = to_at if to_at <= now else None
-    record.from_at, record.to_at, record.updated_at = from_at, to_at, now
-    record.reason = record.reason if change.reason is None else change.reason
+    _check(from_at or record.from_at, to_at or record.to_at, now, settings)
+    if to_at is not None:
+        record.to_at, record.ended_at = to_at, to_at if to_at <= now else None
+    record.from_at, record.updated_at = from_at or record.from_at, now
+    record.reason = record.reason if reason is None else reason
     _note(session, Activity.MAINTENANCE_CHANGED, record, None)
     session.flush()
     request_estimate(session, queue, camera_id)
@@ -134,7 +126,7 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
 
 def note_ends(session: Session, camera_id: str, now: datetime) -> bool:
     """Note the end of windows that came to it by themselves; says whether there was any."""
-    over = maintenance.just_over(session, camera_id, now)
+    over = references.maintenance_just_over(session, camera_id, now)
     for record in over:
         record.ended_at = record.to_at
         _note(session, Activity.MAINTENANCE_OVER, record, None)
@@ -157,7 +149,7 @@ def _note(session: Session, what: Activity, record: MaintenanceRecord, by: str |
 
 def _require(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord:
     require_camera(session, camera_id)
-    record = maintenance.find(session, camera_id, window_id)
+    record = references.find_maintenance(session, camera_id, window_id)
     if record is None:
         raise NotFoundError(f"window_id: camera {camera_id!r} has no window {window_id!r}")
     return record
@@ -175,5 +167,4 @@ def _check(from_at: datetime, to_at: datetime, now: datetime, settings: Settings
 
 
 def _refuse(name: str, problem: str, got: datetime) -> None:
-    reason = f"{problem}, got {got.isoformat()}"
-    raise MalformedError(f"{name}: {reason}", (FieldError(pointer=f"/{name}", reason=reason),))
+    raise MalformedError.of_field(name, f"{problem}, got {got.isoformat()}")

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
@@ -18,10 +18,9 @@ from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import tracks_so_far, wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, fleet, maintenance, windows
+from service.store import cameras, estimates, fleet, references, windows
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
 
 
@@ -39,7 +38,6 @@ class ReferenceView:
 class PoseView:
     """The served pose of a camera, and its status."""
 
-    camera_id: str
     status: CameraStatus
     reasons: Reasons
     pose: CameraPose
@@ -48,24 +46,9 @@ class PoseView:
     etag: str
 
     @property
-    def state(self) -> PoseState:
-        """The camera's state."""
-        return self.status.state
-
-    @property
     def reason(self) -> str:
         """The reasons in words."""
         return in_words(self.reasons)
-
-    @property
-    def estimate(self) -> EstimateRecord | None:
-        """The estimate behind the pose; it may tell nothing yet."""
-        return self.status.estimate
-
-    @property
-    def identifiable(self) -> tuple[str, ...]:
-        """Those of tilt, roll, height, heading that are estimated."""
-        return self.status.identifiable
 
 
 def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
@@ -86,16 +69,10 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         counts = fleet.learning_counts(session, (camera_id,), attended)
     so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
     reasons = _reasons_of(session, settings, status, so_far)
-    pose = pose_of_prior(prior)
+    pose = prior.pose
     estimate = status.estimate
     if estimate is not None:
-        pose = replace(
-            pose,
-            height_m=estimate.pose.height_m,
-            tilt_rad=estimate.pose.tilt_rad,
-            roll_rad=estimate.pose.roll_rad,
-            heading_rad=estimate.pose.heading_rad,
-        )
+        pose = replace(pose, **asdict(estimate.pose))
     reference = ReferenceView(
         ready=record.ready_at is not None,
         tracks=so_far,
@@ -105,10 +82,9 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
-    why, lens = (reasons, in_words(reasons)), intrinsics_of(camera)
+    why, lens = (reasons, in_words(reasons)), camera.intrinsics
     served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
-        camera_id=camera_id,
         status=status,
         reasons=reasons,
         pose=pose,
@@ -119,27 +95,25 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
 
 
 def pose_history(
-    session: Session, camera_id: str, start: datetime | None, end: datetime | None, limit: int
+    session: Session,
+    camera_id: str,
+    start: datetime | None,
+    end: datetime | None,
+    *,
+    newest: int,
+    thinned: int | None,
 ) -> Sequence[EstimateRecord]:
-    """The estimates between two times, oldest first; the newest so many of them.
+    """The estimates between two times, oldest first: the newest so many of them.
+
+    Or at most so many of all of them, evenly thinned out.
 
     Raises:
         NotFoundError: there is no such camera.
     """
     require_camera(session, camera_id)
-    return estimates.between(session, camera_id, start, end, limit)
-
-
-def thinned_history(
-    session: Session, camera_id: str, start: datetime | None, end: datetime | None, most: int
-) -> Sequence[EstimateRecord]:
-    """At most so many of the estimates between two times, evenly thinned out, oldest first.
-
-    Raises:
-        NotFoundError: there is no such camera.
-    """
-    require_camera(session, camera_id)
-    return estimates.thinned(session, camera_id, start, end, most)
+    if thinned is None:
+        return estimates.between(session, camera_id, start, end, newest)
+    return estimates.thinned(session, camera_id, start, end, thinned)
 
 
 def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_far: int) -> Reasons:
@@ -150,7 +124,7 @@ def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_f
     now = datetime.now(UTC)
     found: list[Reason] = []
     if status.attended.under_way(now):
-        window = maintenance.under_way(session, status.camera_id, now)
+        window = references.maintenance_under_way(session, status.camera_id, now)
         if window is not None:
             found.append(_window(window))
     estimate = status.estimate

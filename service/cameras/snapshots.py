@@ -3,7 +3,7 @@
 import hashlib
 from datetime import UTC, datetime
 
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
@@ -11,8 +11,8 @@ from service.enums import Activity
 from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
 from service.formats.still import Still
 from service.settings import Settings
-from service.store import snapshots
-from service.store.snapshots import SnapshotFacts, SnapshotRecord
+from service.store import cameras
+from service.store.cameras import SnapshotRecord
 
 _OTHER_SHAPE = 0.01  # of the ratio of its sides
 
@@ -29,7 +29,7 @@ def require_snapshots(settings: Settings) -> None:
         )
 
 
-def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFacts:
+def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotRecord:
     """Keep a still image of a camera in place of the one there was.
 
     Raises:
@@ -46,8 +46,7 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
         raise MalformedError(f"body: {reason}", (FieldError(pointer="", reason=reason),))
     digest = hashlib.sha256(still.jpeg).hexdigest()
     now = datetime.now(UTC)
-    snapshots.put(
-        session,
+    record = session.merge(
         SnapshotRecord(
             camera_id=camera_id,
             jpeg=still.jpeg,
@@ -55,10 +54,10 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotFact
             width=still.width,
             height=still.height,
             stored_at=now,
-        ),
+        )
     )
     note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
-    return SnapshotFacts(sha256=digest, width=still.width, height=still.height, stored_at=now)
+    return record
 
 
 def show_snapshot(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord:
@@ -70,7 +69,7 @@ def show_snapshot(session: Session, settings: Settings, camera_id: str) -> Snaps
     """
     require_camera(session, camera_id)
     require_snapshots(settings)
-    record = snapshots.find(session, camera_id)
+    record = session.get(SnapshotRecord, camera_id)
     if record is None:
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     return record
@@ -83,11 +82,13 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
         NotFoundError: there is no such camera, or none of it is kept.
     """
     require_camera(session, camera_id)
-    if not snapshots.remove(session, camera_id):
+    if not cameras.remove_snapshot(session, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 
-def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotFacts | None:
-    """Size and time of a camera's still image; None where none may be shown."""
-    return snapshots.facts(session, camera_id) if settings.snapshots else None
+def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord | None:
+    """Size and time of a camera's still image, without reading it; None where none may be shown."""
+    if not settings.snapshots:
+        return None
+    return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))

@@ -15,7 +15,6 @@ from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.access.activity import note
 from service.alerts.alerts import end_alert, open_alert
-from service.alerts.suspected_moves import suspected_moves
 from service.cameras.cameras import require_camera
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
@@ -27,11 +26,13 @@ from service.references import (
     begin_reference,
     is_before,
     made_against,
+    suspected_moves,
     wanted_tracks,
     window_of,
 )
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, references, sources
+from service.store import alerts, estimates, references, sources
+from service.store.cameras import CameraRecord
 from service.store.engines.store import joined
 from service.store.references import SiteReferenceRecord
 from service.store.sources import SourceRecord
@@ -191,7 +192,7 @@ def _make_room(session: Session, camera_id: str, name: str, most: int) -> None:
         record
         for record in known
         if record.name != reference.source
-        and not sources.has_tracks(session, camera_id, record.name)
+        and sources.newest_end_s(session, camera_id, record.name) is None
     ]
     for record in gone:
         session.delete(record)
@@ -241,7 +242,7 @@ def _is_ready(
         return True  # nobody has judged the camera by now
     if not _is_well(session, settings, reference):
         return False
-    camera = cameras.find(session, reference.camera_id)
+    camera = session.get(CameraRecord, reference.camera_id)
     assert camera is not None
     wanted = min(camera.reference_tracks, settings.keep_tracks)
     return _usable(session, settings, reference, name) >= wanted

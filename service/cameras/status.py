@@ -18,29 +18,10 @@ from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
-from service.store import fleet, metrics
+from service.store import fleet
 from service.store.alerts import POSE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.references import SiteReferenceRecord
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CameraFacts:
-    """The stored facts that a camera's status follows from, at a moment.
-
-    `estimate` is the newest, `last_identifiable` the newest of which something is identifiable. It
-    is `silent` where nobody has been seen for longer than is usual; `last_track_s` is the end of
-    the newest track of those that count.
-    """
-
-    reference: SiteReferenceRecord
-    estimate: EstimateRecord | None
-    last_identifiable: EstimateRecord | None
-    attended: Attendance
-    firing: Sequence[AlertRecord]
-    silent: bool
-    last_track_s: float | None
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +31,8 @@ class CameraStatus:
     `estimate` is what is served, maybe nothing identifiable; None where the prior pose is. It is
     `judged` where it says how the camera stands now, against its reference; else it is the last
     that is known, or of a reference that is being learned. `cause` is what is waited after until
-    then.
+    then. It is `silent` where nobody has been seen for longer than is usual; `last_track_s` is the
+    end of the newest track of those that count.
     """
 
     camera_id: str
@@ -81,7 +63,7 @@ def camera_statuses(
 ) -> dict[str, CameraStatus]:
     """The status of all cameras, or some, in order of their ids, by a handful of statements."""
     now = datetime.now(UTC)
-    newest = metrics.newest(session, ids)
+    newest = fleet.newest(session, ids)
     windows: dict[str, list[MaintenanceRecord]] = {}
     if any(each.attended for each in newest.values()):
         windows = fleet.maintenance_windows(session, ids)
@@ -92,40 +74,47 @@ def camera_statuses(
     without = [
         camera_id
         for camera_id, alerts in firing.items()
-        if _holds(alerts) and camera_id in newest and not _identifies(newest[camera_id].estimate)
+        if _holds(alerts)
+        and camera_id in newest
+        and (estimate := newest[camera_id].estimate) is not None
+        and not estimate.identifiable
     ]
-    before = metrics.newest_identifiable_estimates(session, without) if without else {}
+    before = fleet.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, each in newest.items():
         arrivals = None if each.rhythm is None else unpacked(each.rhythm)
-        facts = CameraFacts(
-            reference=each.reference,
-            estimate=each.estimate,
-            last_identifiable=before.get(camera_id) if camera_id in without else each.estimate,
-            attended=attendance_by(windows.get(camera_id, []), now),
-            firing=firing[camera_id],
+        found[camera_id] = _status_of(
+            each,
+            before.get(camera_id) if camera_id in without else each.estimate,
+            attendance_by(windows.get(camera_id, []), now),
+            sorted(firing[camera_id], key=lambda alert: _urgency(alert, now)),
             silent=is_no_data(settings, arrivals, each.last_track_s, now),
-            last_track_s=each.last_track_s,
+            now=now,
         )
-        found[camera_id] = status_of(facts, now)
     return found
 
 
-def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
-    """A camera's status, by what is known of it."""
-    reference = facts.reference
-    estimate = _counting(facts, now)
+def _status_of(
+    newest: fleet.Newest,
+    last_identifiable: EstimateRecord | None,
+    attended: Attendance,
+    alerts: Sequence[AlertRecord],
+    *,
+    silent: bool,
+    now: datetime,
+) -> CameraStatus:
+    """A camera's status, by what is stored of it at a moment."""
+    reference = newest.reference
+    estimate = _counting(newest, attended, now)
     judged = estimate is not None and made_against(reference, estimate)
-    alerts = tuple(sorted(facts.firing, key=lambda alert: _urgency(alert, now)))
-    cause = _cause(reference, facts.attended, now)
-    holding = _holds(alerts)
+    cause = _cause(reference, attended, now)
     state: PoseState
-    if holding:
-        estimate = estimate if judged else facts.last_identifiable
+    if _holds(alerts):
+        estimate = estimate if judged else last_identifiable
         state = PoseState.DRIFTING
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
-    elif facts.silent:
+    elif silent:
         state = PoseState.NO_DATA
     elif judged and estimate is not None:
         state = estimate.state
@@ -134,21 +123,16 @@ def status_of(facts: CameraFacts, now: datetime) -> CameraStatus:
     return CameraStatus(
         camera_id=reference.camera_id,
         state=state,
-        since=_since(state, facts, alerts, cause),
+        since=_since(state, newest, alerts, cause),
         reference=reference,
         estimate=estimate,
         judged=judged,
         cause=cause,
-        alerts=alerts,
-        attended=facts.attended,
-        silent=facts.silent,
-        last_track_s=facts.last_track_s,
+        alerts=tuple(alerts),
+        attended=attended,
+        silent=silent,
+        last_track_s=newest.last_track_s,
     )
-
-
-def _identifies(estimate: EstimateRecord | None) -> bool:
-    """True if the newest estimate is the last that tells something; none is the last, too."""
-    return estimate is None or bool(estimate.identifiable)
 
 
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
@@ -158,9 +142,9 @@ def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
     ]
 
 
-def _counting(facts: CameraFacts, now: datetime) -> EstimateRecord | None:
+def _counting(newest: fleet.Newest, attended: Attendance, now: datetime) -> EstimateRecord | None:
     """The newest estimate; None where it says nothing of how the camera stands now."""
-    reference, estimate = facts.reference, facts.estimate
+    reference, estimate = newest.reference, newest.estimate
     if estimate is None or estimate.reference_id != reference.id:
         return None  # it was measured against a pose or a reference that no longer counts
     if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
@@ -169,7 +153,7 @@ def _counting(facts: CameraFacts, now: datetime) -> EstimateRecord | None:
         return estimate
     # Somebody was at it and has gone: it may stand elsewhere. While they are there it is not
     # judged, so what was told before stands.
-    begins_s = max(facts.attended.free_since_s(now) or 0.0, reference.window_from_s or 0.0)
+    begins_s = max(attended.free_since_s(now) or 0.0, reference.window_from_s or 0.0)
     return estimate if estimate.to_s >= max(begins_s, reference.from_s or 0.0) else None
 
 
@@ -202,13 +186,13 @@ def alert_since(alert: AlertRecord) -> datetime:
 
 
 def _since(
-    state: PoseState, facts: CameraFacts, alerts: Sequence[AlertRecord], cause: Cause
+    state: PoseState, newest: fleet.Newest, alerts: Sequence[AlertRecord], cause: Cause
 ) -> datetime:
-    reference = facts.reference
+    reference = newest.reference
     if alerts:
         return alert_since(alerts[0])
-    if state == PoseState.NO_DATA and facts.last_track_s is not None:
-        return datetime.fromtimestamp(facts.last_track_s, UTC)
+    if state == PoseState.NO_DATA and newest.last_track_s is not None:
+        return datetime.fromtimestamp(newest.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
         return reference.answered_at
     return reference.created_at if reference.ready_at is None else reference.ready_at

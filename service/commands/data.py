@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from typer import echo
 
-from service.commands.settings_given import settings_given
+from service.commands.settings_given import begin
 from service.data_dir import StartError
-from service.logs import configure_logs
-from service.workers.processes.signals import be_private, end_like_ctrl_c
+from service.workers.processes.process import end_like_ctrl_c
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -23,10 +23,10 @@ def migrate(data_dir: DataDir = None) -> None:
     """Bring the database to the newest revision."""
     from service.commands.migrate import migrate as run_migrations
 
-    settings = _begin(data_dir)
+    settings = begin(data_dir=data_dir)
     run_migrations(settings)
     what = settings.database_path if settings.database_url is None else "the database"
-    _say(f"{what} is at the newest revision")
+    echo(f"{what} is at the newest revision")
 
 
 def backup(
@@ -40,13 +40,13 @@ def backup(
     with _progress() as tell:
         manifest = write_backup(settings, file, tell)
     size = sum(member.size for member in manifest.members)
-    _say(f"{file}: {len(manifest.members)} files, {size / 1e6:.1f} MB, schema {manifest.revision}")
+    echo(f"{file}: {len(manifest.members)} files, {size / 1e6:.1f} MB, schema {manifest.revision}")
     if manifest.key == "environment":
-        _say(f"Keep SUREFOOT_SECRET_KEY (id {manifest.key_id}) elsewhere: it is not in there.")
+        echo(f"Keep SUREFOOT_SECRET_KEY (id {manifest.key_id}) elsewhere: it is not in there.")
     elif manifest.key == "archive":
-        _say("The key of webhooks' secrets is in there: keep it as safe as the service itself.")
+        echo("The key of webhooks' secrets is in there: keep it as safe as the service itself.")
     if manifest.missing_weights:
-        _say(f"{len(manifest.missing_weights)} weights were missing: see `surefoot check`.")
+        echo(f"{len(manifest.missing_weights)} weights were missing: see `surefoot check`.")
 
 
 def restore(
@@ -61,11 +61,11 @@ def restore(
     with _progress() as tell:
         done = restore_backup(settings, file, tell, force=force)
     made = f"made {done.manifest.made_at} by release {done.manifest.release}"
-    _say(f"{settings.data_dir} is as in {file}, {made}; the next start migrates it.")
+    echo(f"{settings.data_dir} is as in {file}, {made}; the next start migrates it.")
     if done.replaced is not None:
-        _say(f"What was there before is in {done.replaced}; delete it when you like.")
+        echo(f"What was there before is in {done.replaced}; delete it when you like.")
     if done.manifest.missing_weights:
-        _say(f"{len(done.manifest.missing_weights)} weights are missing: `surefoot check --repair`")
+        echo(f"{len(done.manifest.missing_weights)} weights are missing: `surefoot check --repair`")
 
 
 def check(
@@ -81,7 +81,7 @@ def check(
 
     settings = _begin_on_file(data_dir, "check")
     if repair:
-        _say(f"{repair_weights(settings)} models deleted, to be trained anew")
+        echo(f"{repair_weights(settings)} models deleted, to be trained anew")
     findings = check_data_dir(settings)
     table = Table("looked at", "verdict", "detail", title=str(settings.data_dir))
     colours = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.FAULT: "red"}
@@ -103,19 +103,13 @@ def rotate_key(
     """Seal the stored secrets with a new key file, or with SUREFOOT_SECRET_KEY if that is set."""
     from service.commands.key_rotation import rotate_key as rotate
 
-    count = rotate(_begin(data_dir), old_key_file, lost=lost)
-    _say(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
-
-
-def _begin(data_dir: Path | None, database_url: str | None = None) -> "Settings":
-    configure_logs()
-    be_private()
-    return settings_given(data_dir=data_dir, database_url=database_url)
+    count = rotate(begin(data_dir=data_dir), old_key_file, lost=lost)
+    echo(f"{count} secrets are sealed by the new key; earlier backups hold the old one")
 
 
 def _begin_on_file(data_dir: Path | None, command: str) -> "Settings":
     """Settings for a command that a server has better ones for."""
-    settings = _begin(data_dir)
+    settings = begin(data_dir=data_dir)
     if settings.database_url is not None:
         raise StartError(
             f"{command}: it is for SQLite files, and SUREFOOT_DATABASE_URL names a server; use its "
@@ -138,10 +132,6 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
         )
 
 
-def _say(line: str) -> None:
-    Console().print(line, soft_wrap=True, highlight=False)
-
-
 def migrate_data(
     source: Annotated[str, typer.Option("--from", help="sqlite:///… of a stopped data directory.")],
     target: Annotated[str, typer.Option("--to", help="postgresql://user:password@host/name")],
@@ -156,12 +146,12 @@ def migrate_data(
         url = read_database_url(target)
     except ValueError as error:
         raise StartError(f"--to: {error}") from error
-    settings = _begin(data_dir or path.parent, url)
+    settings = begin(data_dir=data_dir or path.parent, database_url=url)
     with _progress() as tell:
         moved = move(path, settings, tell)
-    _say(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")
-    _say(f"{moved.weights} weights are there; {moved.missing_weights} were missing or damaged")
-    _say("Set SUREFOOT_DATABASE_URL to it, and SUREFOOT_SECRET_KEY on all machines but this one.")
+    echo(f"{sum(moved.rows.values())} rows of {len(moved.rows)} tables are there, hashes agree")
+    echo(f"{moved.weights} weights are there; {moved.missing_weights} were missing or damaged")
+    echo("Set SUREFOOT_DATABASE_URL to it, and SUREFOOT_SECRET_KEY on all machines but this one.")
 
 
 DATA_COMMANDS = (migrate, backup, restore, check, rotate_key, migrate_data)

@@ -2,13 +2,14 @@
 
 import contextlib
 import fcntl
+import math
 import shutil
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -39,9 +40,8 @@ from service.commands.replay import post_tracks
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError, running_in
 from service.enums import AlertState, ReferenceState
-from service.formats.degrees import degrees
 from service.settings import Settings
-from service.workers.processes.signals import end_like_ctrl_c
+from service.workers.processes.process import end_like_ctrl_c
 
 _PREFIX, _LOCK = "surefoot-demo-", "demo.lock"
 _HOST = "127.0.0.1"
@@ -54,9 +54,8 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
     console = Console()
     started = time.monotonic()
-    port = port or _free_port()
     _remove_left_over()
-    _require_free(port)
+    port = _free_port(port)
     end_like_ctrl_c()
     console.print("A street camera, people walking by; later somebody knocks the camera.")
     with _folder() as folder:
@@ -78,7 +77,8 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
                 save_picture(screen.table(progress), picture)
             if won and stay:
                 console.print("Ctrl-C stops the service.")
-                _wait_for_interrupt()
+                with contextlib.suppress(KeyboardInterrupt):
+                    service.wait()
     return 0 if won else 1
 
 
@@ -126,9 +126,7 @@ def _show(
     assert not receipt["rejected"], receipt
     screen.tracks += len(people)
     newest_s = clock_s + float(people[-1].trajectory.time_s[-1])
-    while not _looked_at(http, screen, newest_s):
-        _check_time(started)
-        time.sleep(0.2)
+    _wait(lambda: _looked_at(http, screen, newest_s), started)
 
 
 def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
@@ -157,7 +155,7 @@ def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
         return False
     served = np.array(screen.pose["pose"]["quaternion_wxyz"])
     to_knocked, to_prior = (
-        degrees(float(angle_between(served, pose.quaternion_wxyz)))
+        math.degrees(float(angle_between(served, pose.quaternion_wxyz)))
         for pose in (KNOCK.apply(PRIOR), PRIOR)
     )
     console.print(
@@ -171,16 +169,14 @@ def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
 
 
 def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: float) -> None:
-    while True:
+    def is_ready() -> bool:
         if service.poll() is not None:
             raise StartError(f"demo: its service ended with {service.returncode}, see above")
-        try:
-            if http.get("/readyz").status_code == 200:
-                return
-        except httpx.TransportError:
-            pass  # not listening yet
-        _check_time(started)
-        time.sleep(0.2)
+        with contextlib.suppress(httpx.TransportError):  # not listening yet
+            return http.get("/readyz").status_code == 200
+        return False
+
+    _wait(is_ready, started)
 
 
 @contextlib.contextmanager
@@ -205,17 +201,11 @@ def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
             process.wait(20)
 
 
-def _check_time(started: float) -> None:
-    if time.monotonic() - started > _LONGEST_S:
-        raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
-
-
-def _wait_for_interrupt() -> None:
-    try:
-        while True:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        return
+def _wait(until: Callable[[], bool], started: float) -> None:
+    while not until():
+        if time.monotonic() - started > _LONGEST_S:
+            raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
+        time.sleep(0.2)
 
 
 @contextlib.contextmanager
@@ -238,8 +228,8 @@ def _remove_left_over() -> None:
                 shutil.rmtree(folder)
 
 
-def _require_free(port: int) -> None:
-    """Check that nobody listens on a port of this machine.
+def _free_port(port: int) -> int:
+    """A port of this machine that nobody listens on: the one that is named, any of 0.
 
     Raises:
         StartError: somebody does; the demo would register its street there.
@@ -253,11 +243,5 @@ def _require_free(port: int) -> None:
                 f"port: {_HOST}, port {port} cannot be had ({error.strerror}); another service "
                 "runs there: name another port by --port, or none"
             ) from error
-
-
-def _free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind((_HOST, 0))
-        port: int = probe.getsockname()[1]
-        return port
+        free: int = probe.getsockname()[1]
+        return free

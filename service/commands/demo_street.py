@@ -2,8 +2,8 @@
 
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.scenes import SceneTrack
 from models.tracks.trajectory import Trajectory
 from service.commands.replay import camera_body
+from service.degrees import in_degrees
 from service.enums import ReferenceState
-from service.formats.degrees import degrees
 
 CAMERA_ID = "demo-street"
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
@@ -68,11 +68,14 @@ class Screen:
         rows = Table(title=f"{CAMERA_ID}: {self.tracks} people seen", title_justify="left")
         for column in ("", "height m", "tilt deg", "roll deg"):
             rows.add_column(column, justify="left" if not column else "right")
-        rows.add_row("prior pose", *_row_of(PRIOR))
-        truth = KNOCK.apply(PRIOR) if self.knocked_at else PRIOR
-        rows.add_row("true pose" + (" (knocked)" if self.knocked_at else ""), *_row_of(truth))
+        rows.add_row("prior pose", *_cells(in_degrees(asdict(PRIOR))))
+        truth = in_degrees(asdict(KNOCK.apply(PRIOR) if self.knocked_at else PRIOR))
+        rows.add_row("true pose" + (" (knocked)" if self.knocked_at else ""), *_cells(truth))
         if self.pose is not None:
-            rows.add_row(f"served pose: {self.pose['state']}", *_served(self.pose))
+            rows.add_row(
+                f"served pose: {self.pose['state']}",
+                *_cells(self.pose["pose"], self.pose["sd"] or {}),
+            )
         page.add_row(rows)
         if self.pose is not None:
             page.add_row(self._words(self.pose))
@@ -85,9 +88,7 @@ class Screen:
         usual = f"people walk at {reference['walking_speed_mps']:.2f} m/s here"
         if self.alert is None:
             return f"{usual}\n{pose['reason']}"
-        drift = {
-            name: 0.0 if value is None else value for name, value in self.alert["drift"].items()
-        }
+        drift = {name: value or 0.0 for name, value in self.alert["drift"].items()}
         return (
             f"{usual}\n[bold red]ALERT[/] {self.alert['severity']}: since "
             f"{clock(self.alert['changed_at'])} the camera is turned by {drift['angle_deg']:.1f} "
@@ -104,20 +105,11 @@ def save_picture(page: Table, path: Path) -> None:
         recorder.save_svg(str(path), title="surefoot demo")
 
 
-def _row_of(pose: CameraPose) -> Sequence[str]:
-    """The cells of a pose."""
+def _cells(pose: Mapping[str, Any], sd: Mapping[str, Any] | None = None) -> list[str]:
+    """The numbers of a pose, with their deviations where they are estimated."""
+    known = sd or {}
     return [
-        f"{pose.height_m:.2f}",
-        f"{degrees(pose.tilt_rad):.2f}",
-        f"{degrees(pose.roll_rad):.2f}",
-    ]
-
-
-def _served(pose: dict[str, Any]) -> Sequence[str]:
-    """The served numbers, with their deviations where they are estimated."""
-    sd = pose["sd"] or {}
-    return [
-        f"{pose['pose'][name]:.2f}" + (f" ± {sd[name]:.2f}" if sd.get(name) is not None else "")
+        f"{pose[name]:.2f}" + ("" if known.get(name) is None else f" ± {known[name]:.2f}")
         for name in ("height_m", "tilt_deg", "roll_deg")
     ]
 

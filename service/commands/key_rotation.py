@@ -3,8 +3,14 @@
 from pathlib import Path
 
 from service.data_dir import KEY_FILE, held_alone, make_private, require_stopped
-from service.notifications.keys import NEW_KEY_FILE, give_up_secrets, reseal
-from service.notifications.sealing import read_key_file, sealer_of, write_key_file
+from service.notifications.keys import (
+    NEW_KEY_FILE,
+    give_up_secrets,
+    read_key_file,
+    reseal,
+    sealer_of,
+    write_key_file,
+)
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.store import Store

@@ -13,7 +13,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.scenes import Scene, SceneTrack, load_scene
-from service.formats.degrees import in_degrees
+from service.degrees import in_degrees
 
 _SOURCE = "surefoot-replay"
 _BATCH_TRACKS = 10
@@ -122,15 +122,7 @@ def camera_body(camera_id: str, lens: Intrinsics, pose: CameraPose) -> dict[str,
     """The body that registers a camera."""
     return {
         "id": camera_id,
-        "intrinsics": {
-            "width": lens.width,
-            "height": lens.height,
-            "fx": lens.fx,
-            "fy": lens.fy,
-            "cx": lens.cx,
-            "cy": lens.cy,
-            "distortion": list(lens.distortion),
-        },
+        "intrinsics": asdict(lens),
         "prior_pose": in_degrees(asdict(pose)),
     }
 

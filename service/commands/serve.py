@@ -8,24 +8,22 @@ import socket
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING
+from datetime import UTC, datetime
+from functools import partial
 
 import uvicorn
 
-from service.access.tokens import count_tokens
-from service.api.middleware.connections import ConnectionGuard, protocol_factory
+from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.api.middleware.hosts import auth_on, is_loopback
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
+from service.store import access
 from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
-from service.workers.processes.local_workers import local_workers
-from service.workers.processes.resources import settle_allocator
-
-if TYPE_CHECKING:
-    from fastapi import FastAPI
+from service.workers.processes.local_workers import LocalWorkers
+from service.workers.processes.process import settle_allocator
 
 log = logging.getLogger("surefoot.serve")
 
@@ -48,12 +46,15 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     with held_alone(settings.data_dir), contextlib.closing(listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
-        app = _app(settings)
+        with importing():  # half of what is imported, and who is refused is told without it
+            from service.app import create_app
+
+        app = create_app(settings)
         guard = ConnectionGuard(settings, app.state.instruments)
         config = uvicorn.Config(
             app,
             loop="asyncio",
-            http=protocol_factory(guard),  # type: ignore[arg-type]
+            http=partial(GuardedProtocol, guard=guard),  # type: ignore[arg-type]
             ws="none",
             backlog=_BACKLOG,
             log_level="warning",
@@ -66,7 +67,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         def give_up() -> None:
             server.should_exit = True
 
-        with local_workers(settings, give_up) as workers:
+        with LocalWorkers(settings, give_up) as workers:
             host, port = listener.getsockname()[:2]
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             settle_collector()
@@ -81,14 +82,6 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         raise SystemExit(exits.REFUSED)
 
 
-def _app(settings: Settings) -> "FastAPI":
-    # Half of what is imported, and who is refused is told without it.
-    with importing():
-        from service.app import create_app
-
-    return create_app(settings)
-
-
 def _require_way_in(settings: Settings) -> None:
     """Refuse to serve strangers by mistake, and to serve nobody at all."""
     if not auth_on(settings):
@@ -98,7 +91,7 @@ def _require_way_in(settings: Settings) -> None:
     if settings.proxy_from:
         return
     with contextlib.closing(Store(settings)) as store, store.read() as session:
-        count = count_tokens(session)
+        count = access.count_valid(session, datetime.now(UTC))
     if not count:
         raise StartError(
             "auth: tokens are needed here, and nobody has one; make one by `surefoot token add "

@@ -2,6 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
+from service.logs import configure_logs
+from service.workers.processes.process import be_private
+
 if TYPE_CHECKING:
     from service.settings import Settings
 
@@ -12,6 +15,17 @@ class WrongSettingsError(Exception):
     def __init__(self, lines: list[str]) -> None:
         super().__init__("; ".join(lines))
         self.lines = lines
+
+
+def begin(**flags: Any) -> "Settings":
+    """Settings of a command on a data directory, whose log and files are seen to from here on.
+
+    Raises:
+        WrongSettingsError: one of them cannot be.
+    """
+    configure_logs()
+    be_private()
+    return settings_given(**flags)
 
 
 def settings_given(**flags: Any) -> "Settings":

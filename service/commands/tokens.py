@@ -12,18 +12,17 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from service.commands.data import DataDir
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
 from service.errors import ServiceError
-from service.workers.processes.signals import be_private
+from service.workers.processes.process import be_private
 
 if TYPE_CHECKING:
     from service.store.access import TokenRecord
     from service.store.engines.store import Store
 
 app = typer.Typer(help="Tokens, by which programs and people are let in.", no_args_is_help=True)
-
-DataDir = Annotated[Path | None, typer.Option(help="Database and weights live here.")]
 
 _UNITS = {"h": 1 / 24, "d": 1.0, "w": 7.0, "y": 365.0}
 
@@ -59,11 +58,11 @@ def add(
 @app.command(name="list")
 def list_all(data_dir: DataDir = None) -> None:
     """List the tokens, without their secrets."""
-    from service.access import tokens
+    from service.store import access
 
     table = Table("id", "name", "may", "cameras", "made", "last used", "ends")
     with _store(data_dir) as store, store.read() as session:
-        for record in tokens.list_tokens(session):
+        for record in access.every(session):
             table.add_row(
                 record.id,
                 record.name,

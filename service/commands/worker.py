@@ -15,10 +15,10 @@ from service.settings import Settings
 from service.store.engines.sqlite import FileLock
 from service.store.engines.store import Store
 from service.workers import engine
-from service.workers.context import JobContext
+from service.workers.context import UPKEEP, JobContext, RunningJobs
 from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
-from service.workers.processes.resources import (
+from service.workers.processes.process import (
     give_back,
     resident_mb,
     settle_allocator,
@@ -32,9 +32,7 @@ from service.workers.processes.workers import (
     register_worker,
     worker_name,
 )
-from service.workers.running_jobs import UPKEEP, RunningJobs
-from service.workers.upkeep.clock import follow_clock_since_last_run
-from service.workers.upkeep.periodic import start_periodic_work
+from service.workers.upkeep.periodic import follow_clock_since_last_run, start_periodic_work
 
 log = logging.getLogger("surefoot.worker")
 
@@ -65,11 +63,16 @@ def run_worker(
     settle_allocator()
     yield_to_others(settings.worker_nice)
     store = Store(settings)
+    limits_s = {  # of a task of each kind; trainings mind theirs themselves
+        ESTIMATE_JOB: settings.estimate_limit_s,
+        DELIVER_JOB: settings.delivery_limit_s,
+        UPKEEP: settings.upkeep_limit_s,
+    }
     context = JobContext(
         settings=settings,
         store=store,
         queue=JobQueue(store.engine),
-        running=RunningJobs(limits_s=_limits_s(settings)),
+        running=RunningJobs(limits_s=limits_s),
     )
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: context.stopping.set())
@@ -135,15 +138,6 @@ def _is_full(context: JobContext) -> bool:
         return False
     give_back()
     return resident_mb() > limit_mb
-
-
-def _limits_s(settings: Settings) -> dict[str, float]:
-    """The longest time of a task of each kind; trainings mind theirs themselves."""
-    return {
-        ESTIMATE_JOB: settings.estimate_limit_s,
-        DELIVER_JOB: settings.delivery_limit_s,
-        UPKEEP: settings.upkeep_limit_s,
-    }
 
 
 def _stop_at_end_of_stdin(context: JobContext) -> None:

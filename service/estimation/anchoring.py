@@ -9,28 +9,29 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.chart import chart_from_bytes, chart_to_bytes
-from models.monitoring.config import CREEP_SHARE
-from models.monitoring.creep import creep_log_from_bytes, creep_log_to_bytes
-from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import (
+    CREEP_SHARE,
     CameraSite,
     Creep,
     begin_creep_log,
+    chart_from_bytes,
+    chart_to_bytes,
+    creep_log_from_bytes,
+    creep_log_to_bytes,
     creep_result,
     log_creep,
     observe,
+    paths_from_bytes,
+    paths_to_bytes,
+    reference_from_bytes,
 )
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import reference_from_bytes
-from service.estimation.people import Unpacked
+from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, flow_maps, references, windows
-from service.store.flow_maps import AnchorRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
-from service.store.windows import WindowBounds
+from service.store import cameras, references, windows
+from service.store.cameras import CameraRecord
+from service.store.references import AnchorRecord
 
 _MOST_A_DAY = 100
 
@@ -54,44 +55,18 @@ def paths_of(site: CameraSite) -> LearnedPaths | None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Anchor:
-    """The first map and chart of a reference, and the log of whole days against them, as bytes.
-
-    `log` is None where there is no day yet. It counts from `from_s` on: since then the camera has
-    stood as it does, but for a creep.
-    """
-
-    flow: bytes
-    chart: bytes
-    log: bytes | None
-    from_s: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AnchorDays:
     """The tracks of whole days that are to be held against an anchor, in the order of their ends.
 
-    They end at `to_s`; `logged_to_s` is where those ended that it had before.
+    They end at `to_s`.
     """
 
-    reference_id: int
     site: bytes
     anchor: Anchor
     intrinsics: Intrinsics
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
-    anchored_to_s: float
-    learned_at: datetime
-    logged_to_s: float | None
     to_s: float
-
-
-def anchor_of(
-    session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
-) -> Anchor | None:
-    """The anchor of a reference; None where there is none. `bounds` are those of its window."""
-    record = flow_maps.anchor(session, reference.id)
-    return None if record is None else _anchor(record, bounds)
 
 
 def keep_anchor(
@@ -123,34 +98,31 @@ def load_anchor_days(
 ) -> AnchorDays | None:
     """The whole days that a camera's anchor has not seen; None where there is none."""
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.data is None:
         return None
-    record = flow_maps.anchor(session, reference.id)
-    if record is None:
-        return None
     bounds = window_of(session, reference, settings)
+    anchor = anchor_of(session, reference, bounds)
+    if anchor is None:
+        return None
     newest_s = windows.newest_end_s(session, bounds)
     if newest_s is None:
         return None
     # The day of the newest track is not over yet.
     to_s = math.floor(newest_s / DAY_S) * DAY_S
+    record = anchor.record
     after_s = record.to_s if record.logged_to_s is None else record.logged_to_s
     if to_s <= after_s:
         return None
     found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY)
-    intrinsics = intrinsics_of(camera)
+    intrinsics = camera.intrinsics
     return AnchorDays(
-        reference_id=reference.id,
         site=reference.data,
-        anchor=_anchor(record, bounds),
+        anchor=anchor,
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=cameras.prior_pose(session, camera_id).pose,
         trajectories=tuple(unpacked.seen(track, intrinsics) for track in found),
-        anchored_to_s=record.to_s,
-        learned_at=record.learned_at,
-        logged_to_s=record.logged_to_s,
         to_s=to_s,
     )
 
@@ -165,8 +137,9 @@ def compute_anchor_days(days: AnchorDays) -> bytes | None:
         ),
         days.anchor,
     )
-    log = None if days.anchor.log is None else creep_log_from_bytes(days.anchor.log)
-    log = log or begin_creep_log(first, days.anchored_to_s)
+    kept = days.anchor.record
+    log = None if kept.creep is None else creep_log_from_bytes(kept.creep)
+    log = log or begin_creep_log(first, kept.to_s)
     if log is None:
         return None
     if days.trajectories:
@@ -176,10 +149,11 @@ def compute_anchor_days(days: AnchorDays) -> bytes | None:
 
 def save_anchor_days(session: Session, days: AnchorDays, log: bytes | None) -> None:
     """Keep a log, unless its anchor or its days have become others meanwhile."""
-    record = flow_maps.anchor(session, days.reference_id)
-    if record is None or record.learned_at != days.learned_at:
+    before = days.anchor.record
+    record = session.get(AnchorRecord, before.reference_id)
+    if record is None or record.learned_at != before.learned_at:
         return
-    if record.logged_to_s == days.logged_to_s:
+    if record.logged_to_s == before.logged_to_s:
         record.creep, record.logged_to_s = log, days.to_s
 
 
@@ -189,7 +163,8 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     Raises:
         CheckpointError: what is stored cannot be read.
     """
-    return replace(site, paths=paths_from_bytes(anchor.flow), chart=chart_from_bytes(anchor.chart))
+    kept = anchor.record
+    return replace(site, paths=paths_from_bytes(kept.flow), chart=chart_from_bytes(kept.chart))
 
 
 def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:
@@ -198,17 +173,7 @@ def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | Non
     Raises:
         CheckpointError: what is stored cannot be read.
     """
-    if anchor is None or anchor.log is None:
+    if anchor is None or anchor.record.creep is None:
         return None
-    log = creep_log_from_bytes(anchor.log)
+    log = creep_log_from_bytes(anchor.record.creep)
     return creep_result(log, CREEP_SHARE * false_alarms_per_year, anchor.from_s)
-
-
-def _anchor(record: AnchorRecord, bounds: WindowBounds) -> Anchor:
-    since = [at for at in (bounds.started_from_s, bounds.ended_from_s) if at is not None]
-    return Anchor(
-        flow=record.flow,
-        chart=record.chart,
-        log=record.creep,
-        from_s=max(since, default=None),
-    )

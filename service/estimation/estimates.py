@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
-from models.monitoring.chart import CLOCK
 from models.monitoring.verdict import (
     Drift,
     DriftVerdict,
@@ -20,22 +19,21 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import drift_of
+from models.pose import CLOCK, drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
+from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
-from service.estimation.last_poses import save_last_pose
-from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
-from service.store import cameras, estimates, events, references
-from service.store.estimates import EstimateRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import identifiable_drift
+from service.store import estimates, journal, references
+from service.store.cameras import CameraRecord
+from service.store.estimates import EstimateRecord, identifiable_drift
+from service.store.references import LastPoseRecord, SiteReferenceRecord
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
 
@@ -79,7 +77,7 @@ def save_estimate(
     what comes after a person has answered or was at the camera.
     """
     reference = _counting_reference(session, settings, evidence)
-    camera = cameras.find(session, evidence.camera_id)
+    camera = session.get(CameraRecord, evidence.camera_id)
     if reference is None or camera is None:
         return None
     drift = drift_of(finding.fused, evidence.prior)
@@ -98,16 +96,18 @@ def save_estimate(
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
         _update_alerts(session, settings, camera.id, drift, judgement)
-    camera.urgent = record.suspected or record.drift_streak > 0 or bool(record.drifted)
     session.add(record)
-    save_last_pose(session, reference.id, finding.last)
+    if finding.last is not None:
+        session.merge(finding.last)
+    elif (last := session.get(LastPoseRecord, reference.id)) is not None:
+        session.delete(last)
     payload = {
         "camera_id": record.camera_id,
         "state": record.state,
         "tracks": record.tracks,
         "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
     }
-    events.add(session, EventType.POSE, payload, record.created_at)
+    journal.add_event(session, EventType.POSE, payload, record.created_at)
     return record
 
 

@@ -1,6 +1,6 @@
-"""The input of an estimate, read in one transaction."""
+"""The input of an estimate, read in one transaction: tracks of so many people, and what else."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -11,32 +11,108 @@ from sqlalchemy.orm import Session
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import DriftLimits
+from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
 from service.alerts.alerts import fired_by_estimate
-from service.estimation.anchoring import Anchor, anchor_of
-from service.estimation.limits import drift_limits
-from service.estimation.people import Unpacked, until_so_many
-from service.references import made_against, window_of
+from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
-from service.store import (
-    alerts,
-    cameras,
-    estimates,
-    flow_maps,
-    references,
-    tracks,
-    trainings,
-    windows,
-)
-from service.store import predictions as stored_predictions
+from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
-from service.store.predictions import PredictionRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
-from service.store.stored_tracks import StoredTrack
+from service.store.references import (
+    AnchorRecord,
+    FlowMapRecord,
+    LastPoseRecord,
+    SiteReferenceRecord,
+)
+from service.store.tracks import StoredTrack, seen_of, trajectory_of
 from service.store.trainings import ModelRecord
+from service.store.windows import PredictionRecord, WindowBounds
+
+# The store may give a deleted track's number to a new one.
+_Track = tuple[int, datetime]
+
+
+class Unpacked:
+    """A cache of unpacked tracks; to be forgotten with the refresh."""
+
+    def __init__(self) -> None:
+        self._feet: dict[_Track, Trajectory] = {}
+        self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
+
+    def feet(self, record: StoredTrack) -> Trajectory:
+        """The foot points of a stored track."""
+        track = (record.id, record.received_at)
+        if track not in self._feet:
+            self._feet[track] = trajectory_of(record)
+        return self._feet[track]
+
+    def seen(self, record: StoredTrack, intrinsics: Intrinsics) -> Trajectory:
+        """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
+        track = (record.id, record.received_at)
+        lens, seen = self._seen.get(track, (None, None))
+        if seen is None or (lens is not intrinsics and lens != intrinsics):
+            seen = seen_of(record, self.feet(record), intrinsics)
+            self._seen[track] = (intrinsics, seen)
+        return seen
+
+
+_SPARE = 40
+MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked for an estimate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gathered:
+    """Tracks, and whether there are `enough`: of as many people as were wanted.
+
+    `before` is the piece before each of a walk, as of `link_pieces`; None where nobody looked.
+    """
+
+    records: Sequence[StoredTrack]
+    enough: bool
+    before: npt.NDArray[np.int64] | None = None
+
+
+def until_so_many(
+    load: Callable[[int], Sequence[StoredTrack]],
+    wanted: int,
+    intrinsics: Intrinsics,
+    prior: CameraPose,
+    unpacked: Unpacked,
+    *,
+    newest: bool = False,
+) -> Gathered:
+    """The fewest tracks that are of so many people; all that there are where these are too few.
+
+    One track more is never two people more, so that asking for as many more as are missing ends at
+    the same tracks whenever it is asked. Five times as many tracks as people do in any case.
+
+    Args:
+        load: the first so many tracks, or the newest.
+        wanted: people.
+        intrinsics: of the camera.
+        prior: about where it stands.
+        unpacked: what was unpacked already, and will be.
+        newest: whether the newest are loaded, which are the last in order; or the first.
+    """
+    limit, most = wanted, MOST_PIECES * wanted
+    loaded = limit + max(limit // _SPARE, 1)  # most trackers cut few walks: once is enough
+    every = load(loaded)
+    while True:
+        if limit > loaded:
+            loaded = limit
+            every = load(loaded)
+        if len(every) < limit:
+            return Gathered(records=every, enough=False)
+        records = every[-limit:] if newest else every[:limit]
+        before = link_pieces(
+            [unpacked.seen(record, intrinsics) for record in records], intrinsics, prior
+        )
+        walks = int((before < 0).sum())
+        if walks >= wanted or limit == most:
+            return Gathered(records=records, enough=True, before=before)
+        limit = min(limit + wanted - walks, most)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,19 +127,33 @@ class SeenTrack:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeptPose:
-    """A last pose as bytes, and the `basis` that it hangs on: the site and what is suspected."""
+class Anchor:
+    """The first map and chart of a reference, and its log of whole days.
 
-    basis: bytes
-    data: bytes
+    The log counts from `from_s` on: since then the camera has stood as it does, but for a creep.
+    """
+
+    record: AnchorRecord
+    from_s: float | None
+
+
+def anchor_of(
+    session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
+) -> Anchor | None:
+    """The anchor of a reference; None where there is none. `bounds` are those of its window."""
+    record = session.get(AnchorRecord, reference.id)
+    if record is None:
+        return None
+    since = [at for at in (bounds.started_from_s, bounds.ended_from_s) if at is not None]
+    return Anchor(record=record, from_s=max(since, default=None))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
-    `site` is the learned reference as bytes; None while it is being learned. So are `flow`, `chart`
-    and `anchor`; None where there is none. `predictions` has what the model in use says of the
+    `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
+    `chart`; None where there is none. `predictions` has what the model in use says of the
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `drifting` says that an alert tells of a drift by now. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
@@ -87,7 +177,7 @@ class Evidence:
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
     before: npt.NDArray[np.int64] | None = None
-    last: KeptPose | None = None
+    last: LastPoseRecord | None = None
 
 
 def load_evidence(
@@ -98,12 +188,12 @@ def load_evidence(
     Tracks that were `unpacked` already are not unpacked again.
     """
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None:
         return None
-    intrinsics = intrinsics_of(camera)
-    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    intrinsics = camera.intrinsics
+    prior = cameras.prior_pose(session, camera_id).pose
     bounds = window_of(session, reference, settings)
     gathered = until_so_many(
         lambda limit: windows.window(session, replace(bounds, tracks=limit)),
@@ -116,10 +206,20 @@ def load_evidence(
     records, model = gathered.records, trainings.newest_model(session, camera_id)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
         return None
-    kept = flow_maps.find(session, reference.id)
-    last = flow_maps.last_pose(session, reference.id)
+    kept = session.get(FlowMapRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
-    seen = [_seen(record, answered_at, intrinsics, unpacked) for record in records]
+    seen = [
+        SeenTrack(
+            pk=record.id,
+            unanswered=answered_at is None or record.received_at > answered_at,
+            started_s=record.started_s,
+            ended_s=record.ended_s,
+            trajectory=unpacked.seen(record, intrinsics),
+        )
+        for record in records
+    ]
+    pks = [record.id for record in records]
+    rows = () if model is None else windows.predictions(session, model.id, pks)
     return Evidence(
         camera_id=camera_id,
         reference_id=reference.id,
@@ -136,31 +236,10 @@ def load_evidence(
         limits=drift_limits(settings),
         drifting=bool(fired_by_estimate(session, camera_id)),
         model_id=None if model is None else model.id,
-        predictions=_predictions(session, model, records),
+        predictions=tuple(rows),
         before=gathered.before,
-        last=None if last is None else KeptPose(basis=last.basis, data=last.data),
+        last=session.get(LastPoseRecord, reference.id),
     )
-
-
-def _seen(
-    record: StoredTrack, answered_at: datetime | None, intrinsics: Intrinsics, unpacked: Unpacked
-) -> SeenTrack:
-    return SeenTrack(
-        pk=record.id,
-        unanswered=answered_at is None or record.received_at > answered_at,
-        started_s=record.started_s,
-        ended_s=record.ended_s,
-        trajectory=unpacked.seen(record, intrinsics),
-    )
-
-
-def _predictions(
-    session: Session, model: ModelRecord | None, records: Sequence[StoredTrack]
-) -> tuple[PredictionRecord, ...]:
-    if model is None:
-        return ()
-    pks = [record.id for record in records]
-    return tuple(stored_predictions.predictions(session, model.id, pks))
 
 
 def walk_of(camera: CameraRecord) -> WalkConfig:

@@ -1,26 +1,38 @@
-"""The computation of an estimate; no transaction is open meanwhile."""
+"""The computation of an estimate: no transaction is open; what fails beside it stops nobody."""
 
-from collections.abc import Sequence
+import hashlib
+import logging
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
-from models.monitoring.chart import ChartResult, chart_from_bytes
-from models.monitoring.config import CREEP_SHARE
-from models.paths.reference import paths_from_bytes
+from models.errors import CheckpointError
 from models.pose import (
+    CREEP_SHARE,
     AlarmRate,
     CameraSite,
+    ChartResult,
     Creep,
     FusedEstimate,
+    JointEstimate,
     Observations,
+    PartialFailure,
     SecondLook,
+    WarmStart,
     alarm_chart_result,
     assume_site,
+    chart_from_bytes,
     count_walks,
     estimate_pose,
     observe_walks,
+    paths_from_bytes,
+    reference_from_bytes,
+    unless_failed,
+    warm_start_from_bytes,
+    warm_start_to_bytes,
 )
 from models.reasons import Reason
 from models.regression.averaging import (
@@ -30,15 +42,49 @@ from models.regression.averaging import (
     averaged_estimate,
 )
 from models.walking.config import FEWEST_WALKERS
-from models.walking.estimate import JointEstimate
-from models.walking.speed_reference import reference_from_bytes
 from service.estimation.anchoring import creep_of, first_site
-from service.estimation.evidence import Evidence, KeptPose, SeenTrack
-from service.estimation.last_poses import basis_of, begin_of, kept_of
-from service.estimation.partial_failures import PartialFailures
-from service.estimation.people import MOST_PIECES
-from service.reasons import Reasons
-from service.store.predictions import PredictionRecord
+from service.estimation.evidence import MOST_PIECES, Evidence, SeenTrack
+from service.reasons import Reasons, ServiceCode
+from service.store.references import LastPoseRecord
+from service.store.windows import PredictionRecord
+
+log = logging.getLogger("surefoot.recalibration")
+
+_Made = TypeVar("_Made")
+
+
+class PartialFailures:
+    """The parts of a camera's estimate that could not be made; `reasons` say so."""
+
+    def __init__(self, camera_id: str) -> None:
+        self._camera_id = camera_id
+        self.reasons: list[Reason] = []
+
+    def unless_failed(self, part: str, make: Callable[[], _Made]) -> _Made | None:
+        """Something made; None if it failed. `part` names it in the log, `flow_map` say."""
+        found: list[PartialFailure] = []
+        made = unless_failed(found, part, make)
+        self.take(found)
+        return made
+
+    def take(self, found: Sequence[PartialFailure]) -> None:
+        """Log and say what failed."""
+        for failure in found:
+            fields = {"camera_id": self._camera_id}
+            if isinstance(failure.error, CheckpointError):
+                log.warning(
+                    f"{failure.part}_unreadable", extra=fields | {"why": str(failure.error)}
+                )
+                self.add(failure.part, "cannot be read")
+            else:
+                log.error(f"{failure.part}_failed", exc_info=failure.error, extra=fields)
+                self.add(failure.part, repr(failure.error))
+
+    def add(self, part: str, why: str) -> None:
+        """Say that something is missing, and why."""
+        reason = Reason(code=ServiceCode.WITHOUT_PART, values={"part": part, "why": why})
+        if reason not in self.reasons:
+            self.reasons.append(reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +109,7 @@ class Finding:
     change: SeenTrack | None
     pieces: Reason | None = None
     failures: Reasons = ()
-    last: KeptPose | None = None
+    last: LastPoseRecord | None = None
 
     @property
     def newest_pk(self) -> int:
@@ -71,10 +117,13 @@ class Finding:
         return max(track.pk for track in self.tracks)
 
 
-def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
+def compute_finding(
+    evidence: Evidence, seed: int, failures: PartialFailures | None = None
+) -> Finding | None:
     """The pose by all estimators, from the newest change on; None where too few people walk.
 
-    It begins at what was found of the camera last, if that may be.
+    It begins at what was found of the camera last, if that may be. `failures` are those of the look
+    so far, of which it has those of the finding from then on.
     """
     walks = observe_walks(
         [track.trajectory for track in evidence.tracks],
@@ -85,7 +134,7 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
     observed = walks.observations
     if observed.walkers < FEWEST_WALKERS:
         return None
-    failures = PartialFailures(evidence.camera_id)
+    failures = failures or PartialFailures(evidence.camera_id)
     site = _site_of(evidence, observed, failures)
     creep = failures.unless_failed(
         "anchor", partial(creep_of, evidence.anchor, evidence.alarms_a_year)
@@ -120,7 +169,40 @@ def compute_finding(evidence: Evidence, seed: int) -> Finding | None:
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         pieces=walks.reason,
         failures=tuple(failures.reasons),
-        last=kept_of(found.warm_start, basis),
+        last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
+    )
+
+
+def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
+    """A digest of an estimate's site and of what its chart suspects."""
+    parts = (
+        evidence.site,
+        evidence.flow,
+        evidence.anchor.record.flow if crept and evidence.anchor else b"",
+    )
+    named = (evidence.reference_id, evidence.intrinsics, evidence.prior, suspicious)
+    digest = hashlib.blake2b(repr(named).encode(), digest_size=16)
+    for part in parts:
+        digest.update(hashlib.blake2b(part or b"", digest_size=16).digest())
+    return digest.digest()
+
+
+def begin_of(kept: LastPoseRecord | None, basis: bytes) -> WarmStart | None:
+    """The pose that an estimate may begin at; None where there is none on the same basis.
+
+    One of another release cannot be read: that is as none.
+    """
+    if kept is None or kept.basis != basis:
+        return None
+    try:
+        return warm_start_from_bytes(kept.data)
+    except CheckpointError:
+        return None
+
+
+def _kept(evidence: Evidence, basis: bytes, found: WarmStart) -> LastPoseRecord:
+    return LastPoseRecord(
+        reference_id=evidence.reference_id, basis=basis, data=warm_start_to_bytes(found)
     )
 
 

@@ -15,29 +15,33 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.creep import creep_log_from_bytes
-from models.paths.reference import paths_from_bytes
-from models.pose import learn_site, observe, without_creep
-from models.pose.config import FEWEST_BESIDE
+from models.pose import (
+    FEWEST_BESIDE,
+    creep_log_from_bytes,
+    learn_site,
+    observe,
+    paths_from_bytes,
+    reference_from_bytes,
+    without_creep,
+)
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import reference_from_bytes
-from service.alerts.suspected_moves import SuspectedMove, suspected_moves
-from service.estimation.anchoring import Anchor, LearnedPaths, anchor_of, keep_anchor, paths_of
-from service.estimation.people import Unpacked
+from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
+from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import (
     Attendance,
+    SuspectedMove,
     attendance_of,
     is_before,
     made_against,
+    suspected_moves,
     window_beside,
     window_of,
 )
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, flow_maps, references, tracks, windows
-from service.store.flow_maps import FlowMapRecord
-from service.store.references import SiteReferenceRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
-from service.store.stored_tracks import StoredTrack
+from service.store import alerts, cameras, estimates, references, tracks, windows
+from service.store.cameras import CameraRecord
+from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
+from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
 
 _FEWEST_NEW = 50
@@ -48,9 +52,8 @@ _NEW_SHARE = 0.25  # of the tracks that the map was learned of
 class GrowthPeriod:
     """All that a map is to be learned of anew, in the order of the tracks' ends.
 
-    `weights` (N,) are what they count for. `kept` is the map that there is, as bytes, where all of
-    it is known to be still. `replaces` is when the map that there is was learned,
-    `spoilt` whether it has tracks in it of a time that is no longer known to be still.
+    `weights` (N,) are what they count for. `kept` is the map that there is, `spoilt` where it has
+    tracks in it of a time that is no longer known to be still.
     """
 
     reference_id: int
@@ -60,24 +63,23 @@ class GrowthPeriod:
     prior: CameraPose
     trajectories: tuple[Trajectory, ...]
     weights: Array
-    kept: bytes | None
+    kept: FlowMapRecord | None
+    spoilt: bool
     to_s: float
     taken_at: datetime
-    replaces: datetime | None
-    spoilt: bool
 
 
 def load_growth(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> GrowthPeriod | None:
     """The tracks to learn a camera's map anew of; None where it is to stay as it is."""
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is None:
         return None
     assert reference.to_s is not None
     assert reference.data is not None
-    kept = flow_maps.find(session, reference.id)
+    kept = session.get(FlowMapRecord, reference.id)
     moves = suspected_moves(session, settings, reference)
     attended = attendance_of(session, camera_id, datetime.now(UTC))
     judged = window_beside(attended, reference, settings)
@@ -87,22 +89,25 @@ def load_growth(
         return None
     to_s = found[-1].ended_s if found else reference.to_s
     weights = _faded(to_s - np.array([record.ended_s for record in found]), settings)
-    if kept is not None and not spoilt and weights.sum() < _still_counts(kept, to_s, settings):
+    if (
+        kept is not None
+        and not spoilt
+        and weights.sum() < kept.weight * _faded(to_s - kept.to_s, settings)
+    ):
         return None  # retention has deleted more than has come: the map knows more than they
-    intrinsics, unpacked = intrinsics_of(camera), unpacked or Unpacked()
+    intrinsics, unpacked = camera.intrinsics, unpacked or Unpacked()
     return GrowthPeriod(
         reference_id=reference.id,
         site=reference.data,
         anchor=anchor_of(session, reference, judged),
         intrinsics=intrinsics,
-        prior=pose_of_prior(cameras.prior_pose(session, camera_id)),
+        prior=cameras.prior_pose(session, camera_id).pose,
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in found),
         weights=weights,
-        kept=None if kept is None or spoilt else kept.data,
+        kept=kept,
+        spoilt=spoilt,
         to_s=to_s,
         taken_at=datetime.now(UTC),
-        replaces=None if kept is None else kept.learned_at,
-        spoilt=spoilt,
     )
 
 
@@ -140,10 +145,6 @@ def _still_tracks(
     return windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
 
 
-def _still_counts(kept: FlowMapRecord, to_s: float, settings: Settings) -> float:
-    return kept.weight * float(_faded(np.array(to_s - kept.to_s), settings))
-
-
 def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     """The map and the chart of a period; None where too few of its tracks walk.
 
@@ -153,11 +154,12 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         return None
     trajectories, weights = period.trajectories, period.weights
     anchor = period.anchor
-    if anchor is not None and anchor.log is not None:
-        log = creep_log_from_bytes(anchor.log)
+    if anchor is not None and anchor.record.creep is not None:
+        log = creep_log_from_bytes(anchor.record.creep)
         stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
         trajectories = tuple(track for track in stood if track is not None)
         weights = weights[[track is not None for track in stood]]
+    known = None if period.kept is None or period.spoilt else period.kept.data
     grown = learn_site(
         observe(trajectories, period.intrinsics, period.prior),
         period.intrinsics,
@@ -165,7 +167,7 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
         seed=seed,
         speed_reference=reference_from_bytes(period.site),
         weights=weights,
-        chosen=None if period.kept is None else paths_from_bytes(period.kept).bandwidths,
+        chosen=None if known is None else paths_from_bytes(known).bandwidths,
     )
     return paths_of(grown)
 
@@ -177,8 +179,8 @@ def save_growth(
     reference = references.newest_if_any(session, camera_id)
     if reference is None or reference.id != period.reference_id:
         return False
-    kept = flow_maps.find(session, reference.id)
-    if (None if kept is None else kept.learned_at) != period.replaces:
+    kept, before = session.get(FlowMapRecord, reference.id), period.kept
+    if (kept and kept.learned_at) != (before and before.learned_at):
         return False
     if learned is None and kept is not None and kept.data is not None and not period.spoilt:
         return False
@@ -192,7 +194,7 @@ def save_growth(
         learned_at=period.taken_at,
     )
     session.merge(grown)
-    anchor = flow_maps.anchor(session, reference.id)
+    anchor = session.get(AnchorRecord, reference.id)
     # The first map is kept; or, where tracks of a move are in it, this one in its place.
     if anchor is None or (period.spoilt and anchor.to_s > (reference.to_s or 0.0)):
         keep_anchor(session, reference.id, learned, to_s=period.to_s, learned_at=period.taken_at)
@@ -212,7 +214,7 @@ def _may_have_moved(
         return True
     if is_before(last.to_s, window_of(session, reference, settings)):
         return True  # somebody was at the camera, and nobody knows yet how it stands since
-    if last.drift_streak > 0 or last.drifted or last.suspected:
+    if last.suspects_move:
         return True
     if any(alerts.firing(session, reference.camera_id, kind) for kind in alerts.POSE_KINDS):
         return True
@@ -252,5 +254,5 @@ def _is_spoilt(
     )
 
 
-def _faded(age_s: Array, settings: Settings) -> Array:
-    return np.asarray(0.5 ** (age_s / (settings.flow_half_life_days * DAY_S)))
+def _faded(age_s: Array | float, settings: Settings) -> Array:
+    return np.asarray(0.5 ** (np.asarray(age_s) / (settings.flow_half_life_days * DAY_S)))

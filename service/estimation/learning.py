@@ -9,23 +9,21 @@ from sqlalchemy.orm import Session
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.pose import learn_site, observe
+from models.pose import CameraSite, learn_site, observe, reference_to_bytes
 from models.reasons import Reason, TracksCode
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from models.walking.speed_reference import SpeedReference, reference_to_bytes
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
-from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
-from service.estimation.evidence import walk_of
-from service.estimation.people import Unpacked, until_so_many
+from service.estimation.anchoring import keep_anchor, paths_of
+from service.estimation.evidence import Unpacked, until_so_many, walk_of
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
-from service.store import cameras, maintenance, references, windows
-from service.store.flow_maps import FlowMapRecord
-from service.store.serialization import intrinsics_of, pose_of_prior
+from service.store import cameras, references, windows
+from service.store.cameras import CameraRecord
+from service.store.references import FlowMapRecord
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -47,30 +45,22 @@ class ReferencePeriod:
     to_s: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LearnedReference:
-    """A reference as learned; `paths` are None where too few people walk."""
-
-    site: SpeedReference
-    paths: LearnedPaths | None
-
-
 def load_reference_period(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> ReferencePeriod | None:
     """The tracks to learn a camera's reference of; None as long as there are not enough."""
     unpacked = unpacked or Unpacked()
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
     if camera is None or reference is None or reference.ready_at is not None:
         return None
     now = datetime.now(UTC)
-    if maintenance.under_way(session, camera_id, now) is not None:
+    if references.maintenance_under_way(session, camera_id, now) is not None:
         return None  # what it doubts could not be told now
     wanted = wanted_tracks(reference, settings)
     attended = attendance_of(session, camera_id, now)
-    intrinsics = intrinsics_of(camera)
-    prior = pose_of_prior(cameras.prior_pose(session, camera_id))
+    intrinsics = camera.intrinsics
+    prior = cameras.prior_pose(session, camera_id).pose
     gathered = until_so_many(
         lambda limit: windows.first(
             session, camera_id, reference.from_s, limit, without=attended.spans
@@ -93,14 +83,13 @@ def load_reference_period(
     )
 
 
-def compute_reference(period: ReferencePeriod, seed: int) -> LearnedReference | None:
+def compute_reference(period: ReferencePeriod, seed: int) -> CameraSite | None:
     """The walkers and paths that are usual at the site; None where too few of the tracks walk."""
     observed = observe(period.trajectories, period.intrinsics, period.prior)
     try:
-        site = learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
+        return learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
-    return LearnedReference(site=site.speed_reference, paths=paths_of(site))
 
 
 def save_reference(
@@ -108,7 +97,7 @@ def save_reference(
     settings: Settings,
     camera_id: str,
     period: ReferencePeriod,
-    learned: LearnedReference | None,
+    learned: CameraSite | None,
 ) -> None:
     """Make a learned reference the one that counts, unless another has begun meanwhile.
 
@@ -120,7 +109,7 @@ def save_reference(
     if learned is None:
         record.wanted += max(record.wanted, 1)
         return
-    site = learned.site
+    site, paths = learned.speed_reference, paths_of(learned)
     record.to_s = period.to_s
     record.tracks = len(period.trajectories)
     record.data = reference_to_bytes(site)
@@ -132,15 +121,15 @@ def save_reference(
     session.add(
         FlowMapRecord(
             reference_id=record.id,
-            data=None if learned.paths is None else learned.paths.flow,
-            chart=None if learned.paths is None else learned.paths.chart,
+            data=None if paths is None else paths.flow,
+            chart=None if paths is None else paths.chart,
             tracks=record.tracks,
             weight=float(record.tracks),
             to_s=period.to_s,
             learned_at=record.ready_at,
         )
     )
-    keep_anchor(session, record.id, learned.paths, to_s=period.to_s, learned_at=record.ready_at)
+    keep_anchor(session, record.id, paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.implausible is not None:
         _warn(session, settings, camera_id, site.implausible)
 

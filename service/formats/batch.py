@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
@@ -20,6 +20,7 @@ from service.formats.track import (
     Rejection,
     TrackRejectedError,
     is_text,
+    refuse,
 )
 
 DEFAULT_SOURCE = "unnamed"
@@ -41,18 +42,18 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
     try:
         document = read_document(body)
     except (ValueError, RecursionError) as error:
-        raise malformed("", f"not JSON: {error}") from error
+        raise malformed(f"not JSON: {error}") from error
     if not isinstance(document, dict):
-        raise malformed("", f"an object with tracks is needed, got {type(document).__name__}")
+        raise malformed(f"an object with tracks is needed, got {type(document).__name__}")
     tracks = document.get("tracks")
     if not isinstance(tracks, list | TrackTexts):
-        raise malformed("/tracks", "a list of tracks is needed")
+        raise MalformedError.of_field("tracks", "a list of tracks is needed")
     check_count(len(tracks))
-    source = read_source(document.get("source", DEFAULT_SOURCE), "/source")
+    source = read_source(document.get("source", DEFAULT_SOURCE))
     rate, start = document.get("frame_rate_hz"), document.get("started_at")
     clock = Clock(
-        frame_rate_hz=clock.frame_rate_hz if rate is None else read_rate(rate, "/frame_rate_hz"),
-        started_at_s=clock.started_at_s if start is None else read_time(start, "/started_at"),
+        frame_rate_hz=clock.frame_rate_hz if rate is None else read_rate(rate),
+        started_at_s=clock.started_at_s if start is None else read_time(start),
     )
     try:
         return collect(
@@ -60,7 +61,7 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
             for index, raw in enumerate(tracks)
         )
     except (ValueError, RecursionError) as error:
-        raise malformed("", f"not JSON: {error}") from error
+        raise malformed(f"not JSON: {error}") from error
 
 
 def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch:
@@ -85,7 +86,7 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
     return collect(items())
 
 
-def read_source(value: Any, pointer: str) -> str:
+def read_source(value: Any) -> str:
     """The name of a tracker.
 
     Raises:
@@ -93,38 +94,40 @@ def read_source(value: Any, pointer: str) -> str:
     """
     if not isinstance(value, str) or not 1 <= len(value) <= MAX_ID_LENGTH or not is_text(value):
         reason = f"text of 1 to {MAX_ID_LENGTH} characters is needed, none of them NUL or half one"
-        raise malformed(pointer, reason)
+        raise MalformedError.of_field("source", reason)
     return value
 
 
-def read_rate(value: Any, pointer: str) -> float:
+def read_rate(value: Any) -> float:
     """A frame rate in Hz.
 
     Raises:
         MalformedError: no number above 0 and at most 1000.
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= 1000:
-        raise malformed(pointer, f"a number above 0 and at most 1000 is needed, got {value!r:.40}")
+        reason = f"a number above 0 and at most 1000 is needed, got {value!r:.40}"
+        raise MalformedError.of_field("frame_rate_hz", reason)
     return float(value)
 
 
-def read_time(value: Any, pointer: str) -> float:
-    """Seconds since the epoch of an RFC 3339 time with a zone, or of a number of seconds.
+def read_time(value: Any) -> float:
+    """The start in seconds since the epoch, of an RFC 3339 time with a zone or such a number.
 
     Raises:
         MalformedError: neither of the two.
     """
+    wrong = partial(MalformedError.of_field, "started_at")
     if isinstance(value, str):
         try:
             moment = datetime.fromisoformat(value)
         except ValueError as error:
-            raise malformed(pointer, f"RFC 3339 is needed: {error}") from error
+            raise wrong(f"RFC 3339 is needed: {error}") from error
         if moment.tzinfo is None:
-            raise malformed(pointer, f"a time with its zone is needed, got {value!r:.40}")
+            raise wrong(f"a time with its zone is needed, got {value!r:.40}")
         return moment.timestamp()
     # A whole number may be larger than any float.
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _FAR_S:
-        raise malformed(pointer, f"RFC 3339 or seconds since 1970 are needed, got {value!r:.40}")
+        raise wrong(f"RFC 3339 or seconds since 1970 are needed, got {value!r:.40}")
     return float(value)
 
 
@@ -141,28 +144,16 @@ def collect(
         except TrackRejectedError as refused:
             name = raw.get("id") if isinstance(raw, dict) else None
             known = isinstance(name, str | int) and not isinstance(name, bool)
+            text = str(name)[:MAX_ID_LENGTH].encode(errors="replace").decode()
             rejections.append(
                 Rejection(
                     index=index,
-                    track_id=_sendable(str(name)[:MAX_ID_LENGTH]) if known else None,
+                    track_id=text if known else None,
                     code=refused.code,
                     detail=refused.detail,
                 )
             )
     return Batch(tracks=tuple(tracks), rejections=tuple(rejections), left_out=left_out)
-
-
-def _sendable(text: str) -> str:
-    return text.encode("utf-8", errors="replace").decode()
-
-
-def refuse(detail: str) -> NoReturn:
-    """Refuse a track that cannot be read.
-
-    Raises:
-        TrackRejectedError: always.
-    """
-    raise TrackRejectedError("malformed", detail)
 
 
 def check_count(count: int) -> None:
@@ -175,9 +166,6 @@ def check_count(count: int) -> None:
         raise TooLargeError(f"tracks: at most {MAX_TRACKS} a request are taken, got {count}")
 
 
-def malformed(pointer: str, reason: str) -> MalformedError:
-    """The error of a body, or of a field of it, that cannot be read."""
-    return MalformedError(
-        "the body cannot be read" if not pointer else f"{pointer[1:]}: {reason}",
-        (FieldError(pointer=pointer, reason=reason),),
-    )
+def malformed(reason: str) -> MalformedError:
+    """The error of a body that cannot be read."""
+    return MalformedError("the body cannot be read", (FieldError(pointer="", reason=reason),))

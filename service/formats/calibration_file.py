@@ -11,9 +11,10 @@ import subprocess
 import sys
 import threading
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from service.errors import FieldError, MalformedError, OverloadedError
+from service.errors import MalformedError, OverloadedError
 
 MAX_BYTES = 1024 * 1024
 MAX_DEPTH = 32  # brackets or tags in each other; OpenCV itself writes 4
@@ -24,6 +25,7 @@ _READER = "service.formats.calibration_reader"
 
 _OPENING = re.compile(rb"(?P<open>[\[{]|<[A-Za-z_])|(?P<close>[\]}]|</|/>)")
 _INDENT = re.compile(rb"^[ \t\-?:]*", re.MULTILINE)
+_malformed = partial(MalformedError.of_field, "file")
 _free = threading.BoundedSemaphore(_AT_ONCE)
 
 
@@ -100,7 +102,3 @@ def _ask_reader(body: bytes, timeout_s: float) -> dict[str, Any]:
         raise _malformed("its reader said nothing that makes sense") from error
     assert isinstance(answer, dict)
     return answer
-
-
-def _malformed(reason: str) -> MalformedError:
-    return MalformedError(f"file: {reason}", (FieldError(pointer="/file", reason=reason),))

@@ -20,6 +20,7 @@ from service.formats.track import (
     TrackRejectedError,
     check_heads,
     check_track,
+    refuse,
     track_name,
 )
 
@@ -44,15 +45,11 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
             f"a track of at most {MAX_TRACK_CHARS} characters is taken, got {raw.characters}",
         )
     if not isinstance(raw, dict):
-        raise TrackRejectedError("malformed", f"a track is an object, got {type(raw).__name__}")
-    try:
-        _check_person(raw.get("class"))
-    except ValueError as error:
-        raise TrackRejectedError("malformed", str(error)) from error
+        refuse(f"a track is an object, got {type(raw).__name__}")
+    _check_person(raw.get("class"))
     given = [name for name in _FORMS if name in raw]
     if len(given) != 1:
-        raise TrackRejectedError(
-            "malformed",
+        refuse(
             f"one of points, boxes, frames, frame_boxes is needed, got {given or 'none'}",
         )
     form = given[0]
@@ -76,19 +73,19 @@ def _check_person(value: Any) -> None:
 
     Raises:
         NoPersonError: it is of something else.
-        ValueError: it is neither text nor a number.
+        TrackRejectedError: it is neither text nor a number.
     """
     if value is None:
         return
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise ValueError(f"class: text or a number is needed, got {value!r:.60}")
+        refuse(f"class: text or a number is needed, got {value!r:.60}")
     if not (value.strip().lower() in _NAMES if isinstance(value, str) else value in COCO_PEOPLE):
         raise NoPersonError
 
 
 def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
     if not isinstance(value, list):
-        raise TrackRejectedError("malformed", f"{form}: a list is needed, got {value!r:.60}")
+        refuse(f"{form}: a list is needed, got {value!r:.60}")
     if len(value) > MAX_POINTS:
         raise TrackRejectedError(
             "too_many_points", f"{form}: at most {MAX_POINTS} a track are taken, got {len(value)}"
@@ -103,9 +100,7 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
             needed = str(columns) if at else " or ".join(map(str, taken))
             if isinstance(row, list) and len(row) in taken:
                 needed += ", as in the first point: all points carry a head or none,"
-            raise TrackRejectedError(
-                "malformed", f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}"
-            )
+            refuse(f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}")
         for number in row:
             if isinstance(number, bool) or not isinstance(number, int | float):
                 # JSON has no NaN; some writers put null or a word in its place.

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from service.errors import FieldError, MalformedError, TooLargeError
-from service.formats.batch import check_count, collect, malformed, refuse
+from service.errors import MalformedError, TooLargeError
+from service.formats.batch import check_count, collect, malformed
 from service.formats.track import (
     COCO_PEOPLE,
     MAX_ID_LENGTH,
@@ -16,6 +16,7 @@ from service.formats.track import (
     IncomingTrack,
     Limits,
     check_track,
+    refuse,
     track_name,
 )
 
@@ -60,10 +61,10 @@ def read_mot(
         TooLargeError: too many lines or tracks.
     """
     if clock.frame_rate_hz is None or clock.started_at_s is None:
-        raise malformed("", "query: frame_rate_hz and started_at are needed with text/csv")
+        raise malformed("query: frame_rate_hz and started_at are needed with text/csv")
     lines = _read_lines(body)
     if lines.broken and not any(lines.rows[name] for name in lines.rows):
-        raise malformed("", f"not MOTChallenge text: {next(iter(lines.broken.values()))}")
+        raise malformed(f"not MOTChallenge text: {next(iter(lines.broken.values()))}")
     every = [row for rows in lines.rows.values() for row in rows]
     people = _people(every, classes)
     boxes: dict[str, list[list[float]]] = {}
@@ -100,7 +101,7 @@ def read_classes(text: str) -> frozenset[int]:
     """
     if not re.fullmatch(r"\d{1,6}(,\d{1,6}){0,99}", text, re.ASCII):
         reason = f"whole numbers with commas are needed, such as 0 or 1,7, got {text!r:.60}"
-        raise malformed("/classes", reason)
+        raise MalformedError.of_field("classes", reason)
     return frozenset(int(number) for number in text.split(","))
 
 
@@ -170,4 +171,4 @@ def _nobody(rows: list[list[float]], people: frozenset[float], *, given: bool) -
         f"no line is of a person: classes {wanted} are taken for people, got {len(rows)} lines of "
         f"classes {seen}; say with classes= which numbers are people; lines with conf 0 are ignored"
     )
-    return MalformedError(f"classes: {reason}", (FieldError(pointer="/classes", reason=reason),))
+    return MalformedError.of_field("classes", reason)

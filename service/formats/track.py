@@ -1,7 +1,7 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -93,6 +93,15 @@ class TrackRejectedError(Exception):
         self.detail = detail
 
 
+def refuse(detail: str) -> NoReturn:
+    """Refuse a track that cannot be read.
+
+    Raises:
+        TrackRejectedError: always.
+    """
+    raise TrackRejectedError("malformed", detail)
+
+
 def check_heads(rows: Array, size: tuple[int, int]) -> None:
     """Refuse heads of rows (N, 5), time, u, v, u and v of the head, that nobody carries.
 
@@ -103,8 +112,7 @@ def check_heads(rows: Array, size: tuple[int, int]) -> None:
     above = rows[:, 4] < rows[:, 2]
     if not above.all():
         at = int(np.argmin(above))
-        raise TrackRejectedError(
-            "malformed",
+        refuse(
             f"points/{at}/4: a head above its foot, v_head below {rows[at, 2]:g}, is needed, "
             f"got {rows[at, 4]:g}",
         )
@@ -146,9 +154,7 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
         upright = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1])
         if not upright.all():
             at = int(np.argmin(upright))
-            raise TrackRejectedError(
-                "malformed", f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}"
-            )
+            refuse(f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}")
         points = np.column_stack([time_s, (boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
     _check_inside(points[:, 1:], (limits.width, limits.height))
     return IncomingTrack(source=source, track_id=track_id, points=points, boxes=boxes)
@@ -161,18 +167,12 @@ def track_name(value: Any) -> str:
         TrackRejectedError: missing, neither text nor a whole number, empty or too long.
     """
     if isinstance(value, bool) or not isinstance(value, str | int):
-        raise TrackRejectedError(
-            "malformed", f"id: text or a whole number is needed, got {value!r:.60}"
-        )
+        refuse(f"id: text or a whole number is needed, got {value!r:.60}")
     name = str(value)
     if not 1 <= len(name) <= MAX_ID_LENGTH:
-        raise TrackRejectedError(
-            "malformed", f"id: 1 to {MAX_ID_LENGTH} characters are needed, got {len(name)}"
-        )
+        refuse(f"id: 1 to {MAX_ID_LENGTH} characters are needed, got {len(name)}")
     if not is_text(name):
-        raise TrackRejectedError(
-            "malformed", "id: text without NUL or half a surrogate pair is needed"
-        )
+        refuse("id: text without NUL or half a surrogate pair is needed")
     return name
 
 

@@ -38,7 +38,7 @@ class Attempt:
 
 def begin_run(session: Session, webhook_id: str) -> None:
     """Take the mark "a job waits" off a webhook: what is queued from now on queues its own."""
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is not None:
         webhook.job_queued_at = None
 
@@ -46,7 +46,7 @@ def begin_run(session: Session, webhook_id: str) -> None:
 def load_attempt(session: Session, settings: Settings, webhook_id: str) -> Attempt | None:
     """The next message to a webhook, if it is due."""
     now = datetime.now(UTC)
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is None or not _is_open(webhook, now):
         return None
     delivery = webhooks.next_due(session, webhook_id, now)
@@ -64,7 +64,7 @@ def load_attempt(session: Session, settings: Settings, webhook_id: str) -> Attem
 def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome: Outcome) -> None:
     """Write down what came of an attempt, and when the next one is."""
     delivery = session.get(DeliveryRecord, attempt.number)
-    webhook = webhooks.find(session, attempt.webhook_id)
+    webhook = session.get(WebhookRecord, attempt.webhook_id)
     if delivery is None or webhook is None:
         return  # deleted while it was sent
     session.add(
@@ -99,7 +99,7 @@ def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome
 def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Message | None:
     """All that fires, if an Alertmanager, which forgets, is to be told again now."""
     now = datetime.now(UTC)
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is None or not _is_open(webhook, now) or not _needs_refresh(settings, webhook, now):
         return None
     return all_firing(session, settings, webhook, now)
@@ -107,7 +107,7 @@ def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Messa
 
 def save_refresh(session: Session, settings: Settings, webhook_id: str, out: Outcome) -> None:
     """Write down when an Alertmanager was told; it has no row of its own in the log."""
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is None:
         return
     now = datetime.now(UTC)
@@ -121,7 +121,7 @@ def save_refresh(session: Session, settings: Settings, webhook_id: str, out: Out
 def end_run(session: Session, queue: JobQueue, webhook_id: str) -> None:
     """Queue another job where there is more to send than one may take on."""
     now = datetime.now(UTC)
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is not None and webhooks.next_due(session, webhook_id, now) is not None:
         wake(session, queue, webhook, now)
 
@@ -140,7 +140,7 @@ def awaited(session: Session, settings: Settings) -> list[str]:
 
 def reconcile_webhook(session: Session, queue: JobQueue, webhook_id: str) -> None:
     """Queue a delivery job, unless one waits."""
-    webhook = webhooks.find(session, webhook_id)
+    webhook = session.get(WebhookRecord, webhook_id)
     if webhook is not None:
         wake(session, queue, webhook, datetime.now(UTC))
 

@@ -1,20 +1,28 @@
-"""The requests that tell a webhook of a delivery: URL, headers, body."""
+"""The requests that tell a webhook of a delivery: URL, headers, body.
+
+An Alertmanager takes alerts as its v2 API says: `POST /api/v2/alerts`, a list of postableAlert.
+Labels are an alert's identity there. They are the same for its whole life but for `severity`, by
+which sites route: when that changes, the alert of the other severity is ended in the same request.
+Times and numbers are annotations.
+"""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
+from standardwebhooks import Webhook
 
-from service.enums import WebhookFormat
-from service.notifications.alertmanager import ended, postable_alerts, postable_test
-from service.notifications.keys import old_secret_of, secret_of
+from service.enums import Severity, WebhookFormat
+from service.notifications.keys import secret_of
 from service.notifications.outbox import alert_body, json_time
-from service.notifications.signing import signed_headers
 from service.settings import Settings
-from service.store import alerts, webhooks
+from service.store import webhooks
+from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
+from service.wording.alerts import TEST_ENDS, alert_summary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +47,9 @@ def message_of(
     body = _json(delivery.payload)
     secrets = [secret_of(settings, webhook) or ""]
     if webhook.old_secret and webhook.old_secret_until and webhook.old_secret_until > now:
-        secrets.append(old_secret_of(settings, webhook) or "")
+        secrets.append(secret_of(settings, webhook, old=True) or "")
     return Message(
-        url=webhook.url, body=body, headers=signed_headers(delivery.id, now, body, secrets)
+        url=webhook.url, body=body, headers=_signed_headers(delivery.id, now, body, secrets)
     )
 
 
@@ -68,7 +76,7 @@ def _stands(
     """
     if delivery.alert_id is None:
         return [postable_test(delivery.payload, json_time(now))]
-    record = alerts.find(session, delivery.alert_id)
+    record = session.get(AlertRecord, delivery.alert_id)
     body = delivery.payload["data"] if record is None else alert_body(record)
     if record is None or record.is_silenced(now):
         body = ended(body, json_time(now))
@@ -79,5 +87,90 @@ def _to_alertmanager(webhook: WebhookRecord, posted: list[dict[str, Any]]) -> Me
     return Message(url=f"{webhook.url.rstrip('/')}/api/v2/alerts", body=_json(posted))
 
 
+def _signed_headers(
+    message_id: str, at: datetime, body: str, signing_secrets: Sequence[str]
+) -> dict[str, str]:
+    """The headers of Standard Webhooks: several secrets give several signatures, for rotation."""
+    signatures = [Webhook(secret).sign(message_id, at, body) for secret in signing_secrets]
+    return {
+        "webhook-id": message_id,
+        "webhook-timestamp": str(int(at.timestamp())),
+        "webhook-signature": " ".join(signatures),
+    }
+
+
 def _json(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def postable_alerts(
+    body: dict[str, Any], public_url: str | None, *, changed: bool, at: str = ""
+) -> list[dict[str, Any]]:
+    """An alert, and those to end that have its name.
+
+    Args:
+        body: as of `GET /alerts/{id}`.
+        public_url: where people reach the service; makes `generatorURL`.
+        changed: whether its severity may have changed, so that the other one must be ended.
+        at: now, when the other one ends.
+    """
+    alert = _postable(body, body["severity"], public_url)
+    if not changed:
+        return [alert]
+    others = [severity for severity in Severity if severity != body["severity"]]
+    return [alert, *(_postable(ended(body, at), severity, public_url) for severity in others)]
+
+
+def ended(body: dict[str, Any], at: str) -> dict[str, Any]:
+    """The same alert, ended at a time if it has not before."""
+    return {**body, "resolved_at": body["resolved_at"] or at}
+
+
+def postable_test(payload: dict[str, Any], now: str) -> dict[str, Any]:
+    """A test alert that has ended as it comes: Alertmanager takes it and pages nobody."""
+    return {
+        "labels": {"alertname": "SurefootTest", "severity": "none"},
+        "annotations": {"summary": str(payload["data"]["text"]), "description": TEST_ENDS},
+        "startsAt": payload["timestamp"],
+        "endsAt": now,
+    }
+
+
+def alert_name(kind: str) -> str:
+    """`SurefootCameraNoData` of `no_data`."""
+    return "SurefootCamera" + "".join(part.capitalize() for part in kind.split("_"))
+
+
+def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> dict[str, Any]:
+    kind, camera_id = body["kind"], body["camera_id"]
+    labels = {"alertname": alert_name(kind), "kind": kind, "severity": severity}
+    if camera_id is not None:
+        labels["camera_id"] = camera_id
+    elif body.get("track_source"):  # of many cameras; another tracker's is another alert
+        labels["track_source"] = body["track_source"]
+    annotations = {
+        "summary": alert_summary(kind, camera_id, body.get("camera_ids"), body.get("track_source")),
+        "description": body["reason"],
+        "alert_id": body["id"],
+        **{f"drift_{name}": f"{value:g}" for name, value in _numbers(body["drift"]).items()},
+    }
+    for name in ("acknowledged_by", "outcome"):
+        if body[name]:
+            annotations[name] = body[name]
+    # The change is told by the camera's clock. An alert that ended before it began is refused.
+    started = min(body["changed_at"] or body["opened_at"], body["opened_at"])
+    alert = {"labels": labels, "annotations": annotations, "startsAt": started}
+    if body["resolved_at"]:
+        alert["endsAt"] = body["resolved_at"]
+    if public_url:
+        alert["generatorURL"] = f"{public_url.rstrip('/')}/alerts/{body['id']}"
+    return alert
+
+
+def _numbers(drift: dict[str, Any] | None) -> dict[str, float]:
+    values = (drift or {}).items()
+    return {
+        name: value
+        for name, value in values
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }

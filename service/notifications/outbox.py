@@ -11,8 +11,8 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from service.degrees import in_degrees
 from service.enums import DeliveryState, MessageType
-from service.formats.degrees import in_degrees
 from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
 from service.store.alerts import AlertRecord

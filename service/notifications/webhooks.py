@@ -13,14 +13,13 @@ from service.access.activity import note
 from service.enums import Activity, AlertKind, DeliveryState, MessageType, WebhookFormat
 from service.errors import ConflictError, FieldError, MalformedError, NotFoundError
 from service.job_queue import JobQueue
-from service.notifications.addresses import AddressError, check_url
-from service.notifications.keys import sealed_secret
+from service.notifications.keys import new_secret, sealed_secret
 from service.notifications.outbox import add_delivery, wake
-from service.notifications.signing import new_secret
+from service.notifications.send import AddressError, check_url
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import webhooks
-from service.store.webhooks import DeliveryAttemptRecord, DeliveryRecord, WebhookRecord
+from service.store.webhooks import Backlog, DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 
 OLD_SECRET_STAYS = timedelta(hours=24)
@@ -52,14 +51,6 @@ class SecretMade:
 
     record: WebhookRecord
     secret: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DeliveryView:
-    """A delivery and its attempts, oldest first."""
-
-    record: DeliveryRecord
-    attempts: tuple[DeliveryAttemptRecord, ...]
 
 
 def require_url(settings: Settings, url: str) -> None:
@@ -100,11 +91,8 @@ def create_webhook(session: Session, settings: Settings, spec: WebhookSpec) -> S
 
 def list_webhooks(session: Session) -> Sequence[WebhookView]:
     """All webhooks, oldest first."""
-    pending = webhooks.pending(session)
-    return [
-        WebhookView(record=record, pending=pending.get(record.id, 0))
-        for record in webhooks.every(session)
-    ]
+    backlogs = webhooks.backlogs(session)
+    return [_view(record, backlogs) for record in webhooks.every(session)]
 
 
 def show_webhook(session: Session, webhook_id: str) -> WebhookView:
@@ -113,8 +101,7 @@ def show_webhook(session: Session, webhook_id: str) -> WebhookView:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = _require(session, webhook_id)
-    return WebhookView(record=record, pending=webhooks.pending(session).get(webhook_id, 0))
+    return _view(_require(session, webhook_id), webhooks.backlogs(session))
 
 
 def change_webhook(
@@ -172,7 +159,7 @@ def remove_webhook(session: Session, webhook_id: str) -> None:
     session.delete(record)
 
 
-def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
+def test_webhook(session: Session, webhook_id: str) -> DeliveryRecord:
     """Queue a message of the type `test`.
 
     Raises:
@@ -185,26 +172,22 @@ def test_webhook(session: Session, webhook_id: str) -> DeliveryView:
     delivery = add_delivery(session, record, MessageType.TEST, data, datetime.now(UTC))
     _note(session, Activity.WEBHOOK_TESTED, record)
     session.flush()
-    return DeliveryView(record=delivery, attempts=())
+    return delivery
 
 
 def list_deliveries(
     session: Session, webhook_id: str, state: DeliveryState | None, limit: int
-) -> Sequence[DeliveryView]:
+) -> Sequence[DeliveryRecord]:
     """A webhook's deliveries, newest first.
 
     Raises:
         NotFoundError: there is no such webhook.
     """
     _require(session, webhook_id)
-    records = webhooks.log(session, webhook_id, state, limit)
-    attempts = webhooks.attempts_of(session, [record.number for record in records])
-    return [
-        DeliveryView(record=record, attempts=tuple(attempts[record.number])) for record in records
-    ]
+    return webhooks.log(session, webhook_id, state, limit)
 
 
-def show_delivery(session: Session, delivery_id: str) -> DeliveryView:
+def show_delivery(session: Session, delivery_id: str) -> DeliveryRecord:
     """A delivery with its attempts.
 
     Raises:
@@ -213,27 +196,25 @@ def show_delivery(session: Session, delivery_id: str) -> DeliveryView:
     record = webhooks.find_delivery(session, delivery_id)
     if record is None:
         raise NotFoundError(f"delivery_id: there is no delivery {delivery_id!r}")
-    attempts = webhooks.attempts_of(session, [record.number])[record.number]
-    return DeliveryView(record=record, attempts=tuple(attempts))
+    return record
 
 
-def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> DeliveryView:
+def replay_delivery(session: Session, queue: JobQueue, delivery_id: str) -> DeliveryRecord:
     """Send a delivery anew and at once, under its id; if that fails, its retries begin anew.
 
     Raises:
         NotFoundError: there is none of that id.
         ConflictError: its webhook is disabled.
     """
-    view = show_delivery(session, delivery_id)
-    webhook = _require_enabled(session, view.record.webhook_id)
+    record = show_delivery(session, delivery_id)
+    webhook = _require_enabled(session, record.webhook_id)
     now = datetime.now(UTC)
-    record = view.record
     record.state, record.tries, record.finished_at = DeliveryState.PENDING, 0, None
     record.next_attempt_at = record.queued_at = now
     webhook.held_until = None
     _note(session, Activity.WEBHOOK_REPLAYED, webhook)
     wake(session, queue, webhook, now)
-    return view
+    return record
 
 
 def _note(
@@ -244,8 +225,13 @@ def _note(
     note(session, what, by=None, subject_id=record.id, details=details)
 
 
+def _view(record: WebhookRecord, backlogs: dict[str, Backlog]) -> WebhookView:
+    backlog = backlogs.get(record.id)
+    return WebhookView(record=record, pending=0 if backlog is None else backlog.count)
+
+
 def _require(session: Session, webhook_id: str) -> WebhookRecord:
-    record = webhooks.find(session, webhook_id)
+    record = session.get(WebhookRecord, webhook_id)
     if record is None:
         raise NotFoundError(f"webhook_id: there is no webhook {webhook_id!r}")
     return record

@@ -1,15 +1,20 @@
-"""A data directory that may be in use, written to one checked archive."""
+"""A data directory that may be in use, written to one checked archive that describes itself."""
 
 import fcntl
+import hashlib
 import io
+import json
 import os
 import shutil
+import sqlite3
 import tarfile
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import IO
 
 from models.regression.recipe import weights_path
 from service.data_dir import (
@@ -22,22 +27,83 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
-from service.notifications.keys import require_openable
-from service.notifications.sealing import sealer_of
-from service.operations.manifest import (
-    FORMAT,
-    MANIFEST,
-    Manifest,
-    Member,
-    hash_file,
-    hash_stream,
-    read_manifest,
-    release,
-    sqlite_version,
-)
+from service.notifications.keys import require_openable, sealer_of
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+_CHUNK = 2**20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """A file of a backup: its name there and in the data directory."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """The first member of the archive. `key` is where the key is, if there is one."""
+
+    format: int
+    release: str
+    revision: str
+    sqlite: str
+    made_at: str
+    key: str  # archive, environment, none
+    key_id: str
+    missing_weights: list[str]
+    members: list[Member]
+
+
+def read_manifest(data: bytes) -> Manifest:
+    """The manifest of an archive.
+
+    Raises:
+        StartError: it is none, or of a later format.
+    """
+    try:
+        fields = json.loads(data)
+        if fields["format"] > FORMAT:
+            raise StartError(
+                f"backup: its format is {fields['format']}, this release reads up to {FORMAT}; "
+                "restore with the release that wrote it"
+            )
+        members = [Member(**member) for member in fields.pop("members")]
+        return Manifest(**fields, members=members)
+    except (ValueError, KeyError, TypeError) as error:
+        raise StartError(f"backup: its manifest cannot be read ({error!r})") from error
+
+
+def release() -> str:
+    """The version that runs."""
+    try:
+        return version("surefoot")
+    except PackageNotFoundError:  # run out of a checkout
+        return "unknown"
+
+
+def hash_file(path: Path) -> Member:
+    """A file's size and hash under its own name."""
+    with path.open("rb") as file:
+        return hash_stream(path.name, file)
+
+
+def hash_stream(name: str, source: IO[bytes], target: IO[bytes] | None = None) -> Member:
+    """Size and hash of what a stream has, which is copied to another if there is one."""
+    digest, size = hashlib.sha256(), 0
+    while chunk := source.read(_CHUNK):
+        digest.update(chunk)
+        size += len(chunk)
+        if target is not None:
+            target.write(chunk)
+    return Member(name=name, size=size, sha256=digest.hexdigest())
+
 
 Progress = Callable[[str, int, int], None]  # what, done, total
 _TRIES = 3
@@ -140,7 +206,7 @@ def _describe(settings: Settings, scratch: Path, missing: list[str]) -> Manifest
         format=FORMAT,
         release=release(),
         revision=files.revision(database) or "",
-        sqlite=sqlite_version(),
+        sqlite=sqlite3.sqlite_version,
         made_at=datetime.now(UTC).isoformat(timespec="seconds"),
         key=key,
         key_id=key_id,
@@ -153,7 +219,7 @@ def _pack(manifest: Manifest, scratch: Path, partial: Path, on_progress: Progres
     handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "wb") as file:
         with tarfile.open(fileobj=file, mode="w", format=tarfile.PAX_FORMAT) as tar:
-            description = manifest.to_json()
+            description = json.dumps(asdict(manifest), indent=1).encode()
             tar.addfile(_header(MANIFEST, len(description)), io.BytesIO(description))
             for number, member in enumerate(manifest.members):
                 on_progress("writing", number, len(manifest.members))

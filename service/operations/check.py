@@ -19,9 +19,8 @@ from service.data_dir import (
     strangers_in,
 )
 from service.job_queue import ENGINE_TABLES
-from service.notifications.keys import require_openable
-from service.notifications.sealing import sealer_of
-from service.operations.manifest import hash_file
+from service.notifications.keys import require_openable, sealer_of
+from service.operations.backup import hash_file
 from service.operations.restore import READY
 from service.settings import Settings
 from service.store.engines import files
@@ -87,8 +86,7 @@ def repair_weights(settings: Settings) -> int:
 
 def _in_use(folder: Path) -> Finding:
     users = running_in(folder)
-    detail = f"in use by {', '.join(users)}" if users else "nothing uses it"
-    return Finding(what="use", verdict=Verdict.OK, detail=detail)
+    return _noted("use", "", f"in use by {', '.join(users)}" if users else "nothing uses it")
 
 
 def _database(path: Path) -> Iterator[Finding]:
@@ -99,12 +97,8 @@ def _database(path: Path) -> Iterator[Finding]:
     revision, newest = files.revision(path), known_revisions()[0]
     try:
         require_known(revision, path.name)
-        current = revision == newest
-        yield Finding(
-            what="schema",
-            verdict=Verdict.OK if current else Verdict.NOTE,
-            detail=revision or "none" if current else f"{revision}: the next start migrates it",
-        )
+        old = "" if revision == newest else f"{revision}: the next start migrates it"
+        yield _noted("schema", old, newest)
     except StartError as error:
         yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
     missing = sorted(set(ENGINE_TABLES) - files.tables(path))
@@ -126,11 +120,7 @@ def _weights(settings: Settings) -> Iterator[Finding]:
         if path.name.split(".")[0] not in named.values() and path.stat().st_mtime < hour_ago
     ]
     detail = f"{len(unused)} files that no model names; retention deletes them"
-    yield Finding(
-        what="unused weights",
-        verdict=Verdict.NOTE if unused else Verdict.OK,
-        detail=detail if unused else "none",
-    )
+    yield _noted("unused weights", detail if unused else "", "none")
 
 
 def _broken_models(settings: Settings) -> dict[str, str]:
@@ -152,7 +142,7 @@ def _key(settings: Settings, path: Path) -> Finding:
             require_openable(sealer_of(settings), secrets)
     except StartError as error:
         return Finding(what="key", verdict=Verdict.FAULT, detail=str(error))
-    return Finding(what="key", verdict=Verdict.OK, detail=f"opens {len(secrets)} secrets")
+    return _noted("key", "", f"opens {len(secrets)} secrets")
 
 
 def _modes(folder: Path) -> Finding:
@@ -162,21 +152,15 @@ def _modes(folder: Path) -> Finding:
         if not path.is_symlink() and stat.S_IMODE(path.stat().st_mode) & 0o077
     ]
     detail = f"others may read {', '.join(wide[:5])}; the next start changes what is ours"
-    return Finding(
-        what="modes",
-        verdict=Verdict.NOTE if wide else Verdict.OK,
-        detail=detail if wide else "all is its user's alone",
-    )
+    return _noted("modes", detail if wide else "", "all is its user's alone")
 
 
 def _space(settings: Settings) -> Finding:
     free = shutil.disk_usage(settings.data_dir).free
     wanted = max(_LEAST_FREE, float(files.size(settings.database_path)))
-    few = free < wanted
     detail = f"{megabytes(free)} free"
-    if few:
-        detail += f"; a migration or backup needs about {megabytes(int(wanted))}"
-    return Finding(what="space", verdict=Verdict.NOTE if few else Verdict.OK, detail=detail)
+    few = f"{detail}; a migration or backup needs about {megabytes(int(wanted))}"
+    return _noted("space", few if free < wanted else "", detail)
 
 
 def _left_over(folder: Path) -> Finding:
@@ -186,18 +170,17 @@ def _left_over(folder: Path) -> Finding:
         for path in folder.glob(pattern)
     )
     if (folder / READY).exists():
-        detail = "a restore was cut off; the next start ends it"
-        return Finding(what="left over", verdict=Verdict.NOTE, detail=detail)
+        return _noted("left over", "a restore was cut off; the next start ends it", "")
     found += strangers_in(folder)
-    return Finding(
-        what="left over",
-        verdict=Verdict.NOTE if found else Verdict.OK,
-        detail=f"not in use: {', '.join(found[:5])}" if found else "nothing",
-    )
+    return _noted("left over", f"not in use: {', '.join(found[:5])}" if found else "", "nothing")
+
+
+def _noted(what: str, note: str, well: str) -> Finding:
+    return Finding(what=what, verdict=Verdict.NOTE if note else Verdict.OK, detail=note or well)
 
 
 def _finding(what: str, wrong: list[str], well: str, before: str = "") -> Finding:
     if not wrong:
-        return Finding(what=what, verdict=Verdict.OK, detail=well)
+        return _noted(what, "", well)
     more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
     return Finding(what=what, verdict=Verdict.FAULT, detail=f"{before}{'; '.join(wrong[:3])}{more}")

@@ -1,15 +1,19 @@
-"""The readiness of the service, as `/readyz` and its page say it."""
+"""The health of the service: its readiness, as `/readyz` says it, and the metrics of a moment."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 
+from service.cameras.status import CameraStatus, camera_statuses
+from service.enums import TrainingState
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store import cameras, tracks, workers
+from service.store import cameras, fleet, journal, tracks, trainings, webhooks, workers
+from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import now_in
 from service.store.engines.failures import failure_of
@@ -30,13 +34,13 @@ class Readiness:
     looked at.
     """
 
-    store_writable: bool
-    worker_alive: bool
-    worker_silent_s: float | None
-    queue_lag_s: float
-    failing_cameras: int
-    ready: bool
     problems: tuple[str, ...]
+    store_writable: bool = False
+    worker_alive: bool = False
+    worker_silent_s: float | None = None
+    queue_lag_s: float = 0.0
+    failing_cameras: int = 0
+    ready: bool = False
 
 
 def check_readiness(store: Store, settings: Settings) -> Readiness:
@@ -46,8 +50,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         with store.write("probe/") as session:
             workers.write_probe(session, now)
         with store.read() as session:
-            heartbeat, asked = workers.newest_heartbeat(session), now_in(session)
-            troubles = workers.troubles(session)
+            known, asked = workers.every(session), now_in(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
             came = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
@@ -55,6 +58,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         return _unwritable(error)
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
     # A heartbeat of the future is one of before the clock was set back: no sign of life either.
+    heartbeat = max((each.heartbeat_at for each in known if not each.lost), default=None)
     silent_s = None if heartbeat is None else abs((asked - heartbeat).total_seconds())
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     # Who fails is named below, and rests between its tries: it does not hold up the queue.
@@ -66,7 +70,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         )
     if 2 * len(failing) > count:
         problems.append(f"estimates: they fail for {len(failing)} of {count} cameras")
-    named = [f"worker: {name} {trouble}" for name, trouble in troubles.items()]
+    named = [f"worker: {each.name} {each.trouble}" for each in known if each.trouble is not None]
     return Readiness(
         store_writable=free_mb >= _FULL_MB,
         worker_alive=alive,
@@ -81,15 +85,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
 def _unwritable(error: SQLAlchemyError | OverloadedError) -> Readiness:
     known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
     detail = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
-    return Readiness(
-        store_writable=False,
-        worker_alive=False,
-        worker_silent_s=None,
-        queue_lag_s=0.0,
-        failing_cameras=0,
-        ready=False,
-        problems=(detail if detail.startswith("store: ") else f"store: {detail}",),
-    )
+    return Readiness(problems=(detail if detail.startswith("store: ") else f"store: {detail}",))
 
 
 def _disk_problems(settings: Settings, free_mb: float) -> list[str]:
@@ -119,3 +115,79 @@ def _failing_cameras(failing: dict[str, CameraRecord]) -> list[str]:
 
 def _oldest_s(received: Sequence[datetime], now: datetime) -> float:
     return max(((now - at).total_seconds() for at in received), default=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WebhookMetrics:
+    """A webhook: what waits for it, how long it has, and how long it has been failing."""
+
+    webhook_id: str
+    name: str
+    enabled: bool
+    pending: int
+    oldest_s: float
+    failing_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metrics:
+    """Everything at one moment, with the alerts that fire.
+
+    Heartbeats are seconds since the Unix epoch. `unseen_s` is the age of the oldest track of a
+    camera that nothing has looked at, where there is one; `failing` are the cameras whose last look
+    failed.
+    """
+
+    at: datetime
+    cameras: Collection[CameraStatus]
+    alerts: Sequence[AlertRecord]
+    webhooks: tuple[WebhookMetrics, ...]
+    trainings: dict[TrainingState, int]
+    heartbeats_s: dict[str, float]
+    worker_starts: dict[str, int]
+    unseen_s: dict[str, float]
+    failing: tuple[str, ...]
+    queue_lag_s: float
+    events: int
+
+
+def load_metrics(session: Session, settings: Settings) -> Metrics:
+    """The metrics now, by a dozen statements for all cameras."""
+    now = datetime.now(UTC)
+    unseen_s = {
+        camera_id: max((now - at).total_seconds(), 0.0)
+        for camera_id, (_, at) in tracks.unseen_since(session).items()
+    }
+    known = workers.every(session)
+    return Metrics(
+        at=now,
+        cameras=camera_statuses(session, settings).values(),
+        alerts=[*fleet.firing(session, None), *fleet.firing_groups(session)],
+        webhooks=_webhooks(session, now),
+        trainings=trainings.count_by_state(session),
+        heartbeats_s={worker.name: worker.heartbeat_at.timestamp() for worker in known},
+        worker_starts={worker.name: worker.starts for worker in known},
+        unseen_s=unseen_s,
+        failing=tuple(camera.id for camera in cameras.failing(session)),
+        queue_lag_s=max(unseen_s.values(), default=0.0),
+        events=journal.newest_event_id(session),
+    )
+
+
+def _webhooks(session: Session, now: datetime) -> tuple[WebhookMetrics, ...]:
+    backlogs = webhooks.backlogs(session)
+    found = []
+    for record in webhooks.every(session):
+        backlog = backlogs.get(record.id)
+        failing = record.failing_since
+        found.append(
+            WebhookMetrics(
+                webhook_id=record.id,
+                name=record.name,
+                enabled=record.enabled,
+                pending=0 if backlog is None else backlog.count,
+                oldest_s=0.0 if backlog is None else (now - backlog.oldest_at).total_seconds(),
+                failing_s=0.0 if failing is None else (now - failing).total_seconds(),
+            )
+        )
+    return tuple(found)

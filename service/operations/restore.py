@@ -21,13 +21,12 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
-from service.notifications.keys import require_openable
-from service.notifications.sealing import read_key_file, sealer_of
-from service.operations.backup import Progress
-from service.operations.manifest import (
+from service.notifications.keys import read_key_file, require_openable, sealer_of
+from service.operations.backup import (
     MANIFEST,
     Manifest,
     Member,
+    Progress,
     hash_file,
     hash_stream,
     read_manifest,
@@ -88,7 +87,10 @@ def restore_backup(
             except BaseException:
                 shutil.rmtree(unpacked)
                 raise
-            return Restored(manifest=manifest, replaced=_commit(unpacked, folder))
+            # It decides: cut off before it, nothing has changed; after it, the next start goes on.
+            unpacked.rename(folder / READY)
+            sync_folder(folder)
+            return Restored(manifest=manifest, replaced=finish_restore(folder))
 
 
 def _unpack(archive: Path, folder: Path, on_progress: Progress) -> Manifest:
@@ -164,16 +166,6 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         sealer = read_key_file(folder / KEY_FILE) if in_archive else sealer_of(settings)
         require_openable(sealer, secrets)
     on_progress("checking", 1, 1)
-
-
-def _commit(unpacked: Path, folder: Path) -> Path | None:
-    """Put what was unpacked in the place of what is there; returns where that was moved to.
-
-    The renaming decides: cut off before it, nothing has changed; after it, the next start goes on.
-    """
-    unpacked.rename(folder / READY)
-    sync_folder(folder)
-    return finish_restore(folder)
 
 
 def finish_restore(folder: Path) -> Path | None:

@@ -1,1 +1,1 @@
-"""The operators' pages: what they read, drawings, routes, templates, static files."""
+"""The operators' pages: routes with what they read, drawings, templates, static files."""

@@ -1,14 +1,19 @@
 """The drawings of a camera's page: the picture plane and the ground, by both poses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
 
+from models.geometry.ground import Misplacement
 from models.geometry.rotation import Array
-from service.pages.camera_page import CameraPage
+from models.tracks.trajectory import Trajectory
+from service.cameras.cameras import CameraView
+from service.cameras.poses import PoseView
 from service.pages.drawings.ground_plan import ground_plan_svg
 from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
+from service.store.cameras import SnapshotRecord
 
 _POINTS = 24
 
@@ -25,25 +30,31 @@ class CameraDrawings:
     horizon: bool
 
 
-def draw_camera(page: CameraPage) -> CameraDrawings:
+def draw_camera(
+    camera: CameraView,
+    served: PoseView,
+    tracks: Sequence[Trajectory],
+    misplaced: Sequence[Misplacement],
+    still: SnapshotRecord | None,
+) -> CameraDrawings:
     """The picture plane and the ground from above, with the newest tracks.
 
     The served pose is drawn where the tracks tell one; until then there is the prior pose alone.
     """
-    lens, prior = page.camera.intrinsics, page.camera.prior_pose
-    overlays = [Overlay(pose=prior, kind="prior")]
-    if page.pose.identifiable:
-        overlays.append(Overlay(pose=page.pose.pose, kind="served"))
+    lens = camera.intrinsics
+    overlays = [Overlay(pose=camera.prior_pose, kind="prior")]
+    if served.status.identifiable:
+        overlays.append(Overlay(pose=served.pose, kind="served"))
     # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
     ground = ground_of(lens, overlays[-1].pose)
-    feet = [_fewer(track.uv) for track in page.tracks]
+    feet = [_fewer(track.uv) for track in tracks]
     people = f"the feet of {len(feet)} people" if feet else "nobody yet"
     both = (
         "the prior pose, dashed, and the served pose, solid" if len(overlays) > 1 else "the prior"
     )
     snapshot = None
-    if page.snapshot is not None:
-        snapshot = f"/cameras/{page.camera.record.id}/snapshot?v={page.snapshot.sha256[:12]}"
+    if still is not None:
+        snapshot = f"/cameras/{camera.record.id}/snapshot?v={still.sha256[:12]}"
     return CameraDrawings(
         picture=picture_svg(
             lens,
@@ -57,7 +68,7 @@ def draw_camera(page: CameraPage) -> CameraDrawings:
             lens,
             overlays,
             feet,
-            page.misplaced,
+            misplaced,
             label=f"The ground from above with {people} and what the camera sees of it by {both}.",
         ),
         spacing_m=None if ground is None else ground.spacing_m,

@@ -1,26 +1,32 @@
-"""The lines of the fleet page: every camera in one, those that need a person first."""
+"""`/`: the fleet page, every camera in a line, those that need a person first; and its parts."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from typing import Annotated, Any
 
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
 from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
+from service.api.middleware.dependencies import AppState, ReadDep, StateDep
+from service.api.middleware.pages import render
+from service.api.schemas import Text
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, Severity
-from service.estimation.limits import drift_limits
 from service.pages.drawings.sparkline import sparkline
-from service.references import tracks_so_far, wanted_tracks
+from service.references import drift_limits, tracks_so_far, wanted_tracks
 from service.settings import Settings
-from service.store import fleet
+from service.store import fleet, journal
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.trainings import TrainingRecord
-from service.wording.camera import STATES, fleet_flags, fleet_line
-from service.wording.times import from_seconds
+from service.wording.camera import STATES, fleet_alert_flags, fleet_flags, fleet_line
+from service.wording.reasons import group_in_words
+from service.wording.times import Clock, from_seconds
 
 _HISTORY = 24  # estimates of a sparkline
 # How soon a camera without an alert needs a person.
@@ -189,12 +195,6 @@ def list_groups(session: Session) -> list[FleetGroup]:
     ]
 
 
-def counts_of(rows: Sequence[FleetRow]) -> list[tuple[PoseState, str, int]]:
-    """Each state with its word and how many cameras are in it."""
-    count = Counter(row.state for row in rows)
-    return [(state, word, count[state]) for state, word in STATES.items()]
-
-
 def _sure_drift(estimate: EstimateRecord | None) -> Drift | None:
     """The drift with what is sure enough to be said: beyond 2 sd, or found to drift."""
     if estimate is None or not estimate.identifiable:
@@ -203,3 +203,54 @@ def _sure_drift(estimate: EstimateRecord | None) -> Drift | None:
     known = {name: drift.of(name) for name in drift.identifiable}
     sure = [name for name, (by, sd) in known.items() if name in drifted or abs(by) > 2 * sd]
     return replace(drift, identifiable=tuple(sure))
+
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/")
+def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
+    """Every camera, what needs a person first."""
+    # What happens from here on is an event that the page asks for, even if it is in here too.
+    newest = journal.newest_event_id(session)
+    cameras = list_fleet(session, state.settings)
+    count = Counter(camera.state for camera in cameras)
+    return render(
+        request,
+        "fleet.html",
+        newest_event=newest,
+        counts=[(each, word, count[each]) for each, word in STATES.items()],
+        urgent=count[PoseState.DRIFTING],
+        rows=cameras,
+        groups=list_groups(session),
+        **_words(state),
+    )
+
+
+@router.get("/ui/fleet/rows")
+def rows(
+    request: Request,
+    state: StateDep,
+    session: ReadDep,
+    ids: Annotated[Text | None, Query(max_length=20_000)] = None,
+) -> HTMLResponse:
+    """The rows of some cameras, or of all; one that is gone has none."""
+    wanted = None if ids is None else set(ids.split(","))
+    found = list_fleet(session, state.settings, wanted)
+    return render(request, "_fleet_rows.html", rows=found, **_words(state))
+
+
+@router.get("/ui/fleet/banners")
+def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
+    """The alerts that blame trackers."""
+    return render(request, "_fleet_banners.html", groups=list_groups(session), **_words(state))
+
+
+def _words(state: AppState) -> dict[str, Any]:
+    """The words that the templates say times, states and alerts with."""
+    return dict(
+        clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
+        states=STATES,
+        in_words=group_in_words,
+        flags_of=fleet_alert_flags,
+    )

@@ -1,24 +1,19 @@
-"""The store: each concern's tables with their statements, and every SQL statement there is.
+"""The store: each concern's tables with their statements, and all SQL but that of the job engine's.
 
 All tables are known as soon as one is, for a key may name any of them.
 """
 
 from service.store import (  # noqa: F401
     access,
-    activity,
     alerts,
     cameras,
     estimates,
-    events,
-    flow_maps,
-    maintenance,
-    predictions,
+    journal,
     references,
-    rhythms,
-    snapshots,
     sources,
-    stored_tracks,
+    tracks,
     trainings,
     webhooks,
+    windows,
     workers,
 )

@@ -40,11 +40,6 @@ class SessionRecord(Record):
     __table_args__ = (Index(None, "token_id"), Index(None, "expires_at"))
 
 
-def find(session: Session, token_id: str) -> TokenRecord | None:
-    """The token, or None."""
-    return session.get(TokenRecord, token_id)
-
-
 def every(session: Session) -> Sequence[TokenRecord]:
     """All tokens, oldest first."""
     query = select(TokenRecord).order_by(TokenRecord.created_at, TokenRecord.id)

@@ -20,13 +20,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
-from service.enums import (
-    AlertKind,
-    AlertSource,
-    AlertState,
-    Outcome,
-    Severity,
-)
+from service.enums import AlertKind, AlertSource, AlertState, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
@@ -127,11 +121,6 @@ class AlertFilter:
     silenced: bool | None = None
 
 
-def find(session: Session, alert_id: str) -> AlertRecord | None:
-    """The alert, or None."""
-    return session.get(AlertRecord, alert_id)
-
-
 def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert of a camera and kind, or None."""
     return session.scalars(_FIRING, {"camera": camera_id, "kind": kind}).first()
@@ -139,15 +128,8 @@ def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | N
 
 def firing_cameras(session: Session, kind: AlertKind) -> set[str]:
     """The cameras about which an alert of a kind is open."""
-    return set(
-        session.scalars(
-            select(AlertRecord.camera_id).where(
-                AlertRecord.kind == kind,
-                AlertRecord.state == AlertState.FIRING,
-                AlertRecord.camera_id.is_not(None),
-            )
-        )
-    )
+    found = session.scalars(_all_firing(AlertRecord.kind == kind))
+    return {record.camera_id for record in found if record.camera_id is not None}
 
 
 def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
@@ -223,13 +205,9 @@ def listed(
     session: Session, wanted: AlertFilter, now: datetime, limit: int
 ) -> Sequence[AlertRecord]:
     """Alerts, newest first."""
-    query = select(AlertRecord)
-    if wanted.state is not None:
-        query = query.where(AlertRecord.state == wanted.state)
-    if wanted.camera_id is not None:
-        query = query.where(AlertRecord.camera_id == wanted.camera_id)
-    if wanted.group_id is not None:
-        query = query.where(AlertRecord.group_id == wanted.group_id)
+    named = ("state", "camera_id", "group_id")
+    chosen = {name: getattr(wanted, name) for name in named if getattr(wanted, name) is not None}
+    query = select(AlertRecord).filter_by(**chosen)
     if wanted.acknowledged is not None:
         seen = AlertRecord.acknowledged_at.is_not(None)
         query = query.where(seen if wanted.acknowledged else not_(seen))

@@ -1,4 +1,4 @@
-"""Cameras and their prior poses."""
+"""Cameras, their prior poses, arrival models and still images."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -6,24 +6,27 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import (
+    JSON,
     ColumnElement,
     Connection,
+    ForeignKey,
     Index,
     Integer,
+    LargeBinary,
     String,
     bindparam,
-    false,
+    delete,
     func,
     select,
     type_coerce,
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
-from service.enums import (
-    Origin,
-)
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose
+from service.enums import Origin
 from service.reasons import Reasons
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.estimates import EstimateRecord
 from service.store.record import (
     Record,
@@ -44,8 +47,7 @@ class CameraRecord(Record):
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `lacks` says what failed beside the served estimate. One that is `urgent` may
-    have moved: it is looked at before others.
+    `estimate_after`. `lacks` says what failed beside the served estimate.
     """
 
     __tablename__ = "cameras"
@@ -71,9 +73,22 @@ class CameraRecord(Record):
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
     lacks: Mapped[Reasons] = mapped_column(default=())
-    urgent: Mapped[bool] = mapped_column(default=False, server_default=false())
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The lens."""
+        k1, k2, p1, p2, k3 = self.distortion
+        return Intrinsics(
+            width=self.width,
+            height=self.height,
+            fx=self.fx,
+            fy=self.fy,
+            cx=self.cx,
+            cy=self.cy,
+            distortion=(k1, k2, p1, p2, k3),
+        )
 
 
 class PriorPoseRecord(Record):
@@ -97,6 +112,18 @@ class PriorPoseRecord(Record):
         one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
         Index(None, "camera_id", "id"),
     )
+
+    @property
+    def pose(self) -> CameraPose:
+        """As a value."""
+        return CameraPose(
+            height_m=self.height_m,
+            tilt_rad=self.tilt_rad,
+            roll_rad=self.roll_rad,
+            heading_rad=self.heading_rad,
+            x_m=self.x_m,
+            y_m=self.y_m,
+        )
 
 
 def newest_of(
@@ -129,11 +156,6 @@ _AS_SET_UP = (
 _PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
 
 # A record takes ten times as long as what each post of tracks has to know of its camera.
-_PICTURE = Prepared(
-    select(CameraRecord.width, CameraRecord.height, CameraRecord.frame_rate_hz).where(
-        CameraRecord.id == bindparam("camera")
-    )
-)
 _AWAITED = Prepared(
     select(
         type_coerce(CameraRecord.estimate_due_at.is_(None), Integer),
@@ -164,17 +186,6 @@ class Awaited:
     look: bool
     source: bool
     picture: Picture
-
-
-def find(session: Session, camera_id: str) -> CameraRecord | None:
-    """The camera, or None."""
-    return session.get(CameraRecord, camera_id)
-
-
-def picture(connection: Connection, camera_id: str) -> Picture | None:
-    """The pictures of a camera, or None."""
-    row = _PICTURE.row(connection, {"camera": camera_id})
-    return None if row is None else Picture(width=row[0], height=row[1], frame_rate_hz=row[2])
 
 
 def awaited(connection: Connection, camera_id: str) -> Awaited | None:
@@ -243,3 +254,45 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
         .where(CameraRecord.estimate_failing_since.is_not(None) | CameraRecord.id.in_(besides))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()
+
+
+class RhythmRecord(Record):
+    """The arrival model of a camera: how many people come when, and how late.
+
+    `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
+    """
+
+    __tablename__ = "camera_rhythms"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    profile: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    counts: Mapped[dict[str, Any]]
+    learned_at: Mapped[datetime]
+
+
+def arrival_profile(session: Session, camera_id: str) -> dict[str, Any] | None:
+    """The profile of a camera alone; None where there is none yet."""
+    return session.scalar(select(RhythmRecord.profile).where(RhythmRecord.camera_id == camera_id))
+
+
+class SnapshotRecord(Record):
+    """A still image of a camera, a JPEG, in a row of its own: no other query reads it."""
+
+    __tablename__ = "snapshots"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    jpeg: Mapped[bytes] = mapped_column(LargeBinary)
+    sha256: Mapped[str] = mapped_column(String(64))
+    width: Mapped[int]
+    height: Mapped[int]
+    stored_at: Mapped[datetime]
+
+
+def remove_snapshot(session: Session, camera_id: str) -> bool:
+    """Delete the still image of a camera; False if there was none."""
+    found = delete(SnapshotRecord).where(SnapshotRecord.camera_id == camera_id)
+    return bool(session.execute(found).rowcount)  # type: ignore[attr-defined]

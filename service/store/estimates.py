@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Index, func, select
+from sqlalchemy import ColumnElement, Index, bindparam, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose import PoseParameters
 from models.monitoring.verdict import Drift
-from service.enums import (
-    PoseState,
-)
+from service.enums import PoseState
 from service.reasons import Reasons
 from service.store.record import (
     Record,
@@ -96,6 +94,11 @@ class EstimateRecord(Record):
     )
 
     @property
+    def suspects_move(self) -> bool:
+        """True where its camera may have moved: it is looked at before others, its map stays."""
+        return self.suspected or self.drift_streak > 0 or bool(self.drifted)
+
+    @property
     def drift(self) -> Drift:
         """The drift against the prior pose, and which of it is identifiable."""
         return Drift(
@@ -106,9 +109,13 @@ class EstimateRecord(Record):
         )
 
 
+# Built once: a post of tracks asks for it.
+_NEWEST = newest_first(EstimateRecord, bindparam("camera")).limit(1)
+
+
 def newest(session: Session, camera_id: str) -> EstimateRecord | None:
     """The estimate that is served, or None."""
-    return session.scalars(newest_first(EstimateRecord, camera_id).limit(1)).first()
+    return session.scalars(_NEWEST, {"camera": camera_id}).first()
 
 
 def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> EstimateRecord | None:
@@ -155,3 +162,25 @@ def _made_between(
     if end is not None:
         conditions.append(EstimateRecord.created_at <= end)
     return conditions
+
+
+def identifiable_drift(drift: Drift) -> dict[str, float | None]:
+    """The identifiable drift as an alert keeps it; None where the tracks leave it open."""
+    angle_rad = drift.angle_rad if drift.turned else None
+    return {**_where_identifiable(drift.by, drift.identifiable), "angle_rad": angle_rad}
+
+
+def identifiable_sd(drift: Drift) -> dict[str, float | None]:
+    """The standard deviations of what is identifiable, likewise."""
+    return _where_identifiable(drift.sd, drift.identifiable)
+
+
+def _where_identifiable(
+    parameters: PoseParameters, identifiable: tuple[str, ...]
+) -> dict[str, float | None]:
+    return {
+        "height_m": parameters.height_m if "height" in identifiable else None,
+        "tilt_rad": parameters.tilt_rad if "tilt" in identifiable else None,
+        "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
+        "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
+    }

@@ -1,8 +1,12 @@
-"""Statements that the fleet page asks of many cameras at once: each one for all, none for each."""
+"""Statements on many cameras at once, for pages and metrics: one for all, none for each.
+
+Those that each request for a pose asks are built once: building takes longer than asking.
+"""
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -11,26 +15,136 @@ from sqlalchemy import (
     Float,
     Select,
     String,
+    bindparam,
     case,
     column,
+    exists,
     func,
     select,
     true,
     values,
 )
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, defer
 
 from models.monitoring.verdict import DriftLimits
 from service.enums import AlertState
 from service.store.alerts import AlertRecord
-from service.store.cameras import CameraRecord, newest_of
-from service.store.engines.dialects import contains_word, largest
+from service.store.cameras import CameraRecord, RhythmRecord, newest_of
+from service.store.engines.dialects import as_json, contains_word, largest
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.metrics import Ids, among, among_given, given
-from service.store.references import SiteReferenceRecord
-from service.store.stored_tracks import Spans, TrackRecord
+from service.store.references import MaintenanceRecord, SiteReferenceRecord
+from service.store.tracks import Spans, TrackRecord, of_counting_source
 from service.store.trainings import UNFINISHED, TrainingRecord
+
+# Which cameras are asked about; None is all.
+Ids = Collection[str] | None
+
+_IDS = "ids"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Newest:
+    """The newest rows of a camera, and signs of more to know.
+
+    The reference that counts comes without the site itself, and of several cameras the estimate
+    without what is behind it. `last_track_s` is when the newest track ended of those that count.
+    `fires` says that an alert does, `attended` that there are maintenance windows.
+    """
+
+    reference: SiteReferenceRecord
+    estimate: EstimateRecord | None
+    last_track_s: float | None
+    rhythm: dict[str, Any] | None
+    fires: bool
+    attended: bool
+
+
+def newest(session: Session, ids: Ids = None) -> dict[str, Newest]:
+    """The newest rows of each camera, in order of their ids."""
+    query = _newest(some=ids is not None, whole=ids is not None and len(ids) == 1)
+    return {
+        camera_id: Newest(
+            reference=reference,
+            estimate=estimate,
+            last_track_s=ended_s,
+            rhythm=profile or None,
+            fires=bool(fires),
+            attended=bool(attended),
+        )
+        for camera_id, reference, estimate, ended_s, profile, fires, attended in session.execute(
+            query, given(ids)
+        )
+    }
+
+
+def newest_identifiable_estimates(
+    session: Session, ids: Collection[str]
+) -> dict[str, EstimateRecord]:
+    """The newest estimate of each of some cameras of which something is identifiable.
+
+    Without what is behind it.
+    """
+    newest = (
+        select(EstimateRecord.id)
+        .where(EstimateRecord.camera_id == CameraRecord.id)
+        .where(as_json(EstimateRecord.identifiable) != "[]")
+        .order_by(EstimateRecord.id.desc())
+        .limit(1)
+        .correlate(CameraRecord)
+        .scalar_subquery()
+    )
+    query = select(EstimateRecord).join(CameraRecord, EstimateRecord.id == newest)
+    query = query.where(CameraRecord.id.in_(ids)).options(defer(EstimateRecord.raw))
+    return {record.camera_id: record for record in session.scalars(query)}
+
+
+@cache
+def _newest(*, some: bool, whole: bool) -> Select[Any]:
+    """One statement: each that a request for a pose asks takes as long as all it looks up."""
+    of_camera = TrackRecord.camera_id == CameraRecord.id
+    last = select(func.max(TrackRecord.ended_s)).where(
+        of_camera, of_counting_source(CameraRecord.id)
+    )
+    fires = exists().where(
+        AlertRecord.camera_id == CameraRecord.id, AlertRecord.state == AlertState.FIRING
+    )
+    attended = exists().where(MaintenanceRecord.camera_id == CameraRecord.id)
+    reference = newest_of(SiteReferenceRecord.id, SiteReferenceRecord.camera_id)
+    estimate = newest_of(EstimateRecord.id, EstimateRecord.camera_id)
+    query = (
+        select(
+            CameraRecord.id,
+            SiteReferenceRecord,
+            EstimateRecord,
+            last.correlate(CameraRecord).scalar_subquery(),
+            RhythmRecord.profile,
+            fires.correlate(CameraRecord),
+            attended.correlate(CameraRecord),
+        )
+        .select_from(CameraRecord)
+        .join(SiteReferenceRecord, SiteReferenceRecord.id == reference)
+        .outerjoin(EstimateRecord, EstimateRecord.id == estimate)
+        .outerjoin(RhythmRecord, RhythmRecord.camera_id == CameraRecord.id)
+        .where(among_given(CameraRecord.id, some=some))
+        .order_by(CameraRecord.id)
+        .options(defer(SiteReferenceRecord.data))
+    )
+    return query if whole else query.options(defer(EstimateRecord.raw))
+
+
+def among(column: InstrumentedAttribute[Any], ids: Ids) -> ColumnElement[bool]:
+    """The condition that a column names one of the cameras that are asked about."""
+    return true() if ids is None else column.in_(ids)
+
+
+def among_given(column: InstrumentedAttribute[Any], *, some: bool) -> ColumnElement[bool]:
+    """The same in a statement that is built once: the cameras are `given` with each execution."""
+    return column.in_(bindparam(_IDS, expanding=True)) if some else true()
+
+
+def given(ids: Ids) -> dict[str, list[str]]:
+    """The parameters of such a statement."""
+    return {} if ids is None else {_IDS: list(ids)}
 
 
 def names(session: Session, ids: Ids) -> list[tuple[str, str]]:

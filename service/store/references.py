@@ -1,4 +1,4 @@
-"""References: what is usual at a site while its camera is at its prior pose."""
+"""References, maps and anchors: what is usual at a site; and when somebody was at its camera."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -6,9 +6,11 @@ from datetime import datetime
 from sqlalchemy import (
     BindParameter,
     Connection,
+    ForeignKey,
     Index,
     LargeBinary,
     Select,
+    String,
     bindparam,
     exists,
     func,
@@ -17,10 +19,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, defer, mapped_column
 
-from service.enums import (
-    Answer,
-    Origin,
-)
+from service.enums import Answer, Origin
 from service.reasons import Reasons
 from service.store.estimates import EstimateRecord
 from service.store.record import (
@@ -137,3 +136,141 @@ def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
         .limit(limit)
     )
     return delete_some(session, SiteReferenceRecord.id, bite)
+
+
+class FlowMapRecord(Record):
+    """The density of paths at a reference's site (`models.paths`), learned of `tracks` tracks.
+
+    `data` is None where too few of them walk. `chart` is the drift chart (`models.monitoring`)
+    that goes with it. `to_s` is when the last of them ended, `weight` what they count for together,
+    of whom older ones count less.
+    """
+
+    __tablename__ = "flow_maps"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    data: Mapped[bytes | None] = mapped_column(LargeBinary)
+    chart: Mapped[bytes | None] = mapped_column(LargeBinary)
+    tracks: Mapped[int]
+    weight: Mapped[float]
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+
+
+class AnchorRecord(Record):
+    """The first flow map and drift chart of a reference: they never grow (`models.pose`).
+
+    `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
+    days since (`models.monitoring.creep`), up to `logged_to_s`; None as long as there is none.
+    """
+
+    __tablename__ = "anchors"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    flow: Mapped[bytes] = mapped_column(LargeBinary)
+    chart: Mapped[bytes] = mapped_column(LargeBinary)
+    to_s: Mapped[float]
+    learned_at: Mapped[datetime]
+    creep: Mapped[bytes | None] = mapped_column(LargeBinary)
+    logged_to_s: Mapped[float | None]
+
+
+class LastPoseRecord(Record):
+    """The beginning of the next estimate against a reference (`models.pose.pose_fit`).
+
+    `basis` tells what it hangs on beside the tracks: of another one it says nothing.
+    """
+
+    __tablename__ = "last_poses"
+
+    reference_id: Mapped[int] = foreign_key("site_references.id", primary_key=True)
+    basis: Mapped[bytes] = mapped_column(LargeBinary)
+    data: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class MaintenanceRecord(Record):
+    """A time in which somebody is at a camera: what is seen in it is not judged.
+
+    `to_at` is the plan, `ended_at` when it really ended; None until it has.
+    """
+
+    __tablename__ = "maintenance_windows"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    camera_id: Mapped[str] = mapped_column(ForeignKey("cameras.id", ondelete="CASCADE"))
+    from_at: Mapped[datetime]
+    to_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    reason: Mapped[str | None]
+    requested_by: Mapped[str | None]
+    created_at: Mapped[datetime]
+    updated_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "to_at"),)
+
+    @property
+    def until(self) -> datetime:
+        """The time at which it ended, or will."""
+        return self.ended_at or self.to_at
+
+    def holds(self, now: datetime) -> bool:
+        """True if somebody is there."""
+        return self.from_at <= now < self.until
+
+
+_UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
+
+# Built once: each reconcile of a camera asks for it.
+_JUST_OVER = select(MaintenanceRecord).where(
+    MaintenanceRecord.camera_id == bindparam("camera"),
+    MaintenanceRecord.to_at <= bindparam("now"),
+    MaintenanceRecord.ended_at.is_(None),
+)
+
+
+def find_maintenance(session: Session, camera_id: str, window_id: str) -> MaintenanceRecord | None:
+    """The window of a camera, or None."""
+    record = session.get(MaintenanceRecord, window_id)
+    return record if record is not None and record.camera_id == camera_id else None
+
+
+def maintenance_of(session: Session, camera_id: str) -> Sequence[MaintenanceRecord]:
+    """A camera's windows in the order of their beginnings."""
+    return session.scalars(
+        select(MaintenanceRecord)
+        .where(MaintenanceRecord.camera_id == camera_id)
+        .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
+    ).all()
+
+
+def maintenance_under_way(
+    session: Session, camera_id: str, now: datetime
+) -> MaintenanceRecord | None:
+    """The window that a camera is in, of several the one that ends last; None out of any."""
+    return session.scalars(
+        select(MaintenanceRecord)
+        .where(
+            MaintenanceRecord.camera_id == camera_id,
+            now < _UNTIL,
+            MaintenanceRecord.from_at <= now,
+        )
+        .order_by(_UNTIL.desc())
+        .limit(1)
+    ).first()
+
+
+def maintenance_just_over(
+    session: Session, camera_id: str, now: datetime
+) -> Sequence[MaintenanceRecord]:
+    """Windows that have come to their planned end, which nobody has noted yet."""
+    return session.scalars(_JUST_OVER, {"camera": camera_id, "now": now}).all()
+
+
+def forget_maintenance(session: Session, camera_id: str, before: datetime, limit: int) -> int:
+    """Delete up to `limit` of the windows that ended before a time. Returns how many."""
+    bite = (
+        select(MaintenanceRecord.id)
+        .where(MaintenanceRecord.camera_id == camera_id, before > _UNTIL)
+        .limit(limit)
+    )
+    return delete_some(session, MaintenanceRecord.id, bite)

@@ -3,21 +3,12 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import (
-    Connection,
-    ForeignKey,
-    String,
-    bindparam,
-    delete,
-    func,
-    select,
-    update,
-)
+from sqlalchemy import Connection, ForeignKey, String, bindparam, delete, func, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.record import Record, count_where
-from service.store.stored_tracks import Spans, TrackRecord, outside
+from service.store.tracks import Spans, TrackRecord, outside
 
 
 class SourceRecord(Record):
@@ -87,11 +78,6 @@ def count_from(
     if started_from_s is not None:
         conditions.append(TrackRecord.started_s >= started_from_s)
     return count_where(session, *conditions)
-
-
-def has_tracks(session: Session, camera_id: str, name: str) -> bool:
-    """True if tracks of a source are stored."""
-    return newest_end_s(session, camera_id, name) is not None
 
 
 def forget(session: Session, record: SourceRecord) -> None:

@@ -1,32 +1,178 @@
-"""Statements on tracks.
+"""Stored tracks, and statements on them.
 
 Of a camera's tracks those count that its reference is of: one source's. Others are stored, and
 counted where a function says that it is of all.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, String, and_, bindparam, func, select
-from sqlalchemy.orm import Session
+import numpy as np
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    Connection,
+    Index,
+    LargeBinary,
+    Select,
+    String,
+    UniqueConstraint,
+    bindparam,
+    func,
+    select,
+)
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
 from models.durations import DAY_S
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.rotation import Array
+from models.geometry.upright import tops_of_boxes, uncut
+from models.tracks.trajectory import Trajectory
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
-from service.store.engines.prepared import Prepared
-from service.store.record import count_where, delete_some
-from service.store.stored_tracks import (
-    StoredTrack,
-    TrackRecord,
-    bytes_of_track,
-    counting,
-    newest_source_of,
-    of_counting_source,
-    read,
-    select_tracks,
-    started_from,
-)
+from service.store.engines.sqlite import Prepared
+from service.store.record import Record, camera_key, count_where, delete_some
+from service.store.references import CameraId, counting_source
+
+
+class TrackRecord(Record):
+    """A stored track: points (N, 3), boxes (N, 4) and heads (N, 2) as little-endian float64."""
+
+    __tablename__ = "tracks"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    source: Mapped[str]
+    track_id: Mapped[str]
+    started_s: Mapped[float]
+    ended_s: Mapped[float]
+    points: Mapped[bytes] = mapped_column(LargeBinary)
+    boxes: Mapped[bytes | None] = mapped_column(LargeBinary)
+    heads: Mapped[bytes | None] = mapped_column(LargeBinary)
+    received_at: Mapped[datetime]
+
+    __table_args__ = (
+        UniqueConstraint("camera_id", "source", "track_id", "started_s"),
+        Index(None, "camera_id", "ended_s", "source"),
+        Index(None, "camera_id", "id"),
+        # What counts is counted without its points; when it came is the camera's rhythm.
+        Index(None, "camera_id", "received_at", "ended_s", "source"),
+    )
+
+
+class StoredTrack(NamedTuple):
+    """The columns of a `TrackRecord` that estimates need."""
+
+    id: int
+    track_id: str
+    started_s: float
+    ended_s: float
+    points: bytes
+    boxes: bytes | None
+    heads: bytes | None
+    received_at: datetime
+
+
+_COLUMNS = [getattr(TrackRecord, name) for name in StoredTrack._fields]
+
+
+def by_end(
+    session: Session,
+    *conditions: ColumnElement[bool],
+    newest_first: bool = False,
+    limit: int | None = None,
+) -> Sequence[StoredTrack]:
+    """Tracks that meet some conditions in the order of their ends; or the newest first."""
+    order = [TrackRecord.ended_s.desc(), TrackRecord.id.desc()]
+    query = select(*_COLUMNS).where(*conditions)
+    query = query.order_by(*order if newest_first else (TrackRecord.ended_s, TrackRecord.id))
+    return [StoredTrack._make(row) for row in session.execute(query.limit(limit))]
+
+
+def pack(array: Array) -> bytes:
+    """Little-endian float64, row by row."""
+    return np.ascontiguousarray(array, dtype="<f8").tobytes()
+
+
+def unpack(data: bytes, columns: int) -> Array:
+    """The array (N, columns) of `pack`."""
+    return np.frombuffer(data, dtype="<f8").reshape(-1, columns).astype(np.float64)
+
+
+def trajectory_of(record: StoredTrack) -> Trajectory:
+    """The foot points of a stored track."""
+    points = unpack(record.points, 3)
+    return Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+
+
+def seen_of(record: StoredTrack, feet: Trajectory, intrinsics: Intrinsics) -> Trajectory:
+    """The feet of a stored track with the upper edges of its boxes or its heads, where it has any.
+
+    Who has a head is as tall as it is high, where the picture's border does not cut it.
+    """
+    if record.heads is not None:
+        heads = unpack(record.heads, 2)
+        tops = np.where(uncut(intrinsics, heads), heads[:, 1], np.nan)
+        return replace(feet, top_v=tops, head_uv=heads)
+    if record.boxes is None:
+        return feet
+    return replace(feet, top_v=tops_of_boxes(intrinsics, unpack(record.boxes, 4)))
+
+
+Spans = tuple[tuple[float, float], ...]  # times, from and to
+
+
+def bytes_of_track() -> ColumnElement[int]:
+    """The bytes of a track's points, boxes and heads."""
+    return (
+        func.length(TrackRecord.points)
+        + func.coalesce(func.length(TrackRecord.boxes), 0)
+        + func.coalesce(func.length(TrackRecord.heads), 0)
+    )
+
+
+def of_counting_source(camera_id: CameraId) -> ColumnElement[bool]:
+    """The condition that a track is of the source that counts; all are, as long as none does."""
+    counting = counting_source(camera_id).scalar_subquery()
+    return TrackRecord.source == func.coalesce(counting, TrackRecord.source)
+
+
+def counting(camera_id: str | BindParameter[str]) -> list[ColumnElement[bool]]:
+    """The conditions that a track is of a camera, and of the source that counts."""
+    return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
+
+
+def newest_source_of(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
+    """The source that counts; where none does, that of the newest track."""
+    newest = (
+        select(TrackRecord.source)
+        .where(TrackRecord.camera_id == camera_id)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(1)
+    )
+    if not isinstance(camera_id, str):
+        newest = newest.correlate(camera_id.class_)
+    return select(
+        func.coalesce(counting_source(camera_id).scalar_subquery(), newest.scalar_subquery())
+    )
+
+
+def started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
+    """The conditions that a track counts and started at or after a time."""
+    conditions = counting(camera_id)
+    if started_from_s is not None:
+        conditions.append(TrackRecord.started_s >= started_from_s)
+    return conditions
+
+
+def outside(spans: Spans) -> list[ColumnElement[bool]]:
+    """The conditions that tracks were seen at none of some times."""
+    return [
+        (TrackRecord.ended_s < from_s) | (TrackRecord.started_s > to_s) for from_s, to_s in spans
+    ]
+
 
 _ADDED = Prepared(
     new_rows(TrackRecord.__table__),
@@ -141,50 +287,31 @@ def newest(
     session: Session, camera_id: str, limit: int, started_from_s: float | None = None
 ) -> Sequence[StoredTrack]:
     """The newest tracks, newest first; of those that started from a time on, if it is given."""
-    return read(
-        session,
-        select_tracks()
-        .where(*started_from(camera_id, started_from_s))
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit),
-    )
+    conditions = started_from(camera_id, started_from_s)
+    return by_end(session, *conditions, newest_first=True, limit=limit)
 
 
 def forget(session: Session, camera_id: str, before: datetime, keep: int, limit: int) -> int:
-    """Delete what the limits on age and number say. Returns how many.
+    """Delete up to `limit` tracks that came before a time, or after which so many came; how many.
 
-    At most `limit` at once, those first that came first.
+    By their arrival, not by their own times: what was recorded years ago and is posted today has
+    been acknowledged today, and stays as long as what was walked today. The source that counts has
+    a number of its own: no other can post its tracks away.
     """
-    outlived = _outlived(camera_id, before, keep)
-    bite = select(TrackRecord.id).where(outlived).order_by(TrackRecord.id).limit(limit)
+    number = func.row_number().over(
+        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
+    )
+    of_camera = TrackRecord.camera_id == camera_id
+    numbered = select(TrackRecord.id, number.label("number")).where(of_camera).subquery()
+    surplus = select(numbered.c.id).where(numbered.c.number > keep)
+    outlived = (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus)
+    bite = select(TrackRecord.id).where(of_camera, outlived).order_by(TrackRecord.id).limit(limit)
     return delete_some(session, TrackRecord.id, bite)
 
 
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:
     """Those of the given tracks that are still stored."""
     return set(session.scalars(select(TrackRecord.id).where(TrackRecord.id.in_(track_pks))))
-
-
-def _outlived(camera_id: str, before: datetime, keep: int) -> ColumnElement[bool]:
-    """The condition of being deleted: it came before a time, or so many have come after it.
-
-    By its arrival, not by its own times: what was recorded years ago and is posted today has been
-    acknowledged today, and stays as long as what was walked today. The source that
-    counts has a number of its own: no other can post its tracks away.
-    """
-    number = func.row_number().over(
-        partition_by=of_counting_source(camera_id), order_by=TrackRecord.id.desc()
-    )
-    numbered = (
-        select(TrackRecord.id, number.label("number"))
-        .where(TrackRecord.camera_id == camera_id)
-        .subquery()
-    )
-    surplus = select(numbered.c.id).where(numbered.c.number > keep)
-    return and_(
-        TrackRecord.camera_id == camera_id,
-        (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus),
-    )
 
 
 def forget_tracks(session: Session, camera_id: str, most_bytes: int, limit: int) -> int:

@@ -1,15 +1,13 @@
 """Trainings, the models that they made, and their weights."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Index, LargeBinary, String, bindparam, select
+from sqlalchemy import Index, LargeBinary, String, bindparam, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from service.enums import (
-    TrainingState,
-)
+from service.enums import TrainingState
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first, surplus
 
 
@@ -94,9 +92,10 @@ _UNFINISHED_OF_CAMERA = (
 )
 
 
-def find(session: Session, training_id: str) -> TrainingRecord | None:
-    """The training, or None."""
-    return session.get(TrainingRecord, training_id)
+def count_by_state(session: Session) -> dict[TrainingState, int]:
+    """The number of stored trainings in each state."""
+    query = select(TrainingRecord.state, func.count()).group_by(TrainingRecord.state)
+    return {state: count for state, count in session.execute(query)}
 
 
 def of_camera(session: Session, camera_id: str, limit: int) -> Sequence[TrainingRecord]:
@@ -114,10 +113,10 @@ def newest_model(session: Session, camera_id: str) -> ModelRecord | None:
     return session.scalars(_NEWEST_MODEL, {"camera": camera_id}).first()
 
 
-def superseded_models(session: Session, camera_id: str, keep: int) -> Sequence[ModelRecord]:
-    """Models of a camera older than its newest so many."""
-    query = newest_first(ModelRecord, camera_id, ModelRecord.created_at)
-    return session.scalars(query.offset(keep)).all()
+def forget_models(session: Session, camera_id: str, keep: int, limit: int) -> int:
+    """Delete up to `limit` of a camera's models but its newest so many; how many."""
+    superseded = surplus(ModelRecord, camera_id, keep, ModelRecord.created_at)
+    return delete_some(session, ModelRecord.id, superseded.limit(limit))
 
 
 def forget(session: Session, camera_id: str, keep: int, limit: int) -> int:
@@ -143,35 +142,8 @@ def weights_in_use(session: Session) -> set[str]:
     return set(session.scalars(select(ModelRecord.weights_sha256)))
 
 
-def has_weights(session: Session, sha256: str) -> bool:
-    """True if weights are in the database."""
-    return session.scalar(select(WeightsRecord.sha256).filter_by(sha256=sha256)) is not None
-
-
-def weights(session: Session, sha256: str) -> bytes | None:
-    """Weights by their hash; None where they are not in the database."""
-    return session.scalar(select(WeightsRecord.data).filter_by(sha256=sha256))
-
-
-def keep_weights(session: Session, sha256: str, data: bytes) -> None:
-    """Put weights into the database."""
-    session.add(WeightsRecord(sha256=sha256, data=data, stored_at=datetime.now(UTC)))
-
-
 def forget_weights(session: Session, limit: int) -> int:
     """Delete up to `limit` of the weights that no model names. Returns how many."""
     unused = WeightsRecord.sha256.not_in(select(ModelRecord.weights_sha256))
     bite = select(WeightsRecord.sha256).where(unused).limit(limit)
     return delete_some(session, WeightsRecord.sha256, bite)
-
-
-def model_exists(session: Session, model_id: str) -> bool:
-    """True if a model is still stored."""
-    return session.get(ModelRecord, model_id) is not None
-
-
-def delete_model(session: Session, model_id: str) -> None:
-    """Delete a model and what it says of tracks."""
-    record = session.get(ModelRecord, model_id)
-    if record is not None:
-        session.delete(record)

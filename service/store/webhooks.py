@@ -1,6 +1,7 @@
 """Webhooks, their deliveries and attempts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -16,7 +17,7 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
+from sqlalchemy.orm import Mapped, Session, aliased, mapped_column, relationship, selectinload
 
 from models.reasons import Reason
 from service.enums import AlertState, DeliveryState, MessageType, WebhookFormat
@@ -63,7 +64,7 @@ class DeliveryRecord(Record):
     """A message for an endpoint, written with the change that it tells of; `id` is `webhook-id`.
 
     `queued_at` is when it was made or last replayed, `tries` counts the attempts since, `attempts`
-    all of them. Its alert may be gone, and is no foreign key.
+    all of them, its `requests`, oldest first. Its alert may be gone, and is no foreign key.
     """
 
     __tablename__ = "deliveries"
@@ -83,6 +84,9 @@ class DeliveryRecord(Record):
     error: Mapped[str | None]
     created_at: Mapped[datetime]
     finished_at: Mapped[datetime | None]
+    requests: Mapped[list["DeliveryAttemptRecord"]] = relationship(
+        order_by="DeliveryAttemptRecord.id", viewonly=True
+    )
 
     __table_args__ = (
         Index(None, "webhook_id", "state", "number"),
@@ -106,12 +110,15 @@ class DeliveryAttemptRecord(Record):
     error: Mapped[str | None]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Backlog:
+    """Deliveries that wait for a webhook, and since when."""
+
+    count: int
+    oldest_at: datetime
+
+
 _Earlier = aliased(DeliveryRecord)
-
-
-def find(session: Session, webhook_id: str) -> WebhookRecord | None:
-    """The webhook, or None."""
-    return session.get(WebhookRecord, webhook_id)
 
 
 def every(session: Session) -> Sequence[WebhookRecord]:
@@ -125,14 +132,14 @@ def enabled(session: Session) -> Sequence[WebhookRecord]:
     return session.scalars(query.order_by(WebhookRecord.created_at)).all()
 
 
-def pending(session: Session) -> dict[str, int]:
-    """The number of waiting deliveries of each webhook."""
+def backlogs(session: Session) -> dict[str, Backlog]:
+    """The backlog of each webhook that something waits for."""
     rows = session.execute(
-        select(DeliveryRecord.webhook_id, func.count())
+        select(DeliveryRecord.webhook_id, func.count(), func.min(DeliveryRecord.created_at))
         .where(DeliveryRecord.state == DeliveryState.PENDING)
         .group_by(DeliveryRecord.webhook_id)
     )
-    return {webhook_id: count for webhook_id, count in rows}
+    return {name: Backlog(count=count, oldest_at=oldest) for name, count, oldest in rows}
 
 
 def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:
@@ -143,23 +150,12 @@ def find_delivery(session: Session, delivery_id: str) -> DeliveryRecord | None:
 def log(
     session: Session, webhook_id: str, state: DeliveryState | None, limit: int
 ) -> Sequence[DeliveryRecord]:
-    """A webhook's deliveries, newest first."""
+    """A webhook's deliveries with their requests, newest first."""
     query = select(DeliveryRecord).where(DeliveryRecord.webhook_id == webhook_id)
     if state is not None:
         query = query.where(DeliveryRecord.state == state)
+    query = query.options(selectinload(DeliveryRecord.requests))
     return session.scalars(query.order_by(DeliveryRecord.number.desc()).limit(limit)).all()
-
-
-def attempts_of(session: Session, numbers: Sequence[int]) -> dict[int, list[DeliveryAttemptRecord]]:
-    """The attempts of some deliveries, oldest first, by the deliveries' numbers."""
-    found: dict[int, list[DeliveryAttemptRecord]] = {number: [] for number in numbers}
-    for attempt in session.scalars(
-        select(DeliveryAttemptRecord)
-        .where(DeliveryAttemptRecord.delivery_number.in_(numbers))
-        .order_by(DeliveryAttemptRecord.id)
-    ):
-        found[attempt.delivery_number].append(attempt)
-    return found
 
 
 def next_due(session: Session, webhook_id: str, now: datetime) -> DeliveryRecord | None:

@@ -1,22 +1,22 @@
-"""Statements on the tracks of a window, and of the times when a camera stood still."""
+"""Windows of tracks, times when a camera stood still, and models' predictions on tracks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, ForeignKey, Select, and_, exists, func, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
-from service.store.engines.dialects import whole
-from service.store.record import count_where
-from service.store.stored_tracks import (
+from service.store.engines.dialects import new_rows, whole
+from service.store.record import Record, count_where, foreign_key
+from service.store.tracks import (
     Spans,
     StoredTrack,
     TrackRecord,
+    by_end,
     counting,
     outside,
-    read,
-    select_tracks,
     started_from,
 )
 
@@ -59,12 +59,7 @@ class StillBounds:
 
 def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
-    return read(
-        session,
-        select_tracks()
-        .where(TrackRecord.id.in_(window_ids(session, bounds)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id),
-    )
+    return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)))
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
@@ -81,24 +76,13 @@ def first(
     without: Spans = (),
 ) -> Sequence[StoredTrack]:
     """The first tracks by their ends that started from a time on and were not seen at others."""
-    return read(
-        session,
-        select_tracks()
-        .where(*started_from(camera_id, started_from_s), *outside(without))
-        .order_by(TrackRecord.ended_s, TrackRecord.id)
-        .limit(limit),
-    )
+    conditions = *started_from(camera_id, started_from_s), *outside(without)
+    return by_end(session, *conditions, limit=limit)
 
 
 def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredTrack]:
     """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
-    return read(
-        session,
-        select_tracks()
-        .where(*_still(bounds))
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(limit),
-    )[::-1]
+    return by_end(session, *_still(bounds), newest_first=True, limit=limit)[::-1]
 
 
 def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
@@ -155,12 +139,7 @@ def of_days(
     )
     nth = (each.c.place * most_a_day) // each.c.people
     before = ((each.c.place - 1) * most_a_day) // each.c.people
-    return read(
-        session,
-        select_tracks()
-        .where(TrackRecord.id.in_(select(each.c.id).where(nth > before)))
-        .order_by(TrackRecord.ended_s, TrackRecord.id),
-    )
+    return by_end(session, TrackRecord.id.in_(select(each.c.id).where(nth > before)))
 
 
 def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
@@ -183,3 +162,53 @@ def _inside(bounds: WindowBounds) -> list[ColumnElement[bool]]:
     if bounds.ended_from_s is not None:
         inside.append(TrackRecord.ended_s >= bounds.ended_from_s)
     return inside
+
+
+class PredictionRecord(Record):
+    """A model's prediction on a track; without numbers where the track gives no window."""
+
+    __tablename__ = "predictions"
+
+    model_id: Mapped[str] = foreign_key("models.id", primary_key=True)
+    track_pk: Mapped[int] = mapped_column(
+        ForeignKey("tracks.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    windows: Mapped[int]
+    height_m: Mapped[float | None]
+    qw: Mapped[float | None]
+    qx: Mapped[float | None]
+    qy: Mapped[float | None]
+    qz: Mapped[float | None]
+
+
+def without_prediction(
+    session: Session, bounds: WindowBounds, model_id: str, limit: int
+) -> Sequence[StoredTrack]:
+    """Tracks of the window that the model has not looked at, newest first."""
+    predicted = exists().where(
+        PredictionRecord.track_pk == TrackRecord.id, PredictionRecord.model_id == model_id
+    )
+    inside = TrackRecord.id.in_(window_ids(session, bounds))
+    return by_end(session, inside, ~predicted, newest_first=True, limit=limit)
+
+
+def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
+    """Insert predictions; a second run of the same job changes nothing."""
+    if rows:
+        session.execute(new_rows(PredictionRecord.__table__), rows)
+
+
+def predictions(
+    session: Session, model_id: str, track_pks: Sequence[int]
+) -> Sequence[PredictionRecord]:
+    """The model's predictions on some tracks, newest first, of those with a window."""
+    return session.scalars(
+        select(PredictionRecord)
+        .join(TrackRecord, PredictionRecord.track_pk == TrackRecord.id)
+        .where(
+            PredictionRecord.model_id == model_id,
+            PredictionRecord.windows > 0,
+            PredictionRecord.track_pk.in_(track_pks),
+        )
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+    ).all()

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import delete, insert, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.record import Record
@@ -38,11 +38,6 @@ class ProbeRecord(Record):
     written_at: Mapped[datetime]
 
 
-def find(session: Session, name: str) -> WorkerRecord | None:
-    """The worker of a name, or None."""
-    return session.get(WorkerRecord, name)
-
-
 def add(session: Session, name: str, pid: int, now: datetime) -> WorkerRecord:
     """A new worker."""
     record = WorkerRecord(
@@ -52,27 +47,9 @@ def add(session: Session, name: str, pid: int, now: datetime) -> WorkerRecord:
     return record
 
 
-def alive(session: Session) -> Sequence[WorkerRecord]:
-    """Workers whose jobs nobody has taken over."""
-    return session.scalars(select(WorkerRecord).where(~WorkerRecord.lost)).all()
-
-
-def newest_heartbeat(session: Session) -> datetime | None:
-    """The newest heartbeat of any worker."""
-    return session.scalar(select(func.max(WorkerRecord.heartbeat_at)).where(~WorkerRecord.lost))
-
-
-def after(session: Session, now: datetime) -> Sequence[WorkerRecord]:
-    """Workers, lost ones too, that were heard of after a time."""
-    return session.scalars(select(WorkerRecord).where(WorkerRecord.heartbeat_at > now)).all()
-
-
-def troubles(session: Session) -> dict[str, str]:
-    """The troubles of workers that `serve` cannot keep alive, by their names."""
-    rows = session.execute(
-        select(WorkerRecord.name, WorkerRecord.trouble).where(WorkerRecord.trouble.is_not(None))
-    )
-    return {name: trouble for name, trouble in rows if trouble is not None}
+def every(session: Session) -> Sequence[WorkerRecord]:
+    """All workers, those that are lost among them."""
+    return session.scalars(select(WorkerRecord).order_by(WorkerRecord.name)).all()
 
 
 def forget_lost(session: Session, before: datetime) -> None:

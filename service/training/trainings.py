@@ -18,9 +18,9 @@ from service.errors import ConflictError, NotFoundError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import cameras, events, tracks, trainings
-from service.store.cameras import PriorPoseRecord
-from service.store.serialization import intrinsics_of, pose_of_prior, trajectory_of
+from service.store import cameras, journal, tracks, trainings
+from service.store.cameras import CameraRecord, PriorPoseRecord
+from service.store.tracks import trajectory_of
 from service.store.trainings import ModelRecord, TrainingRecord
 
 # So many of the newest tracks tell a camera's sampling step, once there are at least a few.
@@ -85,7 +85,7 @@ def request_training(
     Raises:
         NotFoundError: there is no such camera.
     """
-    if cameras.find(session, camera_id) is None:
+    if session.get(CameraRecord, camera_id) is None:
         raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
     record = queue_training(session, queue, settings, camera_id, recipe, seed)
     note(session, Activity.TRAINING_REQUESTED, by=by, camera_id=camera_id, subject_id=record.id)
@@ -98,7 +98,7 @@ def show_training(session: Session, training_id: str) -> TrainingRecord:
     Raises:
         NotFoundError: there is none of that id.
     """
-    record = trainings.find(session, training_id)
+    record = session.get(TrainingRecord, training_id)
     if record is None:
         raise NotFoundError(f"training_id: there is no training {training_id!r}")
     return record
@@ -110,7 +110,7 @@ def list_trainings(session: Session, camera_id: str, limit: int) -> Sequence[Tra
     Raises:
         NotFoundError: there is no such camera.
     """
-    if cameras.find(session, camera_id) is None:
+    if session.get(CameraRecord, camera_id) is None:
         raise NotFoundError(f"camera_id: there is no camera {camera_id!r}")
     return trainings.of_camera(session, camera_id, limit)
 
@@ -139,13 +139,13 @@ def begin_training(
     session: Session, settings: Settings, training_id: str
 ) -> TrainingAttempt | None:
     """Mark a training as running and say what to do; None where there is nothing to do."""
-    record = trainings.find(session, training_id)
+    record = session.get(TrainingRecord, training_id)
     if record is None or record.state not in trainings.UNFINISHED:
         return None
     if record.cancel_requested:
         finish(session, record, TrainingState.CANCELLED)
         return None
-    camera = cameras.find(session, record.camera_id)
+    camera = session.get(CameraRecord, record.camera_id)
     assert camera is not None
     record.state = TrainingState.RUNNING
     record.attempt += 1
@@ -157,7 +157,7 @@ def begin_training(
         camera_id=camera.id,
         attempt=record.attempt,
         plan=plan_training(
-            intrinsics=intrinsics_of(camera),
+            intrinsics=camera.intrinsics,
             prior_pose=centre_of(session, record),
             recipe_name=record.recipe,
             walk=WalkConfig(
@@ -175,7 +175,7 @@ def centre_of(session: Session, record: TrainingRecord) -> CameraPose:
     """The pose in the middle of a training's range."""
     prior = session.get(PriorPoseRecord, record.prior_pose_id)
     assert prior is not None
-    return replace(pose_of_prior(prior), **(record.around or {}))
+    return replace(prior.pose, **(record.around or {}))
 
 
 def camera_step_s(session: Session, camera_id: str) -> float:
@@ -256,7 +256,7 @@ def end_training(
 
 def _record_of(session: Session, attempt: TrainingAttempt) -> TrainingRecord | None:
     """The record of an attempt; None where it was deleted, or another attempt took it over."""
-    record = trainings.find(session, attempt.training_id)
+    record = session.get(TrainingRecord, attempt.training_id)
     return record if record is not None and record.attempt == attempt.attempt else None
 
 
@@ -292,4 +292,4 @@ def _tell(session: Session, record: TrainingRecord) -> None:
         "progress": {"step": record.step, "steps": record.steps, "loss": record.loss},
         "error": record.error,
     }
-    events.add(session, EventType.TRAINING, payload, datetime.now(UTC))
+    journal.add_event(session, EventType.TRAINING, payload, datetime.now(UTC))

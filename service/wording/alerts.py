@@ -1,8 +1,10 @@
-"""Alerts in words: their kinds, what came of them, and what an Alertmanager shows of them."""
+"""Alerts in words, as pages and an Alertmanager show them, and entries of the log as sentences."""
 
 from collections.abc import Sequence
 
-from service.enums import AlertKind, Outcome
+from service.enums import Activity, AlertKind, Outcome
+from service.store.journal import ActivityRecord
+from service.wording.times import Clock
 
 KINDS = {
     AlertKind.DRIFT: "The camera moved",
@@ -24,6 +26,44 @@ ESTIMATED_AGAIN = "it is looked at again"
 ONE_SOURCE_POSTS = "only one source posts"
 # A test alert's description.
 TEST_ENDS = "This is a test of surefoot; it ends by itself."
+# By a person; of those that the service does by itself, what happened.
+_DONE = {
+    Activity.CAMERA_REGISTERED: "registered the camera",
+    Activity.CAMERA_CHANGED: "changed what is said of the camera",
+    Activity.CAMERA_REMOVED: "removed the camera",
+    Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
+    Activity.POSE_PUT_BACK: "said that the camera is back at its prior pose",
+    Activity.POSE_FALSE_ALARM: "said that the camera never moved",
+    Activity.REFERENCE_RESET: "had the camera learned anew at its prior pose",
+    Activity.SOURCE_USED: "said whose tracks count; the reference is learned anew",
+    Activity.SOURCE_REMOVED: "removed a source of tracks with its tracks",
+    Activity.ALERT_ACKNOWLEDGED: "acknowledged {alert}",
+    Activity.ALERT_SILENCED: "silenced {alert} until {until}",
+    Activity.ALERT_SILENCE_ENDED: "ended the silence of {alert}",
+    Activity.ALERT_RESOLVED: "closed {alert}: {outcome}",
+    Activity.MAINTENANCE_PLANNED: "planned maintenance until {until}",
+    Activity.MAINTENANCE_CHANGED: "changed the maintenance: until {until}",
+    Activity.MAINTENANCE_ENDED: "ended the maintenance that was planned until {until}",
+    Activity.MAINTENANCE_WITHDRAWN: "took back the maintenance that was planned until {until}",
+    Activity.TRAINING_REQUESTED: "asked for a training",
+    Activity.SNAPSHOT_KEPT: "put a new still image",
+    Activity.SNAPSHOT_REMOVED: "deleted the still image",
+}
+_HAPPENED = {
+    Activity.ALERT_OPENED: "Alert: {kind}",
+    Activity.ALERT_ESCALATED: "It grew: {alert} is critical now",
+    Activity.REFERENCE_LEARNED: "The reference was learned",
+    Activity.MAINTENANCE_OVER: "The maintenance is over",
+    Activity.TRAINING_SUCCEEDED: "A training ended: its model is in use",
+    Activity.TRAINING_FAILED: "A training failed",
+    Activity.TRAINING_CANCELLED: "A training was cancelled",
+}
+_UNASKED = (Outcome.CLEARED, Outcome.CAMERA_REMOVED)
+_BY_ITSELF = {
+    Activity.ALERT_RESOLVED: "The alert “{kind}” ended: {outcome}",
+    Activity.ALERT_SILENCE_ENDED: "The silence of {alert} ended",
+    Activity.SOURCE_USED: "Another source's tracks count; the reference is learned anew",
+}
 
 
 def source_change(name: str, last: str | None) -> str:
@@ -44,3 +84,22 @@ def alert_summary(
     if camera_id is None and track_source:
         whose = f"{len(camera_ids or ())} cameras of {track_source}"
     return f"{kind.replace('_', ' ')}: {whose}"
+
+
+def entry_words(entry: ActivityRecord, clock: Clock) -> str:
+    """A sentence without the time: who did what."""
+    kind = "" if entry.kind is None else KINDS[entry.kind].lower()
+    words = {
+        "kind": kind,
+        "alert": f"the alert “{kind}”",
+        "until": "" if entry.until is None else clock.when(entry.until),
+        "outcome": "" if entry.outcome is None else OUTCOMES[entry.outcome],
+    }
+    if entry.what in _HAPPENED:
+        text = _HAPPENED[entry.what]
+    elif entry.what in _BY_ITSELF and entry.by is None and entry.outcome in (None, *_UNASKED):
+        text = _BY_ITSELF[entry.what]
+    else:
+        text = f"{{who}} {_DONE.get(entry.what, entry.what)}"
+    sentence = f"{text.format(who=entry.by or 'Someone', **words)}."
+    return f"{sentence} {entry.note}" if entry.note else sentence

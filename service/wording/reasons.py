@@ -1,7 +1,7 @@
 """Reasons in words: why a state is what it is, an alert fired, a part is missing."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from enum import StrEnum
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 from models.durations import HOUR_S
 from models.geometry.pose import PARAMETERS
 from models.reasons import Reason, TracksCode
+from service.degrees import in_degrees
 from service.enums import Cause
 from service.reasons import ServiceCode
 
@@ -19,13 +20,15 @@ _SINCE = {
     Cause.PUT_BACK: "since the camera was put back",
     Cause.FALSE_ALARM: "since the alert was called a false alarm",
 }
+_GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)
 
 
 def in_words(reasons: Sequence[Reason]) -> str:
     """Reasons as one sentence without its full stop; empty where there are none."""
     said = ""
     for number, reason in enumerate(reasons):
-        said += _WORDS[reason.code](reason.values)
+        words, values = _WORDS[reason.code], _as_told(reason.values)
+        said += words.format(**values) if isinstance(words, str) else words(values)
         if number + 1 < len(reasons):
             said += " " if reason.code is ServiceCode.LAST_IDENTIFIABLE else "; "
     return said
@@ -35,7 +38,7 @@ def group_in_words(reasons: Sequence[Reason]) -> str:
     """Reasons of a tracker's alert, to stand beside the tracker's name."""
     return in_words(
         [
-            Reason(code=each.code, values={**each.values, "track_source": ""})
+            replace(each, values={**each.values, "track_source": ""})
             if each.code in _GROUPS
             else each
             for each in reasons
@@ -43,11 +46,14 @@ def group_in_words(reasons: Sequence[Reason]) -> str:
     )
 
 
-_GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)
+def _as_told(values: _Values) -> _Values:
+    """Values as sentences say them: angles in degrees, and times in hours, too."""
+    hours = {f"{name}_in_h": value / HOUR_S for name, value in values.items() if name[-2:] == "_s"}
+    return in_degrees(values) | hours
 
 
 def _limit(v: _Values) -> str:
-    return f"{v['sigmas']:g} sd and {math.degrees(v['floor_rad']):g} deg or {v['floor_m']:g} m"
+    return f"{v['sigmas']:g} sd and {v['floor_deg']:g} deg or {v['floor_m']:g} m"
 
 
 def _numbers(v: _Values) -> str:
@@ -55,9 +61,8 @@ def _numbers(v: _Values) -> str:
     for name in PARAMETERS:
         if name == "height" and "height_m" in v:
             said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
-        elif f"{name}_rad" in v:
-            value, sd = (math.degrees(v[f"{name}_{what}rad"]) for what in ("", "sd_"))
-            said.append(f"{name} {value:+.2f} deg (sd {sd:.2f})")
+        elif f"{name}_deg" in v:
+            said.append(f"{name} {v[f'{name}_deg']:+.2f} deg (sd {v[f'{name}_sd_deg']:.2f})")
     return ", ".join(said) + " against the prior pose"
 
 
@@ -83,9 +88,8 @@ def _chart(v: _Values) -> str:
 
 
 def _crept(v: _Values) -> str:
-    by, sd = math.degrees(v["by_rad"]), math.degrees(v["sd_rad"])
     return (
-        f"has crept by {by:+.1f} deg (sd {sd:.1f}) in {v['number']} since "
+        f"has crept by {v['by_deg']:+.1f} deg (sd {v['sd_deg']:.1f}) in {v['number']} since "
         f"{datetime.fromisoformat(v['since']):%Y-%m-%d}, by the first map and speeds of its "
         f"reference (creep: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
     )
@@ -101,20 +105,15 @@ def _scale_changed(v: _Values) -> str:
 
 
 def _ambiguous(v: _Values) -> str:
-    said = " and ".join(f"{math.degrees(turn):+.1f} deg" for turn in v["turns_rad"])
+    said = " and ".join(f"{turn:+.1f} deg" for turn in v["turns_deg"])
     return f"turns of {said} explain where people walk about as well"
-
-
-def _heading_unidentifiable(v: _Values) -> str:
-    sd_deg = math.degrees(v["heading_sd_rad"])
-    return f"where people walk does not tell the heading (sd {sd_deg:.1f} deg)"
 
 
 def _unidentifiable(v: _Values) -> str:
     said = [
-        f"{name} (sd {math.degrees(v[f'{name}_sd_rad']):.1f} deg)"
+        f"{name} (sd {v[f'{name}_sd_deg']:.1f} deg)"
         for name in ("tilt", "roll")
-        if f"{name}_sd_rad" in v
+        if f"{name}_sd_deg" in v
     ]
     if "log_height_sd" in v:
         said.append(f"height (sd {100 * v['log_height_sd']:.0f} %)")
@@ -136,28 +135,6 @@ def _few_groups(v: _Values) -> str:
     )
 
 
-def _speed(v: _Values) -> str:
-    return (
-        f"people walk at {v['speed_mps']:.2f} m/s at the prior pose, {v['slow_mps']:g} to "
-        f"{v['fast_mps']:g} m/s is usual: the prior height or the frame rate is wrong"
-    )
-
-
-def _stature(v: _Values) -> str:
-    return (
-        f"boxes say that people are {v['stature_m']:.2f} m tall at the prior pose, "
-        f"{v['short_m']:g} to {v['tall_m']:g} m is usual: the prior height is wrong"
-    )
-
-
-def _prior_doubted(v: _Values) -> str:
-    tilt, roll = math.degrees(v["tilt_rad"]), math.degrees(v["roll_rad"])
-    return (
-        f"the reference tracks put the camera {tilt:+.1f} deg in tilt and {roll:+.1f} deg in "
-        "roll from its prior pose: the prior pose is wrong, or the camera had moved before"
-    )
-
-
 def _since(v: _Values) -> str:
     return (
         f"{v['tracks']} tracks {_SINCE[Cause(v['cause'])]}; at least {v['least_walkers']} of "
@@ -171,19 +148,13 @@ def _maintenance(v: _Values) -> str:
 
 
 def _silent(v: _Values) -> str:
-    words = f"no track for {_hours(v['silent_s'])}"
+    words = f"no track for {v['silent_s_in_h']:.1f} h"
     if "missed_tracks" in v:
         words += f", where about {v['missed_tracks']:.0f} are usual by now"
     else:
         words += ", as is usual at this hour"
-    return f"{words}; its tracks come up to {_hours(v['late_s'])} late" if "late_s" in v else words
-
-
-def _silent_unknown(v: _Values) -> str:
-    return (
-        f"the newest track ended {_hours(v['silent_s'])} ago; "
-        f"up to {v['limit_s'] / HOUR_S:g} h are waited for"
-    )
+    late = v.get("late_s_in_h")
+    return words if late is None else f"{words}; its tracks come up to {late:.1f} h late"
 
 
 def _of_tracker(v: _Values) -> str:
@@ -209,32 +180,14 @@ def _other_sources(v: _Values) -> str:
     names, counting = " and ".join(repr(name) for name in v["sources"]), v.get("counting")
     return (
         f"tracks of {names} come beside those of {counting!r}, which count: they are kept "
-        f"and move nothing. Should {counting!r} fall silent for "
-        f"{v['silent_s'] / HOUR_S:g} h, they take over once "
-        f"{v['wanted']} of them were seen while the camera was where it "
+        f"and move nothing. Should {counting!r} fall silent for {v['silent_s_in_h']:g} h, they "
+        f"take over once {v['wanted']} of them were seen while the camera was where it "
         "should be; a person can say so at once"
     )
 
 
-def _looks_fail(v: _Values) -> str:
-    return (
-        f"its tracks cannot be looked at: {v['tries']} tries failed in a row, the last with "
-        f"{v['error']}"
-    )
-
-
-def _tracks_wait(v: _Values) -> str:
-    return (
-        f"its tracks have waited for {v['waits_s'] / 60:.0f} min; up to {v['limit_s'] / 60:g} min "
-        "are waited for"
-    )
-
-
-def _hours(seconds: float) -> str:
-    return f"{seconds / HOUR_S:.1f} h"
-
-
-_WORDS: dict[StrEnum, Callable[[_Values], str]] = {
+# A text takes the values by their names.
+_WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}: beyond {_limit(v)}",
     TracksCode.BEYOND_LIMITS_UNCONFIRMED: _unconfirmed,
     TracksCode.BEYOND_LIMITS_BEFORE: _beyond_before,
@@ -245,42 +198,58 @@ _WORDS: dict[StrEnum, Callable[[_Values], str]] = {
     TracksCode.CHART: _chart,
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
-    TracksCode.PATHS_CHANGED: lambda v: "the paths have changed: the flow map is left out",
+    TracksCode.PATHS_CHANGED: "the paths have changed: the flow map is left out",
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
-    TracksCode.HEADING_UNIDENTIFIABLE: _heading_unidentifiable,
+    TracksCode.HEADING_UNIDENTIFIABLE: (
+        "where people walk does not tell the heading (sd {heading_sd_deg:.1f} deg)"
+    ),
     TracksCode.UNIDENTIFIABLE: _unidentifiable,
     TracksCode.TOO_FEW_GROUPS: _few_groups,
-    TracksCode.SPEED_UNUSUAL: _speed,
-    TracksCode.STATURE_UNUSUAL: _stature,
-    TracksCode.PRIOR_POSE_DOUBTED: _prior_doubted,
-    TracksCode.PIECES: lambda v: (
-        f"{v['pieces']:g} of {v['tracks']:g} tracks are pieces of others' walks: the tracker loses "
-        "people, each of whom counts once"
+    TracksCode.SPEED_UNUSUAL: (
+        "people walk at {speed_mps:.2f} m/s at the prior pose, {slow_mps:g} to {fast_mps:g} m/s "
+        "is usual: the prior height or the frame rate is wrong"
     ),
-    ServiceCode.AS_SAID: lambda v: str(v["text"]),
-    ServiceCode.LEARNING_REFERENCE: lambda v: "the reference is being learned",
+    TracksCode.STATURE_UNUSUAL: (
+        "boxes say that people are {stature_m:.2f} m tall at the prior pose, {short_m:g} to "
+        "{tall_m:g} m is usual: the prior height is wrong"
+    ),
+    TracksCode.PRIOR_POSE_DOUBTED: (
+        "the reference tracks put the camera {tilt_deg:+.1f} deg in tilt and {roll_deg:+.1f} deg "
+        "in roll from its prior pose: the prior pose is wrong, or the camera had moved before"
+    ),
+    TracksCode.PIECES: (
+        "{pieces:g} of {tracks:g} tracks are pieces of others' walks: the tracker loses people, "
+        "each of whom counts once"
+    ),
+    ServiceCode.AS_SAID: "{text}",
+    ServiceCode.LEARNING_REFERENCE: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: (
         f"{v['tracks']} of {v['wanted']} reference tracks"
         + ("; pieces of one walk count once" if v["tracks"] >= v["wanted"] else "")
     ),
     ServiceCode.TRACKS_SINCE: _since,
-    ServiceCode.LAST_IDENTIFIABLE: lambda v: "when it was last told:",
+    ServiceCode.LAST_IDENTIFIABLE: "when it was last told:",
     ServiceCode.MAINTENANCE: _maintenance,
     ServiceCode.WITHOUT_PART: lambda v: f"without the {v['part'].replace('_', ' ')}: {v['why']}",
     ServiceCode.SILENT_USUAL: _silent,
     ServiceCode.SILENT_UNUSUAL: _silent,
-    ServiceCode.SILENT_UNKNOWN: _silent_unknown,
+    ServiceCode.SILENT_UNKNOWN: (
+        "the newest track ended {silent_s_in_h:.1f} h ago; up to {limit_s_in_h:g} h are waited for"
+    ),
     ServiceCode.MOVED_TOGETHER: _moved_together,
     ServiceCode.FELL_SILENT_TOGETHER: _silent_together,
     ServiceCode.OTHER_SOURCES: _other_sources,
-    ServiceCode.LOOKS_FAIL: _looks_fail,
-    ServiceCode.TRACKS_WAIT: _tracks_wait,
-    ServiceCode.DISABLED_BY_PERSON: lambda v: "disabled by a person",
-    ServiceCode.ENDPOINT_GONE: lambda v: "it answered 410: it is gone for good",
-    ServiceCode.ENDPOINT_FAILS: lambda v: (
-        f"it failed for more than {v['patience_s'] / HOUR_S:g} h: {v['error']}"
+    ServiceCode.LOOKS_FAIL: (
+        "its tracks cannot be looked at: {tries} tries failed in a row, the last with {error}"
     ),
-    ServiceCode.SECRET_LOST: lambda v: (
+    ServiceCode.TRACKS_WAIT: lambda v: (
+        f"its tracks have waited for {v['waits_s'] / 60:.0f} min; up to {v['limit_s'] / 60:g} min "
+        "are waited for"
+    ),
+    ServiceCode.DISABLED_BY_PERSON: "disabled by a person",
+    ServiceCode.ENDPOINT_GONE: "it answered 410: it is gone for good",
+    ServiceCode.ENDPOINT_FAILS: "it failed for more than {patience_s_in_h:g} h: {error}",
+    ServiceCode.SECRET_LOST: (
         "its secret was lost with the key: fetch a new one, tell the receiver, enable it"
     ),
 }

@@ -17,37 +17,36 @@ class Clock:
     zone: tzinfo
 
     def when(self, at: datetime) -> str:
-        """A time in words."""
-        return when(at, self.now, self.zone)
+        """A time as one would say it: "14:32", "14:32 yesterday", "14:32 on Monday", "3 Mar"."""
+        local, today = at.astimezone(self.zone), self.now.astimezone(self.zone).date()
+        clock = f"{local:%H:%M}"
+        days = (today - local.date()).days
+        if days == 0:
+            return clock
+        if days == 1:
+            return f"{clock} yesterday"
+        if days == -1:
+            return f"{clock} tomorrow"
+        if 1 < days < 7:
+            return f"{clock} on {local:%A}"
+        year = "" if local.year == today.year else f" {local.year}"
+        return f"{local.day} {local:%b}{year}, {clock}"
 
     def in_full(self, at: datetime) -> str:
         """A time with its date and zone."""
         return f"{at.astimezone(self.zone):%Y-%m-%d %H:%M %Z}"
 
     def ago(self, at: datetime) -> str:
-        """The age of a time in words."""
-        return ago(at, self.now)
+        """An age, or in how long a time comes; `times.js` says the same as time goes on."""
+        if self.now - _JUST_NOW[0] < at <= self.now + _JUST_NOW[1]:
+            return "just now"
+        # A whole number, since of a timedelta it would take the second before.
+        seconds = round((at - self.now).total_seconds())
+        return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale="en")
 
     def of(self, seconds: float) -> datetime:
         """The time of seconds since the epoch."""
         return from_seconds(seconds)
-
-
-def when(at: datetime, now: datetime, zone: tzinfo) -> str:
-    """A time as one would say it: "14:32", "14:32 yesterday", "14:32 on Monday", "3 Mar, 14:32"."""
-    local, today = at.astimezone(zone), now.astimezone(zone).date()
-    clock = f"{local:%H:%M}"
-    days = (today - local.date()).days
-    if days == 0:
-        return clock
-    if days == 1:
-        return f"{clock} yesterday"
-    if days == -1:
-        return f"{clock} tomorrow"
-    if 1 < days < 7:
-        return f"{clock} on {local:%A}"
-    year = "" if local.year == today.year else f" {local.year}"
-    return f"{local.day} {local:%b}{year}, {clock}"
 
 
 def next_morning(now: datetime, zone: tzinfo) -> datetime:
@@ -59,15 +58,6 @@ def next_morning(now: datetime, zone: tzinfo) -> datetime:
 def duration(seconds: float) -> str:
     """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
     return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale="en")
-
-
-def ago(at: datetime, now: datetime) -> str:
-    """An age, or in how long a time comes; `times.js` says the same as time goes on."""
-    if now - _JUST_NOW[0] < at <= now + _JUST_NOW[1]:
-        return "just now"
-    # A whole number, since of a timedelta it would take the second before.
-    seconds = round((at - now).total_seconds())
-    return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale="en")
 
 
 def from_seconds(at_s: float) -> datetime:

@@ -8,12 +8,7 @@ from typing import Any
 from dbos import DBOS
 from dbos._recovery import recover_pending_workflows  # private; pinned, see take_over
 
-from service.job_queue import (
-    DELIVER_JOB,
-    ESTIMATE_JOB,
-    TRAIN_JOB,
-    engine_config,
-)
+from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, engine_config
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from service.workers.estimate import run_estimate

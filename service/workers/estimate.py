@@ -2,9 +2,9 @@
 
 import logging
 import time
-from dataclasses import replace
 from functools import partial
 
+from models.errors import CheckpointError
 from service.estimate_queue import (
     begin_look,
     end_look,
@@ -12,22 +12,18 @@ from service.estimate_queue import (
     leave_poisoned,
     note_partial_failures,
 )
-from service.estimation.anchoring import (
-    compute_anchor_days,
-    load_anchor_days,
-    save_anchor_days,
-)
+from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.estimates import save_estimate
-from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
+from service.estimation.evidence import Unpacked, load_evidence
+from service.estimation.finding import PartialFailures, compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
-from service.estimation.partial_failures import PartialFailures
-from service.estimation.people import Unpacked
+from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
-from service.workers.predictions import predict_pending
 
 log = logging.getLogger("surefoot.jobs")
+
+_BATCH = 500  # tracks that are predicted at once
 
 
 def run_estimate(context: JobContext, camera_id: str) -> None:
@@ -61,20 +57,55 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
-    finding = None if evidence is None else compute_finding(evidence, settings.seed)
-    if finding is not None:
-        finding = replace(finding, failures=(*failures.reasons, *finding.failures))
+    finding = None if evidence is None else compute_finding(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
             if record is not None:
                 fields = {"tracks": record.tracks, "state": record.state}
                 log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
-        failed = failures.reasons if finding is None else finding.failures
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=(*failed, *cooling))
+        end_look(
+            session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
+        )
     _grow_unless_failed(context, camera_id, unpacked)
+
+
+def predict_pending(context: JobContext, camera_id: str, unpacked: Unpacked) -> str:
+    """Have the model in use look at all tracks of the window that it has not seen.
+
+    What it says is never served, so what fails here is logged and said, and stops nobody: returns
+    why, or nothing. A model whose weights cannot be read is given up; the reconcile trains another.
+    """
+    try:
+        _predict_all(context, camera_id, unpacked)
+    except CheckpointError as error:
+        log.error("weights_unreadable", extra={"camera_id": camera_id, "why": str(error)})
+        return "the weights of its model cannot be read, and it is trained again"
+    except Exception as error:
+        log.exception("predictions_failed", extra={"camera_id": camera_id})
+        return repr(error)
+    return ""
+
+
+def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+    while True:
+        with context.store.read() as session:
+            pending = load_pending(session, context.settings, camera_id, _BATCH)
+        if pending is None or not pending.tracks:
+            return
+        fetch_weights(context.store, context.settings, pending.model.weights_sha256)
+        from service.workers.regressor import predict  # torch: 200 MB that not every worker needs
+
+        try:
+            rows = predict(context.settings.weights_dir, pending, unpacked)
+        except CheckpointError:
+            with context.store.write(camera_id) as session:
+                drop_model(session, pending.model.id)
+            raise
+        with context.store.write(camera_id) as session:
+            save_predictions(session, pending.model.id, rows)
 
 
 def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

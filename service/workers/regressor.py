@@ -12,8 +12,8 @@ from models.regression.checkpoint import load_weights
 from models.regression.network import PoseRegressor, predict_windows
 from models.regression.recipe import TrainingPlan, plan_from_config
 from models.tracks.trajectory import cut_windows
-from service.estimation.people import Unpacked
-from service.store.stored_tracks import StoredTrack
+from service.estimation.evidence import Unpacked
+from service.store.tracks import StoredTrack
 from service.training import PendingTracks
 
 _NETWORKS = 64  # kept in memory, of the cameras that were looked at last
@@ -27,14 +27,14 @@ def predict(weights_dir: Path, pending: PendingTracks, unpacked: Unpacked) -> li
     Raises:
         CheckpointError: the model's weights or plan cannot be read.
     """
-    plan = plan_from_config(pending.config)
-    network = _load(weights_dir, pending.weights_sha256, plan)
+    plan = plan_from_config(pending.model.config)
+    network = _load(weights_dir, pending.model.weights_sha256, plan)
     windows = cut_windows(
         [unpacked.feet(track) for track in pending.tracks], plan.intrinsics, plan.walk.step_s
     )
     height_m, quaternions = predict_windows(network, windows, plan)
     owners, means = average_windows(height_m, quaternions, windows.owner_idx)
-    rows = _empty_rows(pending.model_id, pending.tracks)
+    rows = _empty_rows(pending.model.id, pending.tracks)
     for place, owner in enumerate(owners):
         q = [float(value) for value in means.quaternion_wxyz[place]]
         rows[owner] |= {

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from service.logs import configure_logs
-from service.workers.processes.resources import settle_allocator, yield_to_others
-from service.workers.training_child import REST
+from service.workers.processes.process import settle_allocator, yield_to_others
 
 log = logging.getLogger("surefoot.jobs")
 _TELLS_EVERY_S = 0.25
+REST, GO_ON = "rest", "go on"  # what a training is told, beside its order
 _going = threading.Event()
 _going.set()
 

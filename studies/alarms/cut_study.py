@@ -21,7 +21,7 @@ import numpy as np
 
 from models.geometry.pose import CameraPose
 from models.pose import CameraSite, learn_site, observe
-from models.pose.change_search import search_change
+from models.pose.estimating import search_change
 from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory, by_end

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from models.errors import DegenerateGeometryError
 from models.tracks.scenes import load_scene
-from service.estimation.limits import drift_limits
+from service.references import drift_limits
 from service.settings import Settings
 from studies.alarms.camera_years import live_year
 from studies.alarms.results import AlarmResults

@@ -5,7 +5,7 @@ import torch
 
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose, PlaneEstimate, plane_parameters_of
+from models.geometry.pose import CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
 from models.regression.averaging import FEWEST_TRACKS
 from models.simulation.walkers import WalkConfig
@@ -13,6 +13,7 @@ from studies.base_model.features import FEATURES, segment_features, walking
 from studies.base_model.network import SetNetwork
 from studies.base_model.offsets import moved_by, offset_between
 from studies.base_model.segments import Segments
+from studies.plane_estimate import PlaneEstimate
 
 _ROUNDS = 4  # looks, each from where the last one ended
 _FARTHEST = np.array([0.5, 0.5, 0.8])  # radians of leaning, log height, from the prior

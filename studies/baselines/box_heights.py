@@ -13,9 +13,10 @@ import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose, PlaneEstimate
+from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.tracks.trajectory import Trajectory
+from studies.plane_estimate import PlaneEstimate
 
 _MOST_OF_A_TRACK = 10
 _FEWEST_POINTS = 10

@@ -7,7 +7,6 @@ import numpy as np
 from models.errors import TooFewTrajectoriesError
 from models.geometry.pose import (
     PLANE_PARAMETERS,
-    PlaneEstimate,
     identifiable_of,
     plane_parameters_of,
 )
@@ -22,6 +21,7 @@ from studies.base_model.network import SetNetwork
 from studies.base_model.prediction import base_estimate
 from studies.base_model.segments import segments_of
 from studies.base_model.stored import load_base_model
+from studies.plane_estimate import PlaneEstimate
 from studies.protocol.cases import (
     KNOCKED,
     Answer,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from models.errors import TooFewTrajectoriesError
-from models.geometry.pose import PLANE_PARAMETERS, CameraPose, PlaneEstimate, plane_parameters_of
+from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.regression.averaging import average_windows, averaged_estimate
 from models.regression.network import predict_windows
 from models.regression.recipe import plan_training
@@ -14,6 +14,7 @@ from models.regression.training import train
 from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Trajectory, choose_step_s, cut_windows
+from studies.plane_estimate import PlaneEstimate
 from studies.protocol.cases import Answer, Estimator, ProtocolCase, nothing_identifiable
 from studies.regressors.calibrated import (
     calibrated_estimate,

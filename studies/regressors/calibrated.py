@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.errors import ShapeError, TooFewTrajectoriesError
-from models.geometry.pose import PlaneEstimate
 from models.geometry.rotation import (
     Array,
     angles_from_rotation,
@@ -13,6 +12,7 @@ from models.geometry.rotation import (
     rotation_from_quaternion,
 )
 from models.regression.averaging import FEWEST_TRACKS, TrackPredictions
+from studies.plane_estimate import PlaneEstimate
 
 # Units in which the curve is a polynomial: radians of tilt and roll, log height.
 _UNITS = np.array([0.1, 0.1, 0.2])

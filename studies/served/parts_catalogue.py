@@ -109,9 +109,9 @@ PARTS: dict[str, Part] = {
         words="people who walk together count once",
         off=(
             ("models.paths.likelihood:walking_groups_of", _each_by_itself),
-            ("models.walking.groups:walking_groups_of", _each_by_itself),
+            ("models.walking.measures:walking_groups_of", _each_by_itself),
         ),
-        source=("models.walking.groups:walking_groups_of",),
+        source=("models.walking.measures:walking_groups_of",),
     ),
     "noise of directions": Part(
         words="information that is noise of directions is taken off",
@@ -168,9 +168,9 @@ PARTS: dict[str, Part] = {
     ),
     "change search": Part(
         words="a window begins anew at a change",
-        off=(("models.pose.change_search:_suspects", lambda *_: iter(())),),
+        off=(("models.pose.estimating:_suspects", lambda *_: iter(())),),
         source=(
-            "models/pose/change_search.py",
+            "models/pose/estimating.py",
             "models/pose/change_point.py",
             "models/pose/change_point.py",
             "models/paths/path_tests.py",

@@ -24,7 +24,6 @@ from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
 from service.commands.replay import camera_body, client_of
 from service.enums import ReferenceState
-from service.formats.degrees import degrees
 from studies.protocol.cases import RANGES, ProtocolCase, draw_case
 from studies.protocol.partings import HALVES_IN_TIME, HALVES_OF_PEOPLE
 
@@ -119,7 +118,7 @@ def replay_protocol(
         case=case,
         camera_id=camera_id,
         served=served,
-        angle_error_deg=degrees(
+        angle_error_deg=math.degrees(
             float(
                 angle_between(
                     np.array(served["pose"]["quaternion_wxyz"]), case.true_pose.quaternion_wxyz
@@ -139,10 +138,10 @@ def print_outcome(outcome: ProtocolReplay, console: Console) -> None:
         table.add_column(column, justify="right" if column else "left")
     prior, true = outcome.case.prior_pose, outcome.case.true_pose
     for field, before, after in (
-        ("tilt_deg", degrees(prior.tilt_rad), degrees(true.tilt_rad)),
-        ("roll_deg", degrees(prior.roll_rad), degrees(true.roll_rad)),
+        ("tilt_deg", math.degrees(prior.tilt_rad), math.degrees(true.tilt_rad)),
+        ("roll_deg", math.degrees(prior.roll_rad), math.degrees(true.roll_rad)),
         ("height_m", prior.height_m, true.height_m),
-        ("heading_deg", degrees(prior.heading_rad), degrees(true.heading_rad)),
+        ("heading_deg", math.degrees(prior.heading_rad), math.degrees(true.heading_rad)),
     ):
         shown = "not told" if sd.get(field) is None else f"{sd[field]:.3f}"
         table.add_row(field, f"{before:.3f}", f"{after:.3f}", f"{pose[field]:.3f}", shown)

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from models.errors import CalibrationError
-from service.estimation.limits import drift_limits
+from service.references import drift_limits
 from service.settings import Settings
 from studies.pages import write_between
 from studies.runs import process_pool, with_bar

@@ -25,7 +25,7 @@ from sqlalchemy import delete
 from service.app import create_app
 from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.flow_maps import LastPoseRecord
+from service.store.references import LastPoseRecord
 from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for

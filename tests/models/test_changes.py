@@ -11,7 +11,7 @@ from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import estimate_pose, learn_site
 from models.pose.change_point import least_covariance
-from models.pose.change_search import pose_fit_of
+from models.pose.estimating import pose_fit_of
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site

@@ -2,21 +2,210 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from models.errors import ShapeError
+from models.errors import ShapeError, TooFewTrajectoriesError
+from models.geometry.pose import array_of
+from models.monitoring.chart_learning import learn_chart
+from models.monitoring.group_scores import score_groups
+from models.monitoring.verdict import DriftLimits
+from models.paths.folds import fold_maps
 from models.pose import (
     AlarmRate,
+    alarm_chart_result,
+    assume_site,
     estimate_pose,
+    learn_site,
     observe,
 )
+from models.pose.change_point import find_change
+from models.pose.pose_fit import by_speeds_alone
+from models.tracks.observations import of_tracks
+from models.tracks.trajectory import by_end
+from models.walking.estimate import joint_estimate
+from studies.protocol.cases import ProtocolCase
+from studies.protocol.flow_runs import fused
+from studies.protocol.learned import Learned
+from studies.protocol.served import served_pose
 from studies.simulation.lanes import SiteConfig
-from tests.models.sites import LENS, PRIOR
+from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
+)  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def tracks():
+    """Reference tracks, then some of the still camera and of the knocked one."""
+    known, still, after = tracks_of(3, (PRIOR, 150), (PRIOR, 60), (KNOCKED, 60), config=CONFIG)
+    return [by_end(part) for part in (known, still, after)]
+
+
+@pytest.fixture(scope="module")
+def site(tracks):
+    return learn_site(seen(tracks[0]), LENS, PRIOR)
+
+
+@pytest.fixture(scope="module")
+def window(tracks):
+    return seen(by_end([*tracks[1], *tracks[2]]))
+
+
+def swapped(tracks):
+    """The same in another order than that of time."""
+    return seen([*tracks[30:], *tracks[:30]])
+
+
+def test_the_pose_is_from_the_change_on(site, window, tracks):
+    found = estimate_pose(window, site)
+    assert abs(found.change_idx - 60) <= 3
+    assert found.first == found.change_idx
+    assert (np.abs(near(found.pose) - near(KNOCKED)) < [0.7, 0.9, 0.3]).all(), found.pose
+    # It is what is said of the tracks from there on alone.
+    alone = estimate_pose(of_tracks(window, np.arange(found.first, window.tracks)), site)
+    assert alone.change_idx is None
+    np.testing.assert_array_equal(found.fused.values, alone.fused.values)
+    assert found.fused.registered
+    assert not found.failures
+
+
+def test_a_still_camera_is_cut_nowhere_and_its_chart_is_calm(site, tracks):
+    still = seen(tracks[1])
+    found = estimate_pose(still, site)
+    assert (found.change_idx, found.first) == (None, 0)
+    assert abs(found.drift.by.tilt_rad) < np.radians(1)
+    assert not alarm_chart_result(still, site, ONE_A_YEAR).moved
+
+
+def test_the_chart_alarms_at_the_rate_that_is_allowed(site, window):
+    result = alarm_chart_result(window, site, ONE_A_YEAR)
+    assert result.moved
+    assert result.track_idx == pytest.approx(60, abs=12)
+    often = alarm_chart_result(window, site, replace(ONE_A_YEAR, alarms_a_year=100.0))
+    assert often.level < result.level
+
+
+def test_the_chart_asks_those_after_the_change_who_count_or_else_all_who_do(site, window):
+    counted = np.ones(window.tracks, dtype=bool)
+    counted[:40] = False
+    late = alarm_chart_result(window, site, ONE_A_YEAR, counted=counted, first=70)
+    alone = alarm_chart_result(of_tracks(window, np.arange(70, 120)), site, ONE_A_YEAR)
+    assert late == replace(alone, track_idx=alone.track_idx + 70)
+    # Ten tracks after the change are too few: all that count are asked.
+    few = alarm_chart_result(window, site, ONE_A_YEAR, counted=counted, first=110)
+    assert few == alarm_chart_result(window, site, ONE_A_YEAR, counted=counted)
+    assert few.track_idx >= 40
+    nobody = np.zeros(window.tracks, dtype=bool)
+    assert alarm_chart_result(window, site, ONE_A_YEAR, counted=nobody) is None
+
+
+def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, tracks):
+    every = seen([*tracks[0], *tracks[1]])
+    evenly = learn_site(every, LENS, PRIOR, speed_reference=site.speed_reference)
+    weights = np.linspace(0.05, 1, every.tracks)
+    faded = learn_site(
+        every, LENS, PRIOR, speed_reference=site.speed_reference, weights=weights, chart=False
+    )
+    assert evenly.speed_reference is faded.speed_reference is site.speed_reference
+    assert evenly.chart.walking_groups > site.chart.walking_groups
+    assert site.paths.people < evenly.paths.people
+    assert faded.paths.people < evenly.paths.people
+
+
+def test_speeds_of_the_first_tracks_and_a_map_of_all(site, tracks):
+    every = seen([*tracks[0], *tracks[1]])
+    found = learn_site(every, LENS, PRIOR, speed_tracks=150, chart=False)
+    np.testing.assert_array_equal(found.speed_reference.offset, site.speed_reference.offset)
+    assert found.chart is None
+    assert found.paths.people > site.paths.people
+
+
+def test_few_people_make_no_map_and_fewer_no_site(tracks):
+    few = learn_site(seen(tracks[0][:8]), LENS, PRIOR)
+    assert few.learned
+    assert (few.paths, few.chart) == (None, None)
+    found = estimate_pose(seen(tracks[2]), few)
+    assert not found.fused.registered
+    assert alarm_chart_result(seen(tracks[2]), few, ONE_A_YEAR) is None
+    with pytest.raises(TooFewTrajectoriesError, match="at least 5"):
+        learn_site(seen(tracks[0][:3]), LENS, PRIOR)
+
+
+def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
+    site = assume_site(window, LENS, PRIOR)
+    assert not site.learned
+    found = estimate_pose(window, site)
+    joint = joint_estimate(window, PRIOR, site.speed_reference)
+    np.testing.assert_array_equal(found.joint.values, joint.values)
+    np.testing.assert_array_equal(found.fused.values, by_speeds_alone(joint, PRIOR).values)
+    assert found.change_idx is None
+
+
+@pytest.mark.parametrize("fails_at", ["search", "pose"])
+def test_a_map_that_fails_is_told_and_the_pose_is_by_speeds(site, tracks, fails_at):
+    asked = seen(tracks[1])
+    if fails_at == "search":
+        paths = replace(site.paths, still=replace(site.paths.still, covariance=np.eye(3)))
+    else:
+        paths = replace(site.paths, bias=np.zeros(3))
+    spoilt = replace(site, paths=paths)
+    found = estimate_pose(asked, spoilt)
+    (lack,) = found.failures
+    assert lack.part == "flow_map"
+    assert isinstance(lack.error, ValueError)
+    assert not found.fused.registered
+    blind = estimate_pose(asked, replace(site, paths=None))
+    assert found.change_idx == blind.change_idx
+    np.testing.assert_array_equal(found.fused.values, blind.fused.values)
+    with pytest.raises(ValueError, match="dimension|shape|broadcast|signature|match"):
+        served_pose(asked, spoilt)  # a study does not do without
+
+
+def test_the_study_s_fused_pose_is_the_served_one_with_its_change(site, window, tracks):
+    case = ProtocolCase(
+        scene_id="simulated",
+        seed=0,
+        intrinsics=LENS,
+        prior_pose=PRIOR,
+        true_pose=KNOCKED,
+        reference=tuple(tracks[0]),
+        seen=tuple(by_end([*tracks[1], *tracks[2]])),
+    )
+    learned = Learned(
+        case=case, seen=window, site=site, feet=window, feet_speed_reference=site.speed_reference
+    )
+    answer, found = fused(learned), estimate_pose(window, site)
+    np.testing.assert_array_equal(answer.values, found.fused.values[:3])
+    assert answer.tracks == found.joint.walkers < window.walkers - 50
+
+
+def refusals(site, tracks):
+    """All that goes by the order of time, each given tracks out of order."""
+    mixed = swapped(tracks)
+    folds = fold_maps(mixed, LENS, array_of(PRIOR), 0)
+    return {
+        "learn_site": lambda: learn_site(mixed, LENS, PRIOR),
+        "estimate_pose": lambda: estimate_pose(mixed, site),
+        "alarm_chart_result": lambda: alarm_chart_result(mixed, site, ONE_A_YEAR),
+        "score_groups": lambda: score_groups(mixed, site.usual(site.paths, site.chart)),
+        "find_change": lambda: find_change(mixed, PRIOR, site.speed_reference),
+        "learn_chart": lambda: learn_chart(mixed, PRIOR, site.speed_reference, folds, 0),
+    }
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "learn_site",
+        "estimate_pose",
+        "alarm_chart_result",
+        "score_groups",
+        "find_change",
+        "learn_chart",
+    ],
+)
 def test_tracks_out_of_order_are_refused(site, tracks, call):
     gone_s = float(tracks[1][-1].time_s[-1] - tracks[1][0].time_s[-1])
     with pytest.raises(ShapeError, match="order of their ends, got one at 30 that ended") as told:

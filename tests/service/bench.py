@@ -15,7 +15,7 @@ from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.finding import Finding, asked_enough
 from service.job_queue import JobQueue
 from service.reasons import as_said
-from service.store import events, references, trainings
+from service.store import journal, references, trainings
 from service.store.engines.store import Store
 from service.training import begin_training, publish_model
 from tests.conftest import track
@@ -86,7 +86,7 @@ class Bench:
 
     def events(self, type_):
         with self.store.read() as session:
-            return [e.payload for e in events.after(session, 0, 1000) if e.type == type_]
+            return [e.payload for e in journal.events_after(session, 0, 1000) if e.type == type_]
 
 
 def made_up(

@@ -18,9 +18,8 @@ from service.settings import Settings
 from service.store import references, trainings
 from service.store.engines.store import Store
 from service.store.estimates import EstimateRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.serialization import pack
-from service.store.stored_tracks import TrackRecord
+from service.store.references import MaintenanceRecord
+from service.store.tracks import TrackRecord, pack
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 POSE = CameraPose(height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1))

@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from models.geometry.pose import CameraPose
+from models.pose import CameraSite
 from models.reasons import Reason, TracksCode
 from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
@@ -25,7 +26,7 @@ from service.app import create_app
 from service.estimate_queue import begin_look, end_look
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
-from service.estimation.learning import LearnedReference, load_reference_period, save_reference
+from service.estimation.learning import load_reference_period, save_reference
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store import tracks, trainings
@@ -135,12 +136,12 @@ class Life:
             newest_pk = begin_look(session, camera_id)
             period = load_reference_period(session, self.settings, camera_id)
             if period is not None:
-                learned = LearnedReference(site=some_site(), paths=None)
+                learned = CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=some_site())
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
                     values = {"tilt_rad": 0.1, "roll_rad": 0.0}
                     doubt = Reason(code=TracksCode.PRIOR_POSE_DOUBTED, values=values)
                     doubted = replace(some_site(), implausible=doubt)
-                    learned = LearnedReference(site=doubted, paths=None)
+                    learned = replace(learned, speed_reference=doubted)
                 save_reference(session, self.settings, camera_id, period, learned)
         with self.store.read() as session:
             evidence = load_evidence(session, self.settings, camera_id)

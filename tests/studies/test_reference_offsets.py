@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from models.geometry.pose import CameraPose, PlaneEstimate, plane_parameters_of
+from models.geometry.pose import CameraPose, plane_parameters_of
+from studies.plane_estimate import PlaneEstimate
 from studies.protocol.regressors import SITE_BIAS_SD, without_offset
 
 PRIOR = CameraPose(height_m=5, tilt_rad=0.2, roll_rad=-0.05)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import surefoot
+from models.monitoring.verdict import DriftLimits
+from service.settings import Settings
 from studies.simulation.lanes import SiteConfig
 from tests.conftest import ROOT, SCENES
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
@@ -140,3 +142,12 @@ def test_a_pose_keeps_its_angles():
     pose = surefoot.Pose(height_m=4, tilt_deg=20, roll_deg=-3, heading_deg=300)
     assert surefoot.Pose.of(pose.in_radians).heading_deg == pytest.approx(300)
     assert pose.in_radians.tilt_rad == pytest.approx(math.radians(20))
+
+
+def test_a_drift_counts_from_where_the_service_counts_it():
+    limits, ours = DriftLimits(), Settings.model_fields
+    assert ours["drift_sigmas"].default == limits.sigmas
+    assert math.radians(ours["drift_floor_deg"].default) == limits.floor_rad
+    assert ours["drift_floor_m"].default == limits.floor_m
+    assert ours["drift_people"].default == limits.people
+    assert ours["drift_clear_ratio"].default == limits.clear_ratio

@@ -4,6 +4,7 @@ import hmac
 import logging
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from ipaddress import ip_address
 from urllib.parse import quote
 
@@ -15,13 +16,14 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access import sessions, tokens
+from service.access.activity import note
 from service.access.attempts import Attempts
-from service.access.callers import Caller
-from service.api.middleware.concurrency import LOOKUPS
+from service.access.tokens import Caller
+from service.api.middleware.admission import LOOKUPS
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import STATIC_URL
 from service.api.middleware.scopes import need_of
-from service.enums import TokenScope
+from service.enums import Activity, TokenScope
 from service.errors import (
     ForbiddenError,
     NotFoundError,
@@ -30,6 +32,7 @@ from service.errors import (
     UnauthorizedError,
 )
 from service.settings import Settings
+from service.store import access
 from service.store.engines.store import Store
 
 log = logging.getLogger("surefoot.access")
@@ -135,7 +138,7 @@ class GuardMiddleware:
 
         def keep() -> None:
             with store.write(f"token/{token_id}") as session:
-                tokens.note_use(session, token_id)
+                access.note_use(session, token_id, datetime.now(UTC))
 
         try:
             await run_sync(keep, limiter=self._keeping)
@@ -160,7 +163,8 @@ def refuse(request: Request) -> None:
         log.warning("login_refused", extra={"address": request.state.address})
         try:
             with request.state.app.store.write("refused/") as session:
-                sessions.note_refused(session, request.state.address)
+                details = {"address": request.state.address}  # and never with what
+                note(session, Activity.LOGIN_REFUSED, by=None, details=details)
         except (SQLAlchemyError, ServiceError) as error:
             log.warning("refusal_not_kept", extra={"error": str(error)})
     if failure.wait_s:

@@ -4,11 +4,12 @@ uvicorn waits for ever for headers, for bodies and for clients that take their a
 """
 
 import asyncio
+import json
 import math
 import resource
 from collections import Counter
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
+from http import HTTPStatus
 from typing import Any
 
 import h11
@@ -20,14 +21,23 @@ from service.settings import Settings
 _OTHER_FILES = 256  # the database, logs, pipes, and what is accepted in one go before it is counted
 _LEAST_BODY_BYTES = 1024  # a second
 _MOST_UNREAD_BYTES = 8 * 1024 * 1024  # of a body that was refused, until the connection is cut
-_BUSY = (
-    b'{"type":"about:blank","title":"Service Unavailable","status":503,"code":"overloaded",'
-    b'"detail":"connections: as many are open as may be"}'
+
+
+def _refusal(status: HTTPStatus, code: str, detail: str) -> bytes:
+    """A problem document as it goes over the wire, where no application is asked."""
+    title = status.phrase
+    problem = {"type": "about:blank", "title": title, "status": status, "code": code}
+    body = json.dumps({**problem, "detail": detail}, separators=(",", ":"))
+    return (
+        f"HTTP/1.1 {status} {title}\r\ncontent-type: application/problem+json\r\n"
+        f"content-length: {len(body)}\r\nretry-after: 2\r\nconnection: close\r\n\r\n{body}"
+    ).encode()
+
+
+_BUSY = _refusal(
+    HTTPStatus.SERVICE_UNAVAILABLE, "overloaded", "connections: as many are open as may be"
 )
-_LATE = (
-    b'{"type":"about:blank","title":"Request Timeout","status":408,"code":"request_timeout",'
-    b'"detail":"the request did not come in time"}'
-)
+_LATE = _refusal(HTTPStatus.REQUEST_TIMEOUT, "request_timeout", "the request did not come in time")
 
 
 class ConnectionGuard:
@@ -43,11 +53,6 @@ class ConnectionGuard:
         self.of_address: Counter[str] = Counter()
         self.open = 0
         self.silent: dict[GuardedProtocol, None] = {}  # no request has come yet; oldest first
-
-
-def protocol_factory(guard: ConnectionGuard) -> Callable[..., asyncio.Protocol]:
-    """The factory of uvicorn's connections."""
-    return partial(GuardedProtocol, guard=guard)
 
 
 def allow_descriptors() -> int:
@@ -133,9 +138,9 @@ class GuardedProtocol(H11Protocol):
         """End the oldest of those that keep silent, since this one may not; else end this one."""
         oldest = next(silent, None)
         if oldest is None:
-            self._end(reason, 503, _BUSY)
+            self._end(reason, _BUSY)
             return False
-        oldest._end("silent", 408, _LATE, abort=True)
+        oldest._end("silent", _LATE, abort=True)
         return True
 
     def _watch(self) -> None:
@@ -159,7 +164,7 @@ class GuardedProtocol(H11Protocol):
 
     def _head_late(self) -> None:
         self._timer = None
-        self._end("head", 408, _LATE)
+        self._end("head", _LATE)
 
     def _body_late(self) -> None:
         self._timer = None
@@ -167,7 +172,7 @@ class GuardedProtocol(H11Protocol):
         if self.flow.read_paused or self._received >= least:
             self._watch()
             return
-        self._end("body", 408, _LATE)
+        self._end("body", _LATE)
 
     def _watch_reader(self) -> None:
         left = self.transport.get_write_buffer_size()
@@ -183,7 +188,7 @@ class GuardedProtocol(H11Protocol):
         self._count("reader")
         self.transport.abort()
 
-    def _end(self, reason: str, status: int, body: bytes, abort: bool = False) -> None:
+    def _end(self, reason: str, answer: bytes, abort: bool = False) -> None:
         """Answer as well as it goes, and close."""
         self._count(reason)
         self._leave()
@@ -191,12 +196,7 @@ class GuardedProtocol(H11Protocol):
             return
         cycle = self.cycle
         if cycle is None or not cycle.response_started or self.conn.our_state is h11.IDLE:
-            title = b"Service Unavailable" if status == 503 else b"Request Timeout"
-            self.transport.write(
-                b"HTTP/1.1 %d %s\r\ncontent-type: application/problem+json\r\n"
-                b"content-length: %d\r\nretry-after: 2\r\nconnection: close\r\n\r\n%s"
-                % (status, title, len(body), body)
-            )
+            self.transport.write(answer)
         if abort:
             self.transport.abort()
         else:

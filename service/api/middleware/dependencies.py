@@ -9,35 +9,32 @@ from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from typing import Annotated
 
-import anyio
 from fastapi import Depends, Header, Request
 from sqlalchemy.orm import Session
 
-from service.access.callers import Caller
+from service.access.tokens import Caller
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
-from service.cameras.posts import Pictures, Quota, Watched
+from service.cameras.tracks import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store.access import Actor, set_actor
+from service.store.access import set_actor
+from service.store.engines.sqlite import Turns
 from service.store.engines.store import Store
-from service.store.engines.turns import Turns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppState:
     """State of one application from start to stop.
 
-    Event streams follow the `feed`, and look for what was before it by `stream_polls`; large bodies
-    are read in `large_bodies`' turns.
+    Event streams follow the `feed`; large bodies are read in `large_bodies`' turns.
     """
 
     settings: Settings
     store: Store
     queue: JobQueue
     quota: Quota
-    stream_polls: anyio.CapacityLimiter
     feed: Feed
     pictures: Pictures = field(default_factory=Pictures)
     watched: Watched = field(default_factory=Watched)
@@ -70,26 +67,14 @@ async def get_caller(request: Request) -> Caller | None:
 CallerDep = Annotated[Caller | None, Depends(get_caller)]
 
 
-async def get_actor(caller: CallerDep) -> Actor | None:
-    """In whose name an activity is kept, whatever name its body says."""
-    return None if caller is None else Actor(name=caller.name, token_id=caller.token_id)
-
-
-ActorDep = Annotated[Actor | None, Depends(get_actor)]
-
-
-def name_of(actor: Actor | None, said: str | None = None) -> str | None:
-    """The name of who acts: the person who is known; where access is off, whoever the body says."""
-    return said if actor is None else actor.name
-
-
-def write_session(request: Request, state: StateDep, actor: ActorDep) -> Iterator[Session]:
+def write_session(request: Request, state: StateDep, caller: CallerDep) -> Iterator[Session]:
     """A session that commits before the answer is sent, or not at all.
 
-    It writes about the camera that the path names, or about everything.
+    It writes about the camera that the path names, or about everything; and in the name of the
+    caller, whatever name a body says.
     """
     with state.store.write(request.path_params.get("camera_id")) as session:
-        set_actor(session, actor)
+        set_actor(session, caller)
         yield session
 
 
@@ -98,11 +83,16 @@ WriteDep = Annotated[Session, Depends(write_session, scope="function")]
 
 
 async def whole_body(request: Request) -> bytes:
-    """The request's body; how large it may be was seen to before (`bodies.py`)."""
+    """The request's body; how large it may be was seen to before (`admission.py`)."""
     return await request.body()
 
 
 BodyDep = Annotated[bytes, Depends(whole_body)]
+
+
+def media_type_of(request: Request) -> str:
+    """The type of the request's body, without its parameters."""
+    return request.headers.get("content-type", "").split(";")[0].strip().lower()
 
 
 async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:

@@ -50,7 +50,9 @@ class OriginMiddleware:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
-        self._names = _host_names(settings)
+        given = {part.strip().lower().strip("[]") for part in settings.allowed_hosts.split(",")}
+        # Small letters, without ports.
+        self._names = {_LOCAL, settings.host.lower(), _public_host(settings), *given} - {""}
         # A page can be given any name, but no address that it was not fetched from; beyond
         # loopback nobody knows all names and addresses that lead here.
         self._any_address = not is_loopback(settings.host)
@@ -127,12 +129,6 @@ def _is_address(name: str) -> bool:
 
 def _public_host(settings: Settings) -> str:
     return urlsplit(settings.public_url or "").hostname or ""
-
-
-def _host_names(settings: Settings) -> frozenset[str]:
-    """Names and addresses that requests may be for; small letters, without ports."""
-    given = {part.strip().lower().strip("[]") for part in settings.allowed_hosts.split(",")}
-    return frozenset({_LOCAL, settings.host.lower(), _public_host(settings), *given} - {""})
 
 
 def _split(url: str) -> tuple[str | None, int | None]:

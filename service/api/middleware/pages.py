@@ -6,9 +6,9 @@ from functools import lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Header, Request
 from fastapi.responses import HTMLResponse, Response
 from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
@@ -35,18 +35,20 @@ _FOR_EVER = {
 }
 
 
-def _versioned_url(package: str, name: str) -> str:
+_PACKAGED: dict[str, tuple[str, str]] = {}  # files of installed packages, by URL
+
+
+def _url_of(package: str, name: str) -> str:
     path = Path(name)
-    return f"/ui/{path.stem}-{version(package)}{path.suffix}"
+    url = f"/ui/{path.stem}-{version(package)}{path.suffix}"
+    _PACKAGED[url] = package, name
+    return url
 
 
-CHARTS = "package_data/plotly.min.js"
-CHARTS_URL = _versioned_url("plotly", CHARTS)
+CHARTS_URL = _url_of("plotly", "package_data/plotly.min.js")
 # Of the viewer the files alone; none of its code is run.
-VIEWER_MODULE = "fastapi_swagger"
-VIEWER_SCRIPT, VIEWER_STYLE = "resources/swagger-ui-bundle.js", "resources/swagger-ui.css"
-VIEWER_SCRIPT_URL = _versioned_url("fastapi-swagger", VIEWER_SCRIPT)
-VIEWER_STYLE_URL = _versioned_url("fastapi-swagger", VIEWER_STYLE)
+VIEWER_SCRIPT_URL = _url_of("fastapi_swagger", "resources/swagger-ui-bundle.js")
+VIEWER_STYLE_URL = _url_of("fastapi_swagger", "resources/swagger-ui.css")
 
 
 def _fingerprint() -> str:
@@ -76,6 +78,8 @@ class _KeptFiles(StaticFiles):
 def mount_static(app: FastAPI) -> None:
     """Serve what pages need besides themselves."""
     app.mount(STATIC_URL, _KeptFiles(directory=_STATIC), name="static")
+    for url in _PACKAGED:
+        app.add_api_route(url, _packaged_file, include_in_schema=False)
 
 
 def wants_page(request: Request) -> bool:
@@ -97,9 +101,9 @@ def render(request: Request, template: str, status: int = 200, **context: Any) -
     return page
 
 
-def packaged_file(module: str, name: str, accept_encoding: str) -> Response:
+def _packaged_file(request: Request, accept_encoding: Annotated[str, Header()] = "") -> Response:
     """A file of an installed package, packed where the browser takes that."""
-    path = _path(module, name)
+    path = _path(*_PACKAGED[request.url.path])
     headers = {**_FOR_EVER, "Vary": "Accept-Encoding"}
     packed = "gzip" in accept_encoding
     if packed:

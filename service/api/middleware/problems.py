@@ -6,7 +6,7 @@ import reprlib
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from sqlalchemy.exc import SQLAlchemyError
@@ -21,21 +21,16 @@ from service.store.engines.failures import failure_of
 
 log = logging.getLogger("surefoot.http")
 
+FORESEEN = (
+    ServiceError,
+    SQLAlchemyError,
+    CalibrationError,
+    RequestValidationError,
+    HTTPException,
+)
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = 80
-
-
-def add_problem_handlers(app: FastAPI) -> None:
-    """Answer what routes raise with problem documents.
-
-    The handlers are coroutines: plain ones would need a thread, of which there may be none.
-    """
-    app.add_exception_handler(ServiceError, _service_error)
-    app.add_exception_handler(SQLAlchemyError, _any_error)
-    app.add_exception_handler(CalibrationError, _calibration_error)
-    app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(HTTPException, _http_error)
 
 
 class ProblemMiddleware:
@@ -63,7 +58,7 @@ class ProblemMiddleware:
         except Exception as error:
             if begun:
                 raise
-            answer = await _any_error(Request(scope, receive), error)
+            answer = await answer_of(Request(scope, receive), error)
             await answer(scope, receive, send)
 
 
@@ -94,31 +89,37 @@ def problem(request: Request, error: ServiceError) -> Response:
     return Response(text, status, headers, media_type="application/problem+json")
 
 
-async def _service_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, ServiceError)
-    return problem(request, error)
+async def answer_of(request: Request, error: Exception) -> Response:
+    """The answer that tells of what was raised.
+
+    A coroutine: a plain handler would need a thread, of which there may be none.
+    """
+    answer = problem(request, _told(request, error))
+    if isinstance(error, HTTPException):
+        answer.headers.update(error.headers or {})
+    return answer
 
 
-async def _any_error(request: Request, error: Exception) -> Response:
-    found = error if isinstance(error, ServiceError) else None
-    if isinstance(error, SQLAlchemyError):
-        found = failure_of(error)
-    if found is None:
-        log.error(
-            "request_failed",
-            exc_info=error,
-            extra={"method": request.method, "path": request.url.path},
-        )
-        found = ServiceError("the service failed; its log says where")
-    return problem(request, found)
+def _told(request: Request, error: Exception) -> ServiceError:
+    """The error as clients are told of it; one that nobody foresaw is logged."""
+    match error:
+        case ServiceError():
+            return error
+        case SQLAlchemyError() if found := failure_of(error):
+            return found
+        case CalibrationError():
+            return _other(409, "calibration", str(error))
+        case RequestValidationError():
+            return _malformed(error)
+        case HTTPException(status_code=status, detail=detail):
+            code = HTTPStatus(status).phrase.lower().replace(" ", "_")
+            return _other(status, code, str(detail))
+    fields = {"method": request.method, "path": request.url.path}
+    log.error("request_failed", exc_info=error, extra=fields)
+    return ServiceError("the service failed; its log says where")
 
 
-async def _calibration_error(request: Request, error: Exception) -> Response:
-    return problem(request, _other(409, "calibration", str(error)))
-
-
-async def _validation_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)
+def _malformed(error: RequestValidationError) -> ServiceError:
     errors = tuple(
         FieldError(
             pointer="".join(f"/{part}" for part in item["loc"] if part != "body")[:200],
@@ -127,15 +128,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
         for item in error.errors()[:_MOST_ERRORS]
     )
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
-    return problem(request, _other(422, "malformed", detail, errors))
-
-
-async def _http_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
-    answer = problem(request, _other(error.status_code, code, str(error.detail)))
-    answer.headers.update(error.headers or {})
-    return answer
+    return _other(422, "malformed", detail, errors)
 
 
 def _other(

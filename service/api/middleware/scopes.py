@@ -11,51 +11,42 @@ from service.enums import TokenScope
 # None: whoever asks.
 Need = TokenScope | None
 
-_GET: dict[Need, tuple[str, ...]] = {
+_ROUTES: dict[Need, tuple[str, ...]] = {
     # `/readyz` tells an orchestrator whether to send work here; what is wrong, only who may read.
-    None: ("/healthz", "/readyz", "/ui/login"),
-    TokenScope.READ: (
-        "/",
-        "/activity",
-        "/alerts",
-        "/alerts/{alert_id}",
-        "/cameras",
-        "/cameras/{camera_id}",
-        "/cameras/{camera_id}/maintenance",
-        "/cameras/{camera_id}/pose",
-        "/cameras/{camera_id}/pose.yaml",
-        "/cameras/{camera_id}/pose/history",
-        "/cameras/{camera_id}/snapshot",
-        "/cameras/{camera_id}/sources",
-        "/cameras/{camera_id}/trainings",
-        "/docs",
-        "/events",
-        "/metrics",
-        "/openapi.json",
-        "/trainings/{training_id}",
-        "/ui/cameras/{camera_id}",
-        "/ui/fleet/banners",
-        "/ui/fleet/rows",
-        CHARTS_URL,
-        VIEWER_SCRIPT_URL,
-        VIEWER_STYLE_URL,
+    None: (
+        "GET /healthz",
+        "GET /readyz",
+        "GET /ui/login",
+        "POST /ui/login",
     ),
-    # Addresses of webhooks often hold a secret; the form and the list of tokens are for who may
-    # use them.
-    TokenScope.ADMIN: (
-        "/deliveries/{delivery_id}",
-        "/tokens",
-        "/ui/register",
-        "/ui/tokens",
-        "/webhooks",
-        "/webhooks/{webhook_id}",
-        "/webhooks/{webhook_id}/deliveries",
-    ),
-}
-_ENDPOINTS: dict[Need, tuple[str, ...]] = {
-    None: ("POST /ui/login",),
     TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),
-    TokenScope.READ: ("POST /ui/logout",),
+    TokenScope.READ: (
+        "GET /",
+        "GET /activity",
+        "GET /alerts",
+        "GET /alerts/{alert_id}",
+        "GET /cameras",
+        "GET /cameras/{camera_id}",
+        "GET /cameras/{camera_id}/maintenance",
+        "GET /cameras/{camera_id}/pose",
+        "GET /cameras/{camera_id}/pose.yaml",
+        "GET /cameras/{camera_id}/pose/history",
+        "GET /cameras/{camera_id}/snapshot",
+        "GET /cameras/{camera_id}/sources",
+        "GET /cameras/{camera_id}/trainings",
+        "GET /docs",
+        "GET /events",
+        "GET /metrics",
+        "GET /openapi.json",
+        "GET /trainings/{training_id}",
+        "GET /ui/cameras/{camera_id}",
+        "GET /ui/fleet/banners",
+        "GET /ui/fleet/rows",
+        f"GET {CHARTS_URL}",
+        f"GET {VIEWER_SCRIPT_URL}",
+        f"GET {VIEWER_STYLE_URL}",
+        "POST /ui/logout",
+    ),
     TokenScope.OPERATE: (
         "POST /alerts/{alert_id}/acknowledge",
         "POST /alerts/{alert_id}/resolve",
@@ -73,7 +64,16 @@ _ENDPOINTS: dict[Need, tuple[str, ...]] = {
         "POST /cameras/{camera_id}/trainings",
         "DELETE /trainings/{training_id}",
     ),
+    # Addresses of webhooks often hold a secret; the form and the list of tokens are for who may
+    # use them.
     TokenScope.ADMIN: (
+        "GET /deliveries/{delivery_id}",
+        "GET /tokens",
+        "GET /ui/register",
+        "GET /ui/tokens",
+        "GET /webhooks",
+        "GET /webhooks/{webhook_id}",
+        "GET /webhooks/{webhook_id}/deliveries",
         "POST /cameras",
         "PATCH /cameras/{camera_id}",
         "DELETE /cameras/{camera_id}",
@@ -94,12 +94,9 @@ _ENDPOINTS: dict[Need, tuple[str, ...]] = {
     ),
 }
 NEEDS: dict[tuple[str, str], Need] = {
-    **{("GET", path): need for need, paths in _GET.items() for path in paths},
-    **{
-        (each.split()[0], each.split()[1]): need
-        for need, some in _ENDPOINTS.items()
-        for each in some
-    },
+    (method, path): need
+    for need, routes in _ROUTES.items()
+    for method, path in map(str.split, routes)
 }
 # A path without parameters is only what it says, before those that fit it, too.
 _PLAIN: dict[tuple[str, str], Need] = {

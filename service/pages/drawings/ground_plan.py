@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from models.geometry.ground import Misplacement, ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.pages.drawings.picture import Overlay, ground_of
-from service.pages.drawings.svg_paths import Frame, path_data
+from service.pages.drawings.svg_paths import Frame, path_data, svg
 
 _SIZE_PX = 640.0
 _MARGIN_PX, _TRIED_MARGIN_PX = 18.0, 20.0
@@ -77,10 +77,7 @@ def ground_plan_svg(
     parts.append(f'<path class="track" d="{drawn}"/>')
     parts += [_stroke(plan, each) for each in misplaced]
     parts += [_camera(plan, pose), _north(), _scale_bar(plan)]
-    return Markup(
-        f'<svg class="picture plan" viewBox="0 0 {_SIZE_PX:.0f} {_HEIGHT_PX:.0f}" role="img" '
-        f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
-    )
+    return svg("picture plan", f"0 0 {_SIZE_PX:.0f} {_HEIGHT_PX:.0f}", label, parts)
 
 
 def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]) -> Markup:
@@ -104,13 +101,13 @@ def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]
     feet = [ground_from_pixel(lens, pose.rotation, pose.centre_m, uv)[0] for uv in tracks]
     drawn = path_data([on_page(walk) for walk in feet], frame)
     u, v = on_page(np.array([view.foot_m]))[0]
-    return Markup(
-        f'<svg class="picture" viewBox="0 0 {_SIZE_PX:.0f} {_SIZE_PX:.0f}" role="img" '
-        f'aria-label="The ground from above; a square is {view.spacing_m:g} m">'
-        f'<path class="grid prior" d="{path_data([on_page(x) for x in view.lines()], frame)}"/>'
-        f'<path class="track" d="{drawn}"/>'
-        f'<circle class="foot" cx="{u:.1f}" cy="{v:.1f}" r="7"/></svg>'
-    )
+    parts = [
+        f'<path class="grid prior" d="{path_data([on_page(x) for x in view.lines()], frame)}"/>',
+        f'<path class="track" d="{drawn}"/>',
+        f'<circle class="foot" cx="{u:.1f}" cy="{v:.1f}" r="7"/>',
+    ]
+    label = f"The ground from above; a square is {view.spacing_m:g} m"
+    return svg("picture", f"0 0 {_SIZE_PX:.0f} {_SIZE_PX:.0f}", label, parts)
 
 
 def view_outline(lens: Intrinsics, pose: CameraPose, reach_m: float) -> Array:

@@ -19,7 +19,7 @@ from models.geometry.ground import (
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from service.pages.drawings.svg_paths import Frame, path_data
+from service.pages.drawings.svg_paths import Frame, path_data, svg
 
 _SPACINGS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 _LINES = 20  # about so many lie across the view
@@ -150,10 +150,7 @@ def picture_svg(
         )
     if tracks:
         parts.append(f'<path class="track" d="{path_data(tracks, picture_frame(lens))}"/>')
-    return Markup(
-        f'<svg class="picture" viewBox="-0.5 -0.5 {lens.width} {lens.height}" role="img" '
-        f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
-    )
+    return svg("picture", f"-0.5 -0.5 {lens.width} {lens.height}", label, parts)
 
 
 def picture_frame(lens: Intrinsics) -> Frame:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from models.geometry.rotation import Array
 
@@ -18,6 +19,14 @@ class Frame:
     top: float
     right: float
     bottom: float
+
+
+def svg(kind: str, view_box: str, label: str, parts: Iterable[str]) -> Markup:
+    """A drawing of parts that are SVG already; the label is what a screen reader says of it."""
+    return Markup(
+        f'<svg class="{kind}" viewBox="{view_box}" role="img" aria-label="{escape(label)}">'
+        f"{''.join(parts)}</svg>"
+    )
 
 
 def path_data(lines: Iterable[Array], frame: Frame) -> str:

@@ -1,19 +1,170 @@
-"""A store in an SQLite file: its connections, and one writer after the other."""
+"""A store in an SQLite file: connections, one writer after the other, prepared statements."""
 
 import fcntl
 import sqlite3
+import threading
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy import (
+    ClauseElement,
+    Connection,
+    CursorResult,
+    Dialect,
+    Engine,
+    Executable,
+    Select,
+    create_engine,
+    event,
+    make_url,
+    text,
+)
+from sqlalchemy.dialects.sqlite import pysqlite
 from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.sql.compiler import SQLCompiler
 
 from service.data_dir import make_file
-from service.store.engines.prepared import Prepared
-from service.store.engines.turns import Turns
+from service.errors import OverloadedError
+
+
+class Turns:
+    """A fair lock with bounded waiting; one thread may take a turn and another end it."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+        self._taken = False
+        self._waiting: deque[threading.Event] = deque()
+
+    @property
+    def waiting(self) -> int:
+        """The number of those who wait."""
+        return len(self._waiting)
+
+    @contextmanager
+    def turn(self, patience_s: float) -> Iterator[None]:
+        """Wait for one's turn, and have it as long as the block lasts.
+
+        Raises:
+            OverloadedError: it did not come in time.
+        """
+        self._take(patience_s)
+        try:
+            yield
+        finally:
+            self._pass_on()
+
+    def _take(self, patience_s: float) -> None:
+        with self._lock:
+            if not self._taken:
+                self._taken = True
+                return
+            called = threading.Event()
+            self._waiting.append(called)
+        if called.wait(patience_s):
+            return
+        with self._lock:
+            if called.is_set():  # called in the very moment of giving up
+                return
+            self._waiting.remove(called)
+        raise OverloadedError(
+            f"{self._what}: others were at it for {patience_s:g} s", retry_after_s=2
+        )
+
+    def _pass_on(self) -> None:
+        with self._lock:
+            if self._waiting:
+                self._waiting.popleft().set()
+            else:
+                self._taken = False
+
+
+_DIALECT: Dialect = pysqlite.dialect()
+
+Values = Mapping[str, Any]
+
+
+class Prepared:
+    """A statement of SQLAlchemy's that the driver runs itself, on a connection of SQLAlchemy's.
+
+    Values are converted as SQLAlchemy does, and errors are SQLAlchemy's. Rows come as they are
+    stored: columns whose values would have to be converted are not taken.
+
+    Args:
+        statement: what is to be run.
+        columns: those that an insert fills; of any other, none.
+    """
+
+    def __init__(self, statement: ClauseElement, columns: Sequence[str] | None = None) -> None:
+        self._statement = statement
+        compiled = statement.compile(dialect=_DIALECT, column_keys=columns)
+        assert isinstance(compiled, SQLCompiler)
+        self._sql = str(compiled)
+        # Of the statement's own, as a limit is; an insert's have no value before they are given.
+        self._own = {name: value for name, value in compiled.params.items() if value is not None}
+        self._values: list[tuple[str, Callable[[Any], Any] | None]] = [
+            (name, compiled.binds[name].type.dialect_impl(_DIALECT).bind_processor(_DIALECT))
+            for name in compiled.positiontup or ()
+        ]
+        if isinstance(statement, Select):
+            for column in statement.selected_columns:
+                kind = column.type.dialect_impl(_DIALECT)
+                assert kind.result_processor(_DIALECT, None) is None, column
+
+    def run(self, connection: Connection) -> None:
+        """Run what takes no values and gives no rows."""
+        with self._cursor(connection) as cursor:
+            cursor.execute(self._sql)
+
+    def row(self, connection: Connection, values: Values) -> tuple[Any, ...] | None:
+        """The first row; None where there is none."""
+        if connection.dialect.name != _DIALECT.name:
+            found = self._executed(connection, values).first()
+            return None if found is None else tuple(found)
+        with self._cursor(connection) as cursor:
+            cursor.execute(self._sql, self._in_order(values))
+            row: tuple[Any, ...] | None = cursor.fetchone()
+        return row
+
+    def change(self, connection: Connection, *values: Values) -> int:
+        """Change what is stored, by each of some values; how many rows that changed."""
+        if connection.dialect.name != _DIALECT.name:
+            return self._executed(connection, list(values)).rowcount
+        with self._cursor(connection) as cursor:
+            cursor.executemany(self._sql, [self._in_order(each) for each in values])
+        return cursor.rowcount
+
+    def _executed(self, connection: Connection, values: Any) -> CursorResult[Any]:
+        assert isinstance(self._statement, Executable)
+        return connection.execute(
+            self._statement, values, execution_options={"preserve_rowcount": True}
+        )
+
+    @contextmanager
+    def _cursor(self, connection: Connection) -> Iterator[sqlite3.Cursor]:
+        driver: sqlite3.Connection | None = connection.connection.driver_connection
+        assert driver is not None
+        cursor = driver.cursor()
+        try:
+            yield cursor
+        except sqlite3.Error as error:
+            raise DBAPIError.instance(
+                self._sql, None, error, sqlite3.Error, hide_parameters=True, dialect=_DIALECT
+            ) from error
+        finally:
+            cursor.close()  # and with it a look at rows that goes on
+
+    def _in_order(self, values: Values) -> list[Any]:
+        values = {**self._own, **values} if self._own else values
+        return [
+            values[name] if convert is None else convert(values[name])
+            for name, convert in self._values
+        ]
+
 
 _BEGIN = Prepared(text("BEGIN IMMEDIATE"))
 # SQLite asks for a lock that others have less and less often, every tenth of a second in the end:

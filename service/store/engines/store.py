@@ -11,12 +11,7 @@ from sqlalchemy.orm import Session
 from service.data_dir import make_private
 from service.settings import Settings
 from service.store.engines.dialects import is_sqlite
-from service.store.engines.postgresql import (
-    Postgresql,
-    ServerLock,
-    postgresql_engine,
-    wait_for,
-)
+from service.store.engines.postgresql import Postgresql, ServerLock, postgresql_engine, wait_for
 from service.store.engines.sqlite import FileLock, Sqlite, sqlite_engine
 
 R = TypeVar("R")

@@ -6,8 +6,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from typing import IO
+from collections.abc import Callable
+from typing import IO, Self
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -27,20 +27,6 @@ _LONGEST_PAUSE_S = 60.0
 _REPORTED_FROM = 3  # deaths in a row
 
 
-@contextlib.contextmanager
-def local_workers(settings: Settings, give_up: Callable[[], None]) -> Iterator["LocalWorkers"]:
-    """Run the local workers as long as the block lasts.
-
-    `give_up` is called where that makes no sense: other processes work under their names.
-    """
-    workers = LocalWorkers(settings, give_up)
-    workers.start()
-    try:
-        yield workers
-    finally:
-        workers.stop()
-
-
 def pause_s(deaths: int) -> float:
     """The pause before a worker is started again that died so often in a row."""
     return float(min(2.0 ** min(deaths - 1, 20), _LONGEST_PAUSE_S))
@@ -50,7 +36,8 @@ class LocalWorkers:
     """Worker processes that live and die with this one; one that dies or hangs is started anew.
 
     Each reads its stdin, whose other end is ours: when this process ends in whatever way, even by
-    `kill -9`, the workers end too. Each tells on its stdout that it lives.
+    `kill -9`, the workers end too. Each tells on its stdout that it lives. `give_up` is called
+    where that makes no sense: other processes work under their names.
     """
 
     def __init__(self, settings: Settings, give_up: Callable[[], None]) -> None:
@@ -66,13 +53,12 @@ class LocalWorkers:
             for number in range(settings.workers)
         ]
 
-    def start(self) -> None:
-        """Start them all."""
+    def __enter__(self) -> Self:
         for thread in self._threads:
             thread.start()
+        return self
 
-    def stop(self) -> None:
-        """Ask them to end, and wait."""
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         for thread in self._threads:
             thread.join()

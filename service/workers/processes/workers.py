@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from service.settings import Settings
 from service.store import workers
 from service.store.engines.dialects import now_in
+from service.store.workers import WorkerRecord
 
 
 class WorkKind(StrEnum):
@@ -35,7 +36,7 @@ def worker_name(settings: Settings, name: str) -> str:
 def register_worker(session: Session, name: str, pid: int) -> None:
     """Record that a worker's process has started."""
     now = now_in(session)
-    record = workers.find(session, name) or workers.add(session, name, pid, now)
+    record = session.get(WorkerRecord, name) or workers.add(session, name, pid, now)
     record.pid, record.started_at, record.heartbeat_at = pid, now, now
     record.beats += 1
     record.starts += 1
@@ -48,7 +49,7 @@ def take_setback(session: Session) -> timedelta:
     None of them saw that happen: each was ended before, or is only just being started.
     """
     now = now_in(session)
-    ahead = workers.after(session, now)
+    ahead = [record for record in workers.every(session) if record.heartbeat_at > now]
     back = max((record.heartbeat_at - now for record in ahead), default=timedelta())
     for record in ahead:
         record.heartbeat_at = now
@@ -57,7 +58,7 @@ def take_setback(session: Session) -> timedelta:
 
 def heartbeat(session: Session, name: str, pid: int) -> bool:
     """Record that a worker is alive; False where its jobs were given to others meanwhile."""
-    record = workers.find(session, name)
+    record = session.get(WorkerRecord, name)
     if record is None or record.lost or record.pid != pid:
         return False
     record.heartbeat_at = now_in(session)
@@ -67,7 +68,7 @@ def heartbeat(session: Session, name: str, pid: int) -> bool:
 
 def note_trouble(session: Session, name: str, trouble: str | None) -> None:
     """Record what `serve` has to say of a worker that it cannot keep alive; None takes it back."""
-    record = workers.find(session, name)
+    record = session.get(WorkerRecord, name)
     if record is None and trouble is not None:
         record = workers.add(session, name, 0, now_in(session))
         record.lost = True  # it has never been heard of
@@ -89,7 +90,9 @@ class Watch:
         """Names of workers that have fallen silent; among all watchers each is named once."""
         now_s = time.monotonic()
         seen, lost = {}, []
-        for record in workers.alive(session):
+        for record in workers.every(session):
+            if record.lost:
+                continue
             beats, since_s = self._seen.get(record.name, (None, now_s))
             if beats != record.beats:
                 since_s = now_s

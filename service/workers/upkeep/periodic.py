@@ -11,18 +11,20 @@ import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
 
 from models.durations import HOUR_S
 from service.alerts.arrival_models import compute_arrival_model, load_arrivals, save_arrival_model
 from service.alerts.staleness import StaleWatch
 from service.data_dir import ROUNDS
+from service.notifications import deliveries
 from service.store import cameras
 from service.store.engines.store import Lock
 from service.workers import engine
-from service.workers.context import JobContext
-from service.workers.running_jobs import UPKEEP
-from service.workers.upkeep.clock import ClockWatch
+from service.workers.context import UPKEEP, JobContext
+from service.workers.processes.workers import take_setback
 from service.workers.upkeep.reconciliation import run_reconcile, run_sweep
 from service.workers.upkeep.retention import run_retention
 
@@ -32,6 +34,7 @@ _SHORTEST_REST_S, _ASK_S = 0.05, 1.0
 _SWEEP_S = 0.5
 _CLOCK_S = 1.0
 _FIRST_HOURLY_S = 120.0  # a service that is restarted every half an hour has its turn too
+_JUMP_S = 2.0
 
 
 @dataclass(slots=True)
@@ -119,6 +122,35 @@ def _hourly(context: JobContext, now_s: float) -> list[Periodic]:
         Periodic("retention", HOUR_S, lambda: run_retention(context), hourly_s, steps=True),
         Periodic("finished_jobs", HOUR_S, engine.forget_finished, hourly_s),
     ]
+
+
+class ClockWatch:
+    """Compares the clock with the monotonic one, that nobody sets."""
+
+    def __init__(self) -> None:
+        self._ahead_s = time.time() - time.monotonic()
+
+    def look(self, context: JobContext) -> None:
+        """Follow the clock, where it was set back since the last look."""
+        ahead_s = time.time() - time.monotonic()
+        back_s = self._ahead_s - ahead_s
+        if back_s >= _JUMP_S:
+            with context.store.write() as session:
+                _follow(session, timedelta(seconds=back_s))
+        self._ahead_s = ahead_s  # not before: where nothing could be written, it is seen again
+
+
+def follow_clock_since_last_run(context: JobContext) -> None:
+    """The same of a clock that was set back while no worker watched; before a worker registers."""
+    with context.store.write() as session:
+        back = take_setback(session)
+        if back.total_seconds() >= _JUMP_S:
+            _follow(session, back)
+
+
+def _follow(session: Session, back: timedelta) -> None:
+    moved = deliveries.follow_clock(session, back)
+    log.warning("clock_set_back", extra={"by_s": round(back.total_seconds()), "deliveries": moved})
 
 
 def run_arrival_models(context: JobContext) -> None:

@@ -12,12 +12,12 @@ from service.alerts.silence import end_silences
 from service.alerts.staleness import StaleWatch
 from service.cameras.maintenance import note_ends
 from service.cameras.sources import watch_sources
-from service.estimate_queue import overlooked, queue_overlooked, request_estimate
+from service.estimate_queue import queue_overlooked, request_estimate
 from service.job_queue import JobQueue
 from service.notifications import deliveries
 from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, predictions, references, tracks, trainings
+from service.store import cameras, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
 from service.training import StepWatch, requeue_lost, train_if_needed
 from service.workers.context import JobContext
@@ -28,11 +28,7 @@ _CAMERAS_HZ = 10  # reconciled, of hundreds: all of them at once took a quarter 
 
 def run_sweep(context: JobContext) -> None:
     """Queue a look at cameras that were posted to while they were looked at, or cooled down."""
-    with context.store.read() as session:
-        camera_ids = overlooked(session, context.queue)
-    if camera_ids:
-        with context.store.write("sweep/") as session:
-            queue_overlooked(session, context.queue, camera_ids)
+    context.store.write_if_needed("sweep/", partial(queue_overlooked, queue=context.queue))
 
 
 def run_reconcile(context: JobContext, stale: StaleWatch) -> None:
@@ -69,7 +65,7 @@ def reconcile_camera(
 
     Without `steps` nothing is remembered of what its tracks were.
     """
-    camera = cameras.find(session, camera_id)
+    camera = session.get(CameraRecord, camera_id)
     if camera is None:
         return []
     now = datetime.now(UTC)
@@ -112,4 +108,4 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
     if model is None:
         return False
     bounds = window_of(session, references.newest(session, camera.id), settings)
-    return bool(predictions.without_prediction(session, bounds, model.id, 1))
+    return bool(windows.without_prediction(session, bounds, model.id, 1))

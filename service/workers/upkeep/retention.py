@@ -12,20 +12,17 @@ from sqlalchemy.orm import Session
 from models.durations import HOUR_S
 from service.settings import Settings
 from service.store import (
-    activity,
     alerts,
     cameras,
     estimates,
-    events,
-    maintenance,
+    journal,
     references,
     tracks,
     trainings,
     webhooks,
 )
 from service.store.engines import files
-from service.workers.context import JobContext
-from service.workers.running_jobs import UPKEEP
+from service.workers.context import UPKEEP, JobContext
 
 log = logging.getLogger("surefoot.jobs")
 
@@ -72,10 +69,12 @@ def limits_of_camera(settings: Settings, camera_id: str) -> Iterator[Limit]:
         yield Limit(
             "tracks_by_size", lambda s: tracks.forget_tracks(s, camera_id, most_bytes, BITE)
         )
-    yield Limit("maintenance_windows", lambda s: maintenance.forget(s, camera_id, before, BITE))
+    yield Limit(
+        "maintenance_windows", lambda s: references.forget_maintenance(s, camera_id, before, BITE)
+    )
     kept = settings.keep_estimates
     yield Limit("estimates", lambda s: estimates.forget(s, camera_id, kept, BITE))
-    yield Limit("models", lambda s: _forget_models(s, camera_id))
+    yield Limit("models", lambda s: trainings.forget_models(s, camera_id, _KEPT_MODELS, BITE))
     ended = settings.keep_trainings
     yield Limit("trainings", lambda s: trainings.forget(s, camera_id, ended, BITE))
     yield Limit("references", lambda s: references.forget(s, camera_id, poses, BITE))
@@ -89,10 +88,10 @@ def limits_of_all(settings: Settings) -> Iterator[Limit]:
     ended = now - timedelta(days=settings.keep_deliveries_days)
     resolved = now - timedelta(days=settings.keep_alerts_days)
     done = now - timedelta(days=settings.keep_activity_days)
-    yield Limit("events", lambda s: events.forget(s, settings.keep_events, BITE))
+    yield Limit("events", lambda s: journal.forget_events(s, settings.keep_events, BITE))
     yield Limit("weights", lambda s: trainings.forget_weights(s, BITE))
     yield Limit("alerts", lambda s: alerts.forget(s, resolved, BITE))
-    yield Limit("activity", lambda s: activity.forget(s, done, BITE))
+    yield Limit("activity", lambda s: journal.forget_activity(s, done, BITE))
     yield Limit("deliveries_given_up", lambda s: webhooks.give_up(s, patience, now, BITE))
     yield Limit("deliveries", lambda s: webhooks.forget(s, ended, BITE))
     yield Limit("old_secrets", lambda s: webhooks.forget_old_secrets(s, now, BITE))
@@ -127,13 +126,6 @@ def _shrink(context: JobContext) -> None:
     files.wipe_log(path, patience_ms=200)
     if files.size(path) < before:
         log.info("shrunk", extra={"bytes": files.size(path), "from_bytes": before})
-
-
-def _forget_models(session: Session, camera_id: str) -> int:
-    superseded = trainings.superseded_models(session, camera_id, _KEPT_MODELS)
-    for model in superseded[:BITE]:
-        session.delete(model)
-    return min(len(superseded), BITE)
 
 
 def _unused_weights(session: Session, folder: Path) -> list[Path]:

@@ -22,8 +22,7 @@ from service.commands.postgresql.moving import move
 from service.estimation.evidence import load_evidence
 from service.settings import Settings
 from service.store.engines.store import Store
-from service.store.serialization import pack
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord, pack
 from service.workers.upkeep import retention
 from tests.benchmarks.city.seeding import camera_id, seed_file
 from tests.conftest import track

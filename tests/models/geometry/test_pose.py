@@ -11,7 +11,6 @@ from models.errors import ShapeError
 from models.geometry.pose import (
     PARAMETERS,
     CameraPose,
-    PlaneEstimate,
     PoseParameters,
     array_of,
     pose_from_centre,
@@ -97,12 +96,3 @@ def test_the_deviation_of_a_log_is_one_of_metres():
     assert sd.height_m == pytest.approx(0.15)
     assert float(drawn.std()) == pytest.approx(sd.height_m, rel=0.03)
     assert (sd.tilt_rad, sd.roll_rad, sd.heading_rad) == pytest.approx((0.01, 0.02, 0.04))
-
-
-@pytest.mark.parametrize(
-    ("values", "covariance"),
-    [(np.zeros(2), np.eye(3)), (np.zeros(3), np.eye(2)), (np.array([0, math.nan, 0]), np.eye(3))],
-)
-def test_what_is_no_triple_is_refused(values: np.ndarray, covariance: np.ndarray):
-    with pytest.raises(ShapeError, match="values, covariance"):
-        PlaneEstimate(values=values, covariance=covariance, tracks=5)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from models.tracks.observations import Rows
-from models.walking.groups import count_walking_groups, walking_groups_of
-from models.walking.measures import Measured
+from models.walking.measures import Measured, count_walking_groups, walking_groups_of
 
 EAST = (1.0, 0.0)
 

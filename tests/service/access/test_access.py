@@ -12,6 +12,7 @@ from service.access.tokens import TokenSpec
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.scopes import NEEDS, need_of
 from service.app import create_app
+from service.store import access
 from service.store.engines.store import Store
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
@@ -168,7 +169,7 @@ def test_a_token_that_is_revoked_or_over_lets_nobody_in(closed, made, on):
     problem(closed.delete("/tokens/none", headers=admin), 404, "not_found")
     short = made("read", expires_at=datetime.now(UTC) + timedelta(seconds=0.2))
     with Store(on).write() as session:
-        record = tokens.list_tokens(session)[-1]
+        record = access.every(session)[-1]
         record.expires_at = datetime.now(UTC)
     problem(closed.get("/cameras", headers=short), 401, "unauthorized")
 

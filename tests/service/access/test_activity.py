@@ -9,8 +9,8 @@ from sqlalchemy.exc import IntegrityError
 
 from service.access.activity import note
 from service.enums import Activity
-from service.store.activity import ActivityRecord
 from service.store.engines.store import Store
+from service.store.journal import ActivityRecord
 from service.workers.upkeep.retention import limits_of_all
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved

@@ -9,6 +9,7 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.api.middleware.authentication import COOKIE
 from service.app import create_app
+from service.store import access
 from service.store.access import SessionRecord
 from service.store.engines.store import Store
 from tests.service.conftest import problem
@@ -111,7 +112,7 @@ def test_a_session_ends(closed, store, end):
         elif end == "over":
             record.expires_at = datetime.now(UTC)
         elif end == "token over":
-            tokens.list_tokens(session)[0].expires_at = datetime.now(UTC)
+            access.every(session)[0].expires_at = datetime.now(UTC)
     cookie = closed.cookies[COOKIE]
     if end == "logout":
         assert closed.post("/ui/logout").headers["Location"] == "/ui/login"

@@ -10,7 +10,7 @@ from service.app import create_app
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.reasons import as_said
-from service.store import alerts, maintenance
+from service.store import alerts, references
 from service.workers.upkeep import reconciliation
 from tests.service.alerts.test_states import KNOCKED, at, knock, resolve, states, told_history
 from tests.service.bench import PRIOR, made_up
@@ -34,7 +34,7 @@ def test_the_end_of_maintenance_is_an_entry_of_its_own_once(bench):
     url = "/cameras/corner/maintenance"
     bench.http.post(url, json={"from": at(-1), "to": at(1)}).raise_for_status()
     with bench.store.write() as session:
-        (window,) = maintenance.of_camera(session, "corner")
+        (window,) = references.maintenance_of(session, "corner")
         window.to_at = datetime.now(UTC) - timedelta(minutes=1)
     for _ in range(2):
         with bench.store.write() as session:

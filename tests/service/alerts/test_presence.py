@@ -17,9 +17,8 @@ from service.alerts.arrival_models import (
 )
 from service.alerts.data_gaps import data_gap_of, watch_data_gap
 from service.settings import Settings
-from service.store import rhythms
-from service.store.serialization import pack
-from service.store.stored_tracks import TrackRecord
+from service.store.cameras import RhythmRecord
+from service.store.tracks import TrackRecord, pack
 from service.wording.reasons import in_words
 from service.workers.context import JobContext
 from service.workers.upkeep import reconciliation
@@ -244,7 +243,7 @@ def test_counts_outlive_their_tracks(street):
     assert after.delay_s == pytest.approx(3.0)
     with street.store.read() as session:
         assert arrival_model_of(session, "corner") == after
-        assert len(rhythms.find(session, "corner").counts["tracks"]) == DAYS * 12
+        assert len(session.get(RhythmRecord, "corner").counts["tracks"]) == DAYS * 12
 
 
 @pytest.mark.parametrize(("outcome", "rate"), [("put_back", 12.0), ("false_alarm", 11.5)])
@@ -255,7 +254,7 @@ def test_an_outage_is_not_learned_as_a_habit(street, outcome, rate):
     street.bench.http.post(url, json={"outcome": outcome}).raise_for_status()
     street.post("back")
     with street.store.write() as session:
-        rhythms.find(session, "corner").learned_at -= timedelta(days=2)
+        session.get(RhythmRecord, "corner").learned_at -= timedelta(days=2)
     # Where nobody came, says the operator, these hours count.
     found = street.learns(time.time() + 60).rhythm.rates
     assert (min(found[14], found[38]) == pytest.approx(12)) == (outcome == "put_back")
@@ -278,14 +277,14 @@ def test_it_is_learned_hourly_in_housekeeping_and_goes_with_its_camera(street):
     context = JobContext(settings=street.settings, store=street.store, queue=street.bench.queue)
     run_arrival_models(context)
     with street.store.read() as session:
-        first = rhythms.find(session, "corner")
+        first = session.get(RhythmRecord, "corner")
         assert first.profile is not None
         assert load_arrivals(session, "corner", first.learned_at + timedelta(minutes=49)) is None
         late = first.learned_at + timedelta(minutes=51)
         assert load_arrivals(session, "corner", late) is not None
     run_arrival_models(context)
     with street.store.read() as session:
-        assert rhythms.find(session, "corner").learned_at == first.learned_at
+        assert session.get(RhythmRecord, "corner").learned_at == first.learned_at
     street.bench.http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
     with street.store.read() as session:
-        assert rhythms.find(session, "corner") is None
+        assert session.get(RhythmRecord, "corner") is None

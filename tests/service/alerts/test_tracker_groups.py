@@ -9,11 +9,11 @@ from sqlalchemy.exc import IntegrityError
 
 from service.alerts.alerts import end_alert, open_alert
 from service.reasons import as_said
-from service.store import alerts, events, webhooks
+from service.store import alerts, journal, webhooks
 from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord
 from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
@@ -63,7 +63,7 @@ class Town:
 
     def notified(self):
         with self.store.read() as session:
-            found = [e.payload for e in events.after(session, 0, 1000) if e.type == "alert"]
+            found = [e.payload for e in journal.events_after(session, 0, 1000) if e.type == "alert"]
         return [(payload["camera_id"], payload["state"]) for payload in found]
 
 

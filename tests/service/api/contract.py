@@ -28,10 +28,9 @@ from service.notifications.outbox import add_delivery
 from service.notifications.webhooks import WebhookSpec
 from service.settings import Settings
 from service.store import cameras as stored_cameras
-from service.store import snapshots
 from service.store.alerts import AlertRecord
-from service.store.maintenance import MaintenanceRecord
-from service.store.snapshots import SnapshotRecord
+from service.store.cameras import CameraRecord, SnapshotRecord
+from service.store.references import MaintenanceRecord
 from service.store.trainings import TrainingRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.training.trainings import queue_training
@@ -147,7 +146,7 @@ class Ground:
             still = read_still(self.still.getvalue(), "image/png")
             facts = {"width": still.width, "height": still.height, "sha256": "0" * 64}
             kept = SnapshotRecord(camera_id="ok", jpeg=still.jpeg, stored_at=now, **facts)
-            snapshots.put(session, kept)
+            session.merge(kept)
             settings, queue = self.fleet.settings, self.fleet.queue
             queue_training(session, queue, settings, "ok")
             if session.scalar(select(WebhookRecord).limit(1)) is None:
@@ -195,7 +194,7 @@ class Ground:
 
     def _etag(self, camera_id: str) -> str:
         with self.store.read() as session:
-            if stored_cameras.find(session, camera_id) is None:
+            if session.get(CameraRecord, camera_id) is None:
                 return '"gone"'
             return cameras.view_camera(session, camera_id).etag
 

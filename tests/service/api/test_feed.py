@@ -9,10 +9,11 @@ from service.api.middleware import event_feed as feeds
 from service.api.middleware.event_feed import Feed, wait
 
 
-class Events:
-    """A store of events, and how often it is asked."""
+class Events(Feed):
+    """A feed of made-up events that counts how often it asks for them."""
 
     def __init__(self, *ids):
+        super().__init__(None)
         self.ids, self.asked, self.fails = list(ids), 0, False
 
     async def newest(self):
@@ -32,8 +33,7 @@ def ids(records):
 def run(events, play, monkeypatch):
     async def main():
         monkeypatch.setattr(feeds, "POLL_S", 0.01)
-        feed = Feed(events.newest, events.after)
-        await asyncio.wait_for(play(feed), 20)
+        await asyncio.wait_for(play(events), 20)
 
     asyncio.run(main())
 
@@ -49,14 +49,14 @@ def test_all_who_follow_are_told_by_one_look(monkeypatch):
     async def play(feed):
         for _ in range(50):
             await feed.join()
-        await soon(lambda: feed.since(2) == [])
-        assert feed.since(1) is None  # before it began: the store knows
+        await soon(lambda: feed.kept(2) == [])
+        assert feed.kept(1) is None  # before it began: the store knows
         asked = events.asked
         news = feed.news
         events.ids += [3, 4]
         await asyncio.wait_for(news.wait(), 5)
-        assert ids(feed.since(2)) == [3, 4]
-        assert ids(feed.since(3)) == [4]
+        assert ids(feed.kept(2)) == [3, 4]
+        assert ids(feed.kept(3)) == [4]
         assert events.asked - asked < 50
         for _ in range(50):
             feed.leave()
@@ -73,11 +73,11 @@ def test_of_much_the_newest_is_kept(monkeypatch):
 
     async def play(feed):
         await feed.join()
-        await soon(lambda: feed.since(0) == [])
+        await soon(lambda: feed.kept(0) == [])
         events.ids += [1, 2, 3, 4, 5]
-        await soon(lambda: feed.since(5) == [] and feed.since(4))
-        assert feed.since(1) is None
-        assert ids(feed.since(2)) == [3, 4, 5]
+        await soon(lambda: feed.kept(5) == [] and feed.kept(4))
+        assert feed.kept(1) is None
+        assert ids(feed.kept(2)) == [3, 4, 5]
         feed.leave()
 
     run(events, play, monkeypatch)
@@ -88,13 +88,13 @@ def test_a_store_that_is_gone_for_a_while_ends_nothing(monkeypatch):
 
     async def play(feed):
         await feed.join()
-        await soon(lambda: feed.since(1) == [])
+        await soon(lambda: feed.kept(1) == [])
         events.fails = True
         await wait(feed.news)
         events.ids.append(2)
         events.fails = False
-        await soon(lambda: feed.since(1))
-        assert ids(feed.since(1)) == [2]
+        await soon(lambda: feed.kept(1))
+        assert ids(feed.kept(1)) == [2]
         feed.leave()
 
     run(events, play, monkeypatch)

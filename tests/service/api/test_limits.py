@@ -128,5 +128,5 @@ def test_a_camera_has_its_bytes(settings, monkeypatch):
         # Retention makes room; the count is taken anew.
         with Store(settings).write() as session:
             session.execute(text("DELETE FROM tracks"))
-        monkeypatch.setattr("service.cameras.posts._RECOUNT_S", 0.0)
+        monkeypatch.setattr("service.cameras.tracks._RECOUNT_S", 0.0)
         assert client.post(URL, json={"tracks": batch}).status_code == 202

@@ -11,11 +11,11 @@ import httpx
 import pytest
 from fastapi.testclient import TestClient
 
-from service.api.middleware.concurrency import Lane
+from service.api.middleware.admission import Lane
 from service.app import create_app
 from service.errors import OverloadedError
+from service.store.engines.sqlite import Turns
 from service.store.engines.store import Store
-from service.store.engines.turns import Turns
 from tests.conftest import CAMERA, track
 from tests.running import RunningService, free_port, wait_for
 from tests.service.conftest import problem

@@ -6,7 +6,7 @@ import threading
 import anyio.to_thread
 from anyio._backends import _asyncio
 
-from service.api.middleware.concurrency import start_threads
+from service.api.middleware.admission import start_threads
 
 
 def pool():

@@ -10,8 +10,7 @@ from sqlalchemy import select
 from service.store import tracks
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
-from service.store.serialization import intrinsics_of, seen_of, trajectory_of, unpack
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord, seen_of, trajectory_of, unpack
 from tests.conftest import track
 from tests.service.conftest import problem
 
@@ -45,7 +44,7 @@ def test_heads_are_stored_as_posted_beside_their_feet(corner, settings):
         assert (record.boxes, bare.heads) == (None, None)
         size = len(record.points) + len(record.heads) + len(bare.points)
         assert tracks.stored_bytes(session, "corner") == size
-        lens = intrinsics_of(session.get(CameraRecord, "corner"))
+        lens = session.get(CameraRecord, "corner").intrinsics
         seen = seen_of(record, trajectory_of(record), lens)
         assert_array_equal(seen.head_uv, np.array(POINTS)[:, 3:])
         assert_array_equal(seen.top_v, np.array(POINTS)[:, 4])
@@ -57,7 +56,7 @@ def test_a_head_cut_by_the_picture_is_no_top(corner, settings):
     assert corner.post("/cameras/corner/tracks", json={"tracks": [cut]}).json()["accepted"] == 1
     with Store(settings).read() as session:
         record = session.scalars(select(TrackRecord)).one()
-        lens = intrinsics_of(session.get(CameraRecord, "corner"))
+        lens = session.get(CameraRecord, "corner").intrinsics
         seen = seen_of(record, trajectory_of(record), lens)
     assert np.isnan(seen.top_v).tolist() == [False, False, True, False, False, False]
 

@@ -10,7 +10,7 @@ from service.estimation.growth import load_growth, save_growth
 from service.estimation.learning import load_reference_period
 from service.reasons import as_said
 from service.references import window_of
-from service.store import maintenance, references, tracks, windows
+from service.store import references, tracks, windows
 from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import track
 from tests.service.bench import PRIOR, moved
@@ -213,8 +213,8 @@ def test_windows_are_kept_as_long_as_their_tracks(bench):
     with bench.store.write() as session:
         for limit in limits_of_camera(bench.settings, "corner"):
             limit.bite(session)
-        (left,) = maintenance.of_camera(session, "corner")
+        (left,) = references.maintenance_of(session, "corner")
     assert left.to_at > datetime.now(UTC) - timedelta(days=30)
     bench.http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
     with bench.store.read() as session:
-        assert maintenance.of_camera(session, "corner") == []
+        assert references.maintenance_of(session, "corner") == []

@@ -7,8 +7,7 @@ from sqlalchemy import select
 
 from service.app import create_app
 from service.store.engines.store import Store
-from service.store.serialization import unpack
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord, unpack
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
 

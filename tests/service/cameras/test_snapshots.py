@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from service.app import create_app
-from service.store import snapshots
+from service.store.cameras import SnapshotRecord
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
@@ -87,5 +87,5 @@ def test_a_picture_goes_when_it_is_deleted_and_with_its_camera(allowed, settings
     allowed.put(URL, content=image(), headers=JPEG).raise_for_status()
     allowed.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
     with Store(settings).read() as session:
-        assert snapshots.find(session, "corner") is None
+        assert session.get(SnapshotRecord, "corner") is None
     problem(allowed.put(URL, content=image(), headers=JPEG), 404, "not_found")

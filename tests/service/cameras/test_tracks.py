@@ -12,8 +12,7 @@ from sqlalchemy import select
 from service.app import create_app
 from service.settings import Settings
 from service.store.engines.store import Store
-from service.store.serialization import unpack
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord, unpack
 from service.workers.upkeep.retention import limits_of_camera
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem

@@ -15,8 +15,8 @@ from service.estimation.anchoring import (
     save_anchor_days,
 )
 from service.estimation.growth import load_growth
-from service.store import flow_maps, references
-from service.store.flow_maps import AnchorRecord
+from service.store import references
+from service.store.references import AnchorRecord, FlowMapRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
 
@@ -57,12 +57,12 @@ def live(street, days, *, pan_deg_a_day=0.0, begin_deg=0.0, look_every=5):
 
 def anchor(street):
     with street.context.store.read() as session:
-        return flow_maps.anchor(session, references.newest(session, "corner").id)
+        return session.get(AnchorRecord, references.newest(session, "corner").id)
 
 
 def flow_map(street):
     with street.context.store.read() as session:
-        return flow_maps.find(session, references.newest(session, "corner").id)
+        return session.get(FlowMapRecord, references.newest(session, "corner").id)
 
 
 def due(street):
@@ -143,7 +143,7 @@ def test_a_new_reference_makes_a_new_anchor(known):
 
 def test_an_anchor_that_cannot_be_read_is_said_and_stops_nothing(known):
     with known.context.store.write() as session:
-        record = flow_maps.anchor(session, references.newest(session, "corner").id)
+        record = session.get(AnchorRecord, references.newest(session, "corner").id)
         record.flow = b"of another release"
     live(known, 2, look_every=2)
     body = known.pose()

@@ -11,16 +11,14 @@ from models.errors import CheckpointError
 from service.alerts.staleness import StaleWatch
 from service.estimate_queue import (
     cooldown_s,
-    overlooked,
     queue_overlooked,
     request_estimate,
 )
 from service.reasons import ServiceCode
-from service.store import flow_maps, references, trainings
+from service.store import references, trainings
 from service.store.cameras import CameraRecord
-from service.store.flow_maps import FlowMapRecord
-from service.store.references import SiteReferenceRecord
-from service.store.stored_tracks import TrackRecord
+from service.store.references import FlowMapRecord, SiteReferenceRecord
+from service.store.tracks import TrackRecord
 from service.training import begin_training, publish_model
 from service.workers.estimate import run_estimate
 from service.workers.upkeep import reconciliation
@@ -125,7 +123,7 @@ def test_a_map_or_chart_that_cannot_be_read_blinds_nobody(street, part):
 def test_a_map_that_cannot_grow_is_left_as_it_was(street):
     with street.context.store.read() as session:
         reference = references.newest(session, "corner")
-        before = flow_maps.find(session, reference.id).learned_at
+        before = session.get(FlowMapRecord, reference.id).learned_at
     # Read by the growth alone: the pose does without.
     change(street, window_tracks=40, flow_unsure_tracks=5, flow_half_life_days="not a number")
     street.keep_to_lanes(PRIOR, 100)
@@ -139,7 +137,7 @@ def test_a_map_that_cannot_grow_is_left_as_it_was(street):
     street.look()
     assert camera(street).lacks == (lack,)
     with street.context.store.read() as session:
-        assert flow_maps.find(session, reference.id).learned_at == before
+        assert session.get(FlowMapRecord, reference.id).learned_at == before
 
 
 def test_a_camera_whose_looks_fail_rests_longer_each_time_and_is_told(street):
@@ -239,7 +237,7 @@ def test_one_job_a_camera_however_often_it_is_asked_for(newcomer):
             reconciliation.reconcile_camera(session, context.queue, context.settings, "corner")
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
 
 
 def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newcomer):
@@ -249,12 +247,11 @@ def test_a_job_that_the_engine_lost_is_found_and_what_is_due_keeps_its_age(newco
     with context.store.write() as session:
         session.execute(text("DELETE FROM workflow_status"))
     with context.store.write() as session:
-        assert overlooked(session, context.queue) == ["corner"]
-        queue_overlooked(session, context.queue, ["corner"])
+        assert queue_overlooked(session, context.queue) == ["corner"]
     assert camera(newcomer).estimate_due_at == due_at
     with context.store.read() as session:
         assert queued_cameras(session) == ["corner"]
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
 
 
 def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
@@ -267,10 +264,10 @@ def test_a_camera_rests_after_a_look_and_is_asked_for_once_it_has(newcomer):
     newcomer.keep_to_lanes(PRIOR, 5)
     with context.store.read() as session:
         assert queued_cameras(session) == []
-        assert overlooked(session, context.queue) == []
+        assert queue_overlooked(session, context.queue) == []
     let_rest_end(newcomer)
-    with context.store.read() as session:
-        assert overlooked(session, context.queue) == ["corner"]
+    with context.store.write() as session:
+        assert queue_overlooked(session, context.queue) == ["corner"]
 
 
 def test_a_training_that_the_engine_lost_is_queued_again_and_at_last_fails(newcomer):

@@ -16,10 +16,10 @@ from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
-from service.store import alerts, flow_maps, references
+from service.store import alerts, references
 from service.store.estimates import EstimateRecord
-from service.store.flow_maps import FlowMapRecord
-from service.store.stored_tracks import TrackRecord
+from service.store.references import FlowMapRecord
+from service.store.tracks import TrackRecord
 from tests.conftest import CAMERA
 from tests.service.estimation.answered import put_back
 from tests.service.street import KNOCKED, PRIOR, Street
@@ -60,7 +60,7 @@ def known(request, learned):
 
 def map_of(street):
     with street.context.store.read() as session:
-        return flow_maps.find(session, references.newest(session, "corner").id)
+        return session.get(FlowMapRecord, references.newest(session, "corner").id)
 
 
 def ended(street, first, last):
@@ -111,7 +111,7 @@ def test_older_tracks_count_less_and_no_more_than_so_many_at_all(known):
     assert grown.weight == pytest.approx(WANTED / 2 + 60, rel=0.01)
     few = known.context.settings.model_copy(update={"flow_tracks": 50})
     with known.context.store.write() as session:
-        record = flow_maps.find(session, grown.reference_id)
+        record = session.get(FlowMapRecord, grown.reference_id)
         session.delete(record)
     with known.context.store.read() as session:
         period = load_growth(session, few, "corner")
@@ -180,7 +180,7 @@ def test_what_was_seen_until_it_was_put_back_never_counts(known):
     with known.context.store.write() as session:
         (alert,) = alerts.ended(session, "corner")
         alert.outcome = "false_alarm"
-        session.delete(flow_maps.find(session, grown.reference_id))
+        session.delete(session.get(FlowMapRecord, grown.reference_id))
     assert len(due(known).trajectories) == WANTED + 60 + 60 + 120 - WINDOW
 
 
@@ -264,7 +264,7 @@ def test_a_reference_of_before_there_were_maps_gets_one(known):
 
 def test_people_who_stand_make_no_map_and_are_not_asked_again(known):
     with known.context.store.write() as session:
-        record = flow_maps.find(session, references.newest(session, "corner").id)
+        record = session.get(FlowMapRecord, references.newest(session, "corner").id)
         record.data = None
     known.keep_to_lanes(PRIOR, 40)
     body = known.look()

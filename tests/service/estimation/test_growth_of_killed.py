@@ -6,7 +6,7 @@ import signal
 import pytest
 from sqlalchemy import select
 
-from service.store.flow_maps import FlowMapRecord
+from service.store.references import FlowMapRecord
 from tests.conftest import CAMERA
 from tests.running import wait_for
 from tests.service.estimation.test_growth import WANTED, make_street, map_of

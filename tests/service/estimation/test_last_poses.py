@@ -7,8 +7,8 @@ import pytest
 
 from models.pose import warm_start_from_bytes
 from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
-from service.estimation.last_poses import basis_of, begin_of
+from service.estimation.finding import basis_of, begin_of, compute_finding
+from service.store.references import LastPoseRecord
 from tests.conftest import CAMERA
 from tests.service.street import KNOCKED, PRIOR, Street
 
@@ -60,7 +60,7 @@ def test_a_site_that_is_new_or_suspected_begins_anew(known):
     assert begun(replace(evidence, reference_id=7), kept) is None
     assert begun(replace(evidence, prior=replace(PRIOR, height_m=7.0)), kept) is None
     # By another release, say.
-    assert begun(evidence, replace(kept, data=b"else")) is None
+    assert begun(evidence, LastPoseRecord(basis=kept.basis, data=b"else")) is None
 
 
 def test_a_changed_camera_begins_anew(known):

@@ -9,7 +9,8 @@ import pytest
 from models.monitoring.chart import chart_from_bytes
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
-from service.store import flow_maps, references
+from service.store import references
+from service.store.references import FlowMapRecord
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
 
@@ -42,7 +43,7 @@ def judge_by(street, tracks):
 
 def tracks_of_map(street):
     with street.context.store.read() as session:
-        return flow_maps.find(session, references.newest(session, "corner").id).tracks
+        return session.get(FlowMapRecord, references.newest(session, "corner").id).tracks
 
 
 def test_the_window_begins_where_the_camera_turned(street):
@@ -126,12 +127,12 @@ def at(time_s):
 def test_a_chart_of_another_release_is_done_without(street):
     with street.context.store.write() as session:
         reference = references.newest(session, "corner")
-        flow_maps.find(session, reference.id).chart = b"of another release"
+        session.get(FlowMapRecord, reference.id).chart = b"of another release"
     judge_by(street, 60)
     street.keep_to_lanes(PRIOR, 120)
     assert street.look()["state"] == "ok"
     with street.context.store.read() as session:
-        kept = flow_maps.find(session, references.newest(session, "corner").id)
+        kept = session.get(FlowMapRecord, references.newest(session, "corner").id)
     assert (
         chart_from_bytes(kept.chart).walking_groups > 100
     )  # the map has grown, and its chart with it

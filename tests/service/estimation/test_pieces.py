@@ -7,9 +7,8 @@ import pytest
 
 from models.pose import count_walks
 from models.tracks.trajectory import Trajectory
-from service.estimation.people import Unpacked, until_so_many
-from service.store.serialization import pack
-from service.store.stored_tracks import TrackRecord
+from service.estimation.evidence import Unpacked, until_so_many
+from service.store.tracks import TrackRecord, pack
 from tests.conftest import CAMERA
 from tests.service.estimation.test_batchings import Recording, at_once, at_random
 from tests.service.street import KNOCKED, LENS, PRIOR

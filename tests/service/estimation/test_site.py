@@ -12,9 +12,8 @@ from models.pose import estimate_pose, learn_site
 from models.walking.estimate import joint_estimate
 from models.walking.speed_reference import reference_from_bytes
 from service.estimation.estimates import save_estimate
-from service.estimation.evidence import load_evidence
+from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.finding import compute_finding
-from service.estimation.people import Unpacked
 from service.store import references
 from service.workers.estimate import learn_if_due
 from tests.conftest import CAMERA, track

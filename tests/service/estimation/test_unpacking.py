@@ -4,8 +4,9 @@ import sys
 
 import pytest
 
-from service.store import flow_maps, references
-from service.store.serialization import unpack
+from service.store import references
+from service.store.references import FlowMapRecord
+from service.store.tracks import unpack
 from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.service.street import PRIOR, Street
@@ -42,7 +43,7 @@ def test_each_track_of_a_refresh_is_unpacked_once(http, settings, unpackings, fo
     assert len(set(unpackings)) == len(unpackings)
     assert street.pose()["tracks"] == 40
     with street.context.store.read() as session:
-        grown = flow_maps.find(session, references.newest(session, "corner").id)
+        grown = session.get(FlowMapRecord, references.newest(session, "corner").id)
     assert grown.tracks == WANTED + 50  # all but the window
     street.walk(PRIOR, 5, form=form)
     unpackings.clear()

@@ -6,8 +6,7 @@ from sqlalchemy import select
 
 from service.formats import mot
 from service.store.engines.store import Store
-from service.store.serialization import unpack
-from service.store.stored_tracks import TrackRecord
+from service.store.tracks import TrackRecord, unpack
 from tests.service.conftest import problem
 
 T0 = 1_700_000_000.0

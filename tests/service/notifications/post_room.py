@@ -10,8 +10,8 @@ from service.alerts import alerts
 from service.job_queue import JobQueue
 from service.notifications import deliveries
 from service.reasons import as_said
-from service.store import webhooks
 from service.store.engines.store import Store
+from service.store.webhooks import WebhookRecord
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from tests.conftest import CAMERA
@@ -108,7 +108,7 @@ class PostRoom:
     def change(self, hook: dict[str, Any], **values: Any) -> None:
         """Set what only time would."""
         with self.store.write() as session:
-            record = webhooks.find(session, hook["id"])
+            record = session.get(WebhookRecord, hook["id"])
             for name, value in values.items():
                 setattr(record, name, value)
 

@@ -8,9 +8,8 @@ from ipaddress import ip_network
 
 import pytest
 
-from service.notifications import addresses, send
-from service.notifications.addresses import AddressError, check_url, may_reach
-from service.notifications.send import post
+from service.notifications import send
+from service.notifications.send import AddressError, check_url, may_reach, post
 from tests.service.conftest import problem
 from tests.service.notifications.receiver import receiver
 
@@ -67,7 +66,7 @@ def resolves_to(monkeypatch, *answers):
         family = {True: socket.AF_INET6, False: socket.AF_INET}
         return [(family[":" in a], socket.SOCK_STREAM, 6, "", (a, port)) for a in found]
 
-    monkeypatch.setattr(addresses.socket, "getaddrinfo", getaddrinfo)
+    monkeypatch.setattr(send.socket, "getaddrinfo", getaddrinfo)
 
 
 def test_a_name_of_a_public_and_a_private_address_is_refused(monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 from service.alerts import alerts
 from service.alerts.staleness import StaleWatch
 from service.enums import MessageType
-from service.notifications.alertmanager import alert_name, postable_alerts
+from service.notifications.messages import alert_name, postable_alerts
 from service.notifications.outbox import alert_body
 from service.reasons import as_said
 from service.workers.upkeep.reconciliation import run_reconcile

@@ -11,13 +11,12 @@ import pytest
 from service.commands.key_rotation import rotate_key
 from service.commands.migrate import migrate
 from service.data_dir import StartError
-from service.notifications.keys import secret_of
-from service.notifications.sealing import Sealer
+from service.notifications.keys import Sealer, secret_of
 from service.notifications.webhooks import WebhookSpec, create_webhook, rotate_secret
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import webhooks
 from service.store.engines.store import Store
+from service.store.webhooks import WebhookRecord
 from tests.stores.databases import only_sqlite
 
 SPEC = WebhookSpec(
@@ -39,7 +38,7 @@ def hook(settings):
 
 def read(settings, webhook_id):
     with Store(settings).read() as session:
-        return secret_of(settings, webhooks.find(session, webhook_id))
+        return secret_of(settings, session.get(WebhookRecord, webhook_id))
 
 
 @only_sqlite("reads the file")
@@ -153,7 +152,7 @@ def test_a_key_that_is_lost_for_good_is_given_up_in_the_open(settings):
     migrate(settings)
     assert read(settings, webhook_id) != secret
     with Store(settings).read() as session:
-        record = webhooks.find(session, webhook_id)
+        record = session.get(WebhookRecord, webhook_id)
         assert not record.enabled
         assert [why.code for why in record.disabled_reasons] == [ServiceCode.SECRET_LOST]
 

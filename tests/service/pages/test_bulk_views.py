@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import event
 
-from service.operations.metrics import load_metrics
+from service.operations.health import load_metrics
 from service.pages.fleet import list_fleet
 from tests.service.fleet_bench import Fleet, every_state
 

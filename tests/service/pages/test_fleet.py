@@ -8,12 +8,12 @@ from sqlalchemy import event
 
 from models.monitoring.verdict import DriftLimits
 from service.cameras.poses import view_pose
-from service.estimation.limits import drift_limits
 from service.pages import fleet as use_cases
+from service.references import drift_limits
 from service.store import fleet as statements
 from service.store.estimates import EstimateRecord
 from service.wording.moves import height_change
-from service.wording.times import ago, duration
+from service.wording.times import Clock, duration
 from tests.service.bench import moved
 from tests.service.fleet_bench import Fleet, afternoon
 from tests.stores.databases import only_sqlite
@@ -205,7 +205,7 @@ def test_words_are_made_without_a_store():
     said = {-61: "in 61 seconds", -60: "just now", 9.9: "just now", 10: "10 seconds ago",
             3000: "50 minutes ago", -7200: "in 2 hours", 11 * 86_400: "2 weeks ago"}  # fmt: skip
     for seconds, words in said.items():
-        assert ago(now - timedelta(seconds=seconds), now) == words
+        assert Clock(now=now, zone=UTC).ago(now - timedelta(seconds=seconds)) == words
     assert [height_change(m) for m in (-0.12, 1.34)] == ["12 cm lower", "1.3 m higher"]
 
 

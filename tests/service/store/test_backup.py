@@ -25,9 +25,9 @@ from service.notifications.keys import secret_of
 from service.operations.backup import write_backup
 from service.operations.check import check_data_dir
 from service.operations.restore import finish_restore, restore_backup
-from service.store import webhooks
 from service.store.engines.revisions import known_revisions
 from service.store.engines.store import Store
+from service.store.webhooks import WebhookRecord
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
 from tests.service.notifications.test_sealing import hook
@@ -73,7 +73,7 @@ def test_there_and_back(settings, tmp_path):
     assert done.replaced is None
     migrate(fresh)
     with Store(fresh).read() as session:
-        assert secret_of(fresh, webhooks.find(session, webhook_id)) == secret
+        assert secret_of(fresh, session.get(WebhookRecord, webhook_id)) == secret
     assert {one.what: one.verdict for one in check_data_dir(fresh)}["weights"] == "ok"
     assert {stat.S_IMODE(path.stat().st_mode) for path in fresh.data_dir.rglob("*")} == {
         0o600,

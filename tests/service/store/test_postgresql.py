@@ -17,10 +17,11 @@ from service.enums import EventType
 from service.errors import OverloadedError, StoreUnavailableError
 from service.job_queue import JobQueue
 from service.setting_values import read_database_url
-from service.store import events, trainings, workers
+from service.store import journal, trainings
 from service.store.engines.dialects import now_in
 from service.store.engines.failures import failure_of
 from service.store.engines.store import Store
+from service.store.workers import WorkerRecord
 from service.training import fetch_weights, share_weights
 from service.workers.processes.workers import (
     heartbeat,
@@ -42,13 +43,13 @@ def store(settings):
 
 
 def add(session, said):
-    events.add(session, EventType.POSE, {"said": said}, datetime.now(UTC))
+    journal.add_event(session, EventType.POSE, {"said": said}, datetime.now(UTC))
     session.flush()
 
 
 def said_after(store, seen=0):
     with store.read() as session:
-        return [event.payload["said"] for event in events.after(session, seen, 100)]
+        return [event.payload["said"] for event in journal.events_after(session, seen, 100)]
 
 
 def test_nobody_reads_beyond_what_may_still_come_before(store):
@@ -58,7 +59,7 @@ def test_nobody_reads_beyond_what_may_still_come_before(store):
             add(second, "second")
         assert said_after(store) == []  # its id is larger than one that may be committed yet
         with store.read() as reading:
-            begun = events.newest_id(reading)
+            begun = journal.newest_event_id(reading)
     assert said_after(store) == said_after(store, begun) == ["first", "second"]
 
 
@@ -88,7 +89,7 @@ def test_a_hundred_writers_are_followed_without_a_gap(store):
     while not ended:
         ended = done.is_set()
         with store.read() as session:
-            for event in events.after(session, seen, 1000):
+            for event in journal.events_after(session, seen, 1000):
                 seen = event.id
                 said.append(event.payload["said"])
     assert sorted(said) == sorted(f"{number}-{each}" for number in range(4) for each in range(25))
@@ -207,7 +208,7 @@ def test_workers_are_heard_of_by_the_servers_clock(store, monkeypatch):
     with store.write() as session:
         register_worker(session, "a", 1)
     with store.read() as session:
-        begun = workers.find(session, "a").heartbeat_at
+        begun = session.get(WorkerRecord, "a").heartbeat_at
         assert abs((now_in(session) - begun).total_seconds()) < 5
     with monkeypatch.context() as patched, store.write() as session:
         patched.setattr(

@@ -10,7 +10,7 @@ from sqlalchemy.exc import IntegrityError, OperationalError
 from service.errors import OverloadedError
 from service.store.cameras import CameraRecord
 from service.store.engines.failures import failure_of
-from service.store.engines.prepared import Prepared
+from service.store.engines.sqlite import Prepared
 from service.store.engines.store import Store, joined
 from tests.conftest import CAMERA
 

@@ -8,7 +8,7 @@ import pytest
 
 from service.store.estimates import EstimateRecord
 from service.wording.moves import angle_half_width_deg, moved_words, signed
-from service.wording.times import next_morning, when
+from service.wording.times import Clock, next_morning
 
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 
@@ -88,7 +88,8 @@ def test_signs(value, text):
 def test_times_are_said_by_the_cameras_clock(at, text):
     now = datetime(2026, 11, 20, 16, tzinfo=UTC)
     berlin = ZoneInfo("Europe/Berlin")
-    assert when(datetime.fromisoformat(at).replace(tzinfo=UTC), now, berlin) == text
+    clock = Clock(now=now, zone=berlin)
+    assert clock.when(datetime.fromisoformat(at).replace(tzinfo=UTC)) == text
 
 
 def test_tomorrow_at_eight_is_so_on_the_morning_after_the_clocks_change():

@@ -7,10 +7,11 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from service.estimate_queue import is_cooling
-from service.store import webhooks, workers
+from service.store import webhooks
 from service.store.engines.store import Store
+from service.store.workers import WorkerRecord
 from service.workers.processes.workers import register_worker
-from service.workers.upkeep.clock import ClockWatch, follow_clock_since_last_run
+from service.workers.upkeep.periodic import ClockWatch, follow_clock_since_last_run
 from tests.running import free_port
 
 
@@ -60,7 +61,7 @@ def test_a_clock_that_was_set_back_while_no_worker_watched_is_seen_by_the_next(p
     with post_room.store.write() as session:
         register_worker(session, "local-0", 1)
         hour = timedelta(hours=1)
-        workers.find(session, "local-0").heartbeat_at += hour
+        session.get(WorkerRecord, "local-0").heartbeat_at += hour
         for record in webhooks.waiting(session, datetime.now(UTC)):
             record.next_attempt_at += hour
         for record in webhooks.every(session):

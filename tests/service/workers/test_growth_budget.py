@@ -6,7 +6,6 @@ from functools import partial
 
 import pytest
 
-from service.workers import cooldown
 from tests.service.estimation.test_growth import WANTED, WINDOW, learn_street, map_of
 from tests.service.street import PRIOR
 
@@ -20,7 +19,7 @@ def known(learned):
 
 def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
     now_s = time.monotonic()
-    monkeypatch.setattr(cooldown.time, "monotonic", lambda: now_s)
+    monkeypatch.setattr(time, "monotonic", lambda: now_s)
     first, context = map_of(known), known.context
     known.keep_to_lanes(PRIOR, 50 + WINDOW)
     with context.store.write() as session:

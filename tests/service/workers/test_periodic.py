@@ -4,8 +4,7 @@ import threading
 
 import pytest
 
-from service.workers.context import JobContext
-from service.workers.running_jobs import UPKEEP, RunningJobs
+from service.workers.context import UPKEEP, JobContext, RunningJobs
 from service.workers.upkeep import periodic
 from service.workers.upkeep.retention import BITE, Limit, run_retention
 from tests.service.bench import Bench

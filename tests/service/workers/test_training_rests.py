@@ -12,8 +12,7 @@ from models.simulation.walkers import WalkConfig
 from service.job_queue import JobQueue
 from service.store.engines.store import Store
 from service.workers.context import JobContext
-from service.workers.train import may_go_on
-from service.workers.training_child import Progress, train_apart
+from service.workers.train import Progress, may_go_on, train_apart
 
 _RESTS = 6  # ticks, each of half a second: no step of this training takes that long
 

@@ -2,6 +2,7 @@
 
 from sqlalchemy import text
 
+from service.store import estimates
 from tests.conftest import CAMERA, track
 from tests.service.bench import moved
 from tests.stores.queued import queued_cameras
@@ -33,7 +34,7 @@ def test_one_that_is_back_waits_like_others(bench):
     for pose in (moved(), moved(tilt_deg=4), moved(), moved()):
         bench.see(pose)
     with bench.store.read() as session:
-        assert session.scalar(text("SELECT urgent FROM cameras WHERE id = 'corner'")) in (0, False)
+        assert not estimates.newest(session, "corner").suspects_move
 
 
 def test_a_camera_whose_page_is_looked_at_has_its_turn_before_others(corner, bench):

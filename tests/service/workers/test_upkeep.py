@@ -15,6 +15,7 @@ from service.formats.track import Batch, Clock, Limits
 from service.store import cameras, tracks, trainings, windows
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
+from service.store.trainings import TrainingRecord
 from service.store.windows import WindowBounds
 from service.training import (
     StepWatch,
@@ -80,7 +81,7 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         Recorder(),
         "corner",
         Batch(tracks=tuple(batch), rejections=()),
-        read_by=cameras.picture(session.connection(), "corner"),
+        read_by=cameras.awaited(session.connection(), "corner").picture,
     )
 
 
@@ -212,7 +213,7 @@ def test_a_cancelled_training_publishes_nothing(session, settings):
     cancel_training(session, attempt.training_id)
     assert not report_progress(session, attempt, 1, 10, 0.5, 9.0)
     publish_model(session, Recorder(), attempt, weights_sha256="1" * 64, metrics={})
-    assert trainings.find(session, attempt.training_id).state == "cancelled"
+    assert session.get(TrainingRecord, attempt.training_id).state == "cancelled"
     assert trainings.newest_model(session, "corner") is None
 
 

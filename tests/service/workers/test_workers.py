@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from service.store import workers
 from service.store.engines.store import Store
+from service.store.workers import WorkerRecord
+from service.workers.context import RunningJobs
 from service.workers.processes.local_workers import pause_s
 from service.workers.processes.workers import Watch, heartbeat, note_trouble, register_worker
-from service.workers.running_jobs import RunningJobs
 
 LOST_S = 0.2
 
@@ -36,7 +36,7 @@ def test_a_worker_that_shows_no_sign_of_life_is_lost_and_named_once(session):
     register_worker(session, "one", 11)
     session.flush()
     assert heartbeat(session, "one", 11)
-    assert workers.find(session, "one").starts == 2
+    assert session.get(WorkerRecord, "one").starts == 2
 
 
 @pytest.mark.parametrize("hours", [1, -1])
@@ -44,7 +44,7 @@ def test_a_clock_that_jumps_makes_nobody_lost(session, hours):
     watch = Watch()
     watch.take_lost(session, LOST_S)
     for name in ("one", "two"):  # what they wrote before the jump
-        workers.find(session, name).heartbeat_at = datetime.now(UTC) - timedelta(hours=hours)
+        session.get(WorkerRecord, name).heartbeat_at = datetime.now(UTC) - timedelta(hours=hours)
     assert watch.take_lost(session, LOST_S) == []
 
 
@@ -82,7 +82,7 @@ def test_who_dies_again_and_again_is_started_ever_more_rarely(deaths, seconds):
 def test_a_task_beyond_its_limit_is_overdue(monkeypatch):
     clock = iter([0.0, 0.0, 60.0, 60.1])
     standing = SimpleNamespace(monotonic=lambda: next(clock))
-    monkeypatch.setattr("service.workers.running_jobs.time", standing)
+    monkeypatch.setattr("service.workers.context.time", standing)
     running = RunningJobs(limits_s={"estimate": 60.0})
     with running.job("train", "a"), running.job("estimate", "corner"):
         assert running.overdue() is None

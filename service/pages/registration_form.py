@@ -1,24 +1,31 @@
-"""Bodies out of what people type: numbers with commas, numbers pasted with brackets."""
+"""The registration form: what was typed, to what the API takes, with reasons beside the fields."""
 
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from service.api.cameras import CameraName, FrameRate, ReferenceTracks
-from service.api.fields import Body, CameraId, Finite, Triple
-from service.api.geometry_schemas import (
+from service.api.cameras import CameraBody, CameraName, FrameRate, ReferenceTracks
+from service.api.schemas import (
+    Body,
+    CameraId,
     Centre,
+    Finite,
     FocalLength,
     IntrinsicsBody,
     PriorPoseBody,
     Tilt,
+    Triple,
 )
-from service.errors import FieldError
+from service.errors import FieldError, MalformedError
 
+Made = TypeVar("Made", bound=BaseModel)
+Typed = Annotated[str, Field(max_length=2000)]
+_FOLLOWS = "default_factory_not_called"  # of another error, which is told
 _SEPARATORS = re.compile(r"[\s,;\[\]()]+")
 # What pydantic finds wrong, in the words of who types; `got` is what was typed.
 _REASONS = {
@@ -126,7 +133,84 @@ class TypedRest(Body):
     _typed = field_validator("frame_rate_hz", "reference_tracks", mode="before")(_number)
 
 
-def field_error(item: ErrorDetails) -> FieldError:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadForm:
+    """Values of a form as far as they can be read, and what is wrong or missing where."""
+
+    lens: IntrinsicsBody | None
+    pose: PriorPoseBody | None
+    rest: TypedRest | None
+    errors: tuple[FieldError, ...]
+
+
+class RegistrationForm(Body):
+    """The fields as they were typed; `form` says which of the two poses counts."""
+
+    form: Literal["angles", "matrix"] = "angles"
+    name: Typed = ""
+    id: Typed = ""
+    width: Typed = ""
+    height: Typed = ""
+    fx: Typed = ""
+    fy: Typed = ""
+    cx: Typed = ""
+    cy: Typed = ""
+    distortion: Typed = ""
+    height_m: Typed = ""
+    tilt_deg: Typed = ""
+    roll_deg: Typed = ""
+    heading_deg: Typed = ""
+    x_m: Typed = ""
+    y_m: Typed = ""
+    rotation: Typed = ""
+    translation_m: Typed = ""
+    frame_rate_hz: Typed = ""
+    reference_tracks: Typed = ""
+
+    def read(self) -> ReadForm:
+        """Read it as far as that goes, and say what is wrong or missing."""
+        errors: list[FieldError] = []
+        lens = self._read(TypedLens, errors)
+        pose: PriorPoseBody | None = None
+        if self.form == "angles":
+            pose = self._read(TypedAngles, errors)
+        elif (matrix := self._read(TypedMatrix, errors)) is not None:
+            wrong: list[FieldError] = []
+            pose = _made(PriorPoseBody, matrix.to_fields(), wrong)
+            errors += [_of_matrix(error) for error in wrong]
+        return ReadForm(
+            lens=lens, pose=pose, rest=self._read(TypedRest, errors), errors=tuple(errors)
+        )
+
+    def to_body(self) -> CameraBody:
+        """The body of `POST /cameras`.
+
+        Raises:
+            MalformedError: with a reason for each field that is missing or wrong.
+        """
+        read = self.read()
+        if read.errors or read.rest is None:
+            detail = "; ".join(f"{error.pointer[1:]}: {error.reason}" for error in read.errors)
+            raise MalformedError(detail, read.errors)
+        rest = read.rest.model_dump()
+        return CameraBody.model_validate({"intrinsics": read.lens, "prior_pose": read.pose, **rest})
+
+    def _read(self, kind: type[Made], errors: list[FieldError]) -> Made | None:
+        """A kind, made of those of its fields that are not empty."""
+        typed = {name: str(getattr(self, name, "")).strip() for name in kind.model_fields}
+        return _made(kind, {name: text for name, text in typed.items() if text}, errors)
+
+
+def _made(kind: type[Made], values: dict[str, Any], errors: list[FieldError]) -> Made | None:
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        errors += [_field_error(item) for item in found if item["type"] != _FOLLOWS]
+        return None
+
+
+def _field_error(item: ErrorDetails) -> FieldError:
     """The field that an error is of, and the reason without the words of a programmer."""
     said: dict[str, Any] = item.get("ctx", {})
     if item["type"] == "value_error":  # of all fields together: it begins with a field's name
@@ -138,7 +222,7 @@ def field_error(item: ErrorDetails) -> FieldError:
     )
 
 
-def of_matrix(error: FieldError) -> FieldError:
+def _of_matrix(error: FieldError) -> FieldError:
     """The same of the field that R and t were typed into."""
     name = error.pointer[1:]
     reason = error.reason

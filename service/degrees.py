@@ -7,11 +7,6 @@ from typing import Any
 _RAD, _DEG = "_rad", "_deg"
 
 
-def degrees(radians: float) -> float:
-    """An angle as people read it."""
-    return math.degrees(radians)
-
-
 def in_degrees(body: Mapping[str, Any]) -> dict[str, Any]:
     """A body whose fields `*_rad` are `*_deg`, in bodies within it too; the rest as it is."""
     return dict(_as_read(name, value) for name, value in body.items())
@@ -20,6 +15,10 @@ def in_degrees(body: Mapping[str, Any]) -> dict[str, Any]:
 def _as_read(name: str, value: Any) -> tuple[str, Any]:
     if isinstance(value, Mapping):
         return name, in_degrees(value)
-    if name.endswith(_RAD):
-        return name.removesuffix(_RAD) + _DEG, None if value is None else degrees(value)
-    return name, value
+    if not name.endswith(_RAD):
+        return name, value
+    if isinstance(value, list | tuple):
+        value = [math.degrees(each) for each in value]
+    elif value is not None:
+        value = math.degrees(value)
+    return name.removesuffix(_RAD) + _DEG, value

@@ -1,8 +1,9 @@
-"""Memory and processor time of a process: freed memory goes back, jobs yield."""
+"""A process of ours before the system: private files, an end that cleans up, memory, niceness."""
 
 import ctypes
 import logging
 import os
+import signal
 from pathlib import Path
 
 log = logging.getLogger("surefoot.worker")
@@ -53,3 +54,18 @@ def yield_to_others(nice: int) -> None:
         os.setpriority(os.PRIO_PROCESS, 0, nice)
     except OSError as error:
         log.info("niceness_kept", extra={"wanted": nice, "why": str(error)})
+
+
+def be_private() -> None:
+    """From now on this process makes files that only its user can read."""
+    os.umask(0o077)
+
+
+def end_like_ctrl_c() -> None:
+    """From now on the end of the terminal, or SIGTERM, ends this process as Ctrl-C does."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _interrupt)
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt

@@ -1,24 +1,92 @@
-"""Lenses and poses in their forms on the wire."""
+"""Fields, lenses and poses in their forms on the wire, and the classes that bodies are of."""
 
 import math
 from dataclasses import asdict
-from typing import Annotated, Self
+from datetime import UTC, datetime
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    field_validator,
+    model_validator,
+)
 
 from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
-from service.api.fields import Body, Finite, Triple
+from service.degrees import in_degrees
+from service.reasons import CODES
 
+_EARLIEST, _LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
 # Of numbers beyond these nothing can be computed, let alone drawn.
 _HIGHEST_M, _FARTHEST_M = 10_000.0, 1e8
 
+
+def _checked_moment(value: datetime) -> datetime:
+    # In UTC, the first and the last hours that a datetime can say are none any more.
+    if not _EARLIEST <= value <= _LATEST:
+        raise ValueError(f"a time from 1970 to 9998 is needed, got {value.isoformat()}")
+    return value
+
+
+def _without_nul(value: str) -> str:
+    # PostgreSQL has no text with one.
+    if "\0" in value:
+        raise ValueError("text without NUL characters is needed")
+    return value
+
+
+Moment = Annotated[AwareDatetime, AfterValidator(_checked_moment)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Text = Annotated[str, AfterValidator(_without_nul)]
+CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
+Who = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 FocalLength = Annotated[Finite, Field(ge=1, le=1e6)]
 Centre = Annotated[Finite, Field(ge=-1e6, le=1e6)]
 Tilt = Annotated[Finite, Field(ge=-90, le=90)]
+# Beside every `reason`: its code, and the numbers and names that belong to it.
+ReasonCode = Annotated[
+    str,
+    Field(
+        description="code of the first of the reasons; null where there is none",
+        json_schema_extra={"enum": list(CODES)},
+    ),
+]
+ReasonValues = Annotated[
+    dict[str, Any],
+    Field(description="its numbers, with the unit in their names, and names; may be empty"),
+]
+
+
+class Body(BaseModel):
+    """A request body; unknown fields are refused, since they are mostly misspelt ones."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    @field_validator("*")
+    @classmethod
+    def _no_nul(cls, value: object) -> object:
+        return _without_nul(value) if isinstance(value, str) else value
+
+
+class Out(BaseModel):
+    """A body of an answer, made of a value or a record by its attributes."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    @classmethod
+    def of(cls, value: object, **others: Any) -> Self:
+        """The body of what has its fields as attributes, all but the others."""
+        own = {name: getattr(value, name) for name in cls.model_fields.keys() - others}
+        return cls.model_validate({**own, **others})
 
 
 class IntrinsicsBody(Body):
@@ -36,14 +104,7 @@ class IntrinsicsBody(Body):
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
-        k1, k2, p1, p2, k3 = self.distortion
-        fields = self.model_dump(exclude={"distortion"})
-        return Intrinsics(**fields, distortion=(k1, k2, p1, p2, k3))
-
-    @classmethod
-    def from_value(cls, value: Intrinsics) -> Self:
-        """The body of a lens."""
-        return cls.model_validate(asdict(value))
+        return Intrinsics(**{**self.model_dump(), "distortion": tuple(self.distortion)})
 
 
 class PriorPoseBody(Body):
@@ -130,12 +191,7 @@ class PoseOut(BaseModel):
     def from_value(cls, pose: CameraPose) -> Self:
         """The body of a pose."""
         return cls(
-            height_m=pose.height_m,
-            tilt_deg=math.degrees(pose.tilt_rad),
-            roll_deg=math.degrees(pose.roll_rad),
-            heading_deg=math.degrees(pose.heading_rad),
-            x_m=pose.x_m,
-            y_m=pose.y_m,
+            **in_degrees(asdict(pose)),
             quaternion_wxyz=pose.quaternion_wxyz.tolist(),
             rotation=pose.rotation.tolist(),
             translation_m=pose.translation_m.tolist(),

@@ -1,31 +1,25 @@
 """`/ui/register`: a camera by a form, with a preview before anything is stored."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
+from pydantic import BaseModel, Field
 
 from models.durations import DAY_S
 from service.api.cameras import CameraOut
 from service.api.middleware.dependencies import BodyDep, StateDep, WriteDep
 from service.api.middleware.pages import render
-from service.api.registration_schemas import (
-    FilledOut,
-    PreviewBody,
-    PreviewOut,
-    RegistrationForm,
-    SayingOut,
-    TriedOut,
-    values_of,
-)
+from service.api.schemas import Body, Finite, Triple
 from service.cameras import cameras
-from service.formats.calibration_file import read_calibration
+from service.formats.calibration_file import CalibrationFile, read_calibration
 from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
-from service.wording.typed_pose import judge_pose, judge_tracks, worst_first
+from service.pages.registration_form import RegistrationForm
+from service.wording.typed_pose import Saying, judge_pose, judge_tracks, worst_first
 
 router = APIRouter(include_in_schema=False)
 
@@ -33,6 +27,65 @@ _MOST_TRACKS, _MOST_POINTS = 80, 40  # of recorded ones, which every preview tak
 _USUAL_RATE_HZ = 25.0
 _AN_EPOCH_S = 1e9  # recordings to try have frames and no dates
 _A_RECORDING_S = 366 * DAY_S
+
+
+class PreviewBody(Body):
+    """The form so far, and recorded tracks to try it with: `[frame, u, v]` each point."""
+
+    fields: RegistrationForm
+    tracks: Annotated[
+        list[Annotated[list[Triple], Field(max_length=200)]], Field(max_length=200)
+    ] = []
+
+
+class PreviewOut(BaseModel):
+    """The pictures of a pose, what is to say of it, and what is wrong with the fields."""
+
+    picture: str
+    ground: str
+    says: list[Saying]
+    errors: dict[str, str]
+
+
+class TriedOut(BaseModel):
+    """Tracks to send with each preview, thinned, and what was read."""
+
+    tracks: list[list[list[Finite]]]
+    text: str
+
+
+class FilledOut(BaseModel):
+    """A calibration file as the form's fields have it."""
+
+    fields: dict[str, str]
+    text: str
+
+    @classmethod
+    def from_value(cls, value: CalibrationFile) -> Self:
+        """The fields of a calibration."""
+        fields: dict[str, str] = {}
+        if value.size is not None:
+            fields |= {"width": str(value.size[0]), "height": str(value.size[1])}
+        if value.matrix is not None:
+            fx, _, cx, _, fy, cy = value.matrix[:6]
+            fields |= {"fx": _say(fx), "fy": _say(fy), "cx": _say(cx), "cy": _say(cy)}
+        if value.distortion is not None:
+            fields["distortion"] = ", ".join(_say(number) for number in value.distortion)
+        if value.rotation is not None:
+            rows = [value.rotation[n : n + 3] for n in range(0, len(value.rotation), 3)]
+            fields["rotation"] = "\n".join("  ".join(_say(n) for n in row) for row in rows)
+        if value.translation is not None:
+            fields["translation_m"] = "  ".join(_say(number) for number in value.translation)
+        if "rotation" in fields and "translation_m" in fields:
+            fields["form"] = "matrix"
+        names = {"fx": "lens", "width": "picture size", "rotation": "rotation"}
+        names["translation_m"] = "translation"
+        read = ", ".join(word for name, word in names.items() if name in fields)
+        missing = ", ".join(word for name, word in names.items() if name not in fields)
+        return cls(
+            fields=fields,
+            text=f"Read: {read}." + (f" Not in the file: {missing}." if missing else ""),
+        )
 
 
 @router.get("/ui/register")
@@ -49,9 +102,9 @@ def preview(body: PreviewBody) -> PreviewOut:
     wrong = {error.pointer[1:]: error.reason for error in read.errors}
     # What is needed and not there yet is no error while the form is filled in.
     errors = {name: reason for name, reason in wrong.items() if typed[name].strip()}
-    lens, pose = values_of(read)
-    if lens is None or pose is None:
+    if read.lens is None or read.pose is None:
         return PreviewOut(picture="", ground="", says=[], errors=errors)
+    lens, pose = read.lens.to_value(), read.pose.to_value()
     tracks = [np.array(track) for track in body.tracks if len(track) > 1]
     feet = [track[:, 1:] for track in tracks]
     says = judge_pose(lens, pose, typed_angles=body.fields.form == "angles")
@@ -70,7 +123,7 @@ def preview(body: PreviewBody) -> PreviewOut:
     return PreviewOut(
         picture=str(drawn),
         ground=str(tried_ground_svg(lens, pose, feet)) if tracks else "",
-        says=[SayingOut.model_validate(said, from_attributes=True) for said in worst_first(says)],
+        says=worst_first(says),
         errors=errors,
     )
 
@@ -114,3 +167,7 @@ def register(body: RegistrationForm, state: StateDep, session: WriteDep) -> Came
     """Register a camera by the form; the same as `POST /cameras`."""
     spec = body.to_body().to_spec()
     return CameraOut.from_value(cameras.register_camera(session, state.queue, state.settings, spec))
+
+
+def _say(number: float) -> str:
+    return f"{number:.10g}"
