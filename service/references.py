@@ -186,7 +186,7 @@ def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: i
 def drift_limits(settings: Settings) -> DriftLimits:
     """The limits from which on a drift counts, by the settings."""
     return DriftLimits(
-        sigmas=settings.drift_sigmas,
+        certainty=settings.drift_certainty,
         floor_rad=math.radians(settings.drift_floor_deg),
         floor_m=settings.drift_floor_m,
         people=settings.drift_people,

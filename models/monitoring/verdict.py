@@ -20,14 +20,10 @@ _CHARTED = (*PARAMETERS, "height")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveProbabilities:
-    """How likely a camera has moved, and changed each of its parameters by that.
-
-    `turned` is the probability that an angle changed, given that it moved.
-    """
+    """How likely a camera has moved, and changed each of its parameters by that."""
 
     moved: float
     parameters: Mapping[str, float]
-    turned: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +32,7 @@ class Drift:
 
     `identifiable` names the parameters that the tracks determine; the others stand here but count
     nowhere. `angle_rad` is the whole rotation that the identifiable angles make. `move` is how
-    likely one is; `noticed` says that a turn of some 10 deg would have been noticed.
+    likely one is.
     """
 
     by: PoseParameters
@@ -44,7 +40,6 @@ class Drift:
     angle_rad: float
     identifiable: tuple[str, ...]
     move: MoveProbabilities
-    noticed: bool
 
     def of(self, name: str) -> tuple[float, float]:
         """A parameter's drift and its standard deviation: in metres for height, else in radians."""
@@ -105,8 +100,6 @@ def drift_between(
     identifiable: Sequence[str],
     prior: CameraPose,
     move: MoveProbabilities,
-    *,
-    noticed: bool = True,
 ) -> Drift:
     """Drift: pose less prior pose; x and y count as unmoved.
 
@@ -116,7 +109,6 @@ def drift_between(
         identifiable: those of tilt, roll, height, heading that the tracks determine.
         prior: the prior pose.
         move: how likely one is.
-        noticed: whether a turn would have been noticed.
     """
     drift = Drift(
         by=PoseParameters(
@@ -129,7 +121,6 @@ def drift_between(
         angle_rad=0.0,
         identifiable=tuple(name for name in PARAMETERS if name in identifiable),
         move=move,
-        noticed=noticed,
     )
     turned = pose_after(drift, prior)
     return replace(
@@ -158,6 +149,8 @@ def judge(
     drifted: tuple[str, ...],
     chart: ChartResult | None = None,
     creep: Creep | None = None,
+    *,
+    enough: bool = True,
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
@@ -175,15 +168,17 @@ def judge(
         drifted: the parameters that have drifted, by the verdicts before; empty where none has.
         chart: its result, where there is one.
         creep: of the weeks up to now, where there is an anchor.
+        enough: whether enough people came since somebody said how the camera stands: of fewer, the
+            pose neither begins nor ends a drift.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
     if not drift.identifiable and chart is None and not crept:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
-    beyond = _beyond(drift, limits)
+    beyond = _beyond(drift, limits) if enough else {}
     charted = (_CHARTED[chart.parameter],) if chart is not None and chart.moved else crept
     calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
     known = set(drift.identifiable) if chart is None else set(PARAMETERS)
-    well = calm and set(drifted) <= known and _is_well(drift, limits)
+    well = enough and calm and set(drifted) <= known and _is_well(drift, limits)
     streak = 1 if beyond or charted else -1 if well else 0
     if not drifted:
         drifted = tuple(beyond) or charted
@@ -279,7 +274,9 @@ def may_be_clock(chart: ChartResult) -> bool:
     )
 
 
-def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
+def clock_fault(
+    drift: Drift, turned: float, prior: CameraPose, frame_rate_hz: float | None
+) -> Reason | None:
     """Reason of a change of scale with unchanged angles; None where there is none.
 
     Times that are too long by a factor make people slow, and only a higher camera makes them walk
@@ -288,6 +285,7 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
 
     Args:
         drift: the pose against the prior pose.
+        turned: the probability that an angle changed, given that the camera moved.
         prior: that pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
@@ -295,7 +293,7 @@ def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) ->
         return None
     factor = 1 + drift.by.height_m / prior.height_m
     changed = drift.move.moved >= LIKELY and drift.move.parameters["height"] >= LIKELY
-    if not changed or drift.move.turned > config.CLOCK_TURNED:
+    if not changed or turned > config.CLOCK_TURNED:
         return None
     if abs(math.log(factor)) <= config.CLOCK_LEAST_LOG:
         return None

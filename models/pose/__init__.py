@@ -30,7 +30,7 @@ from models.pose.estimating import (
     estimate_pose,
     unless_failed,
 )
-from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
+from models.pose.hypotheses import PosePosterior, drift_of, is_noticed, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
     WarmStart,
@@ -83,6 +83,7 @@ __all__ = [
     "count_walks",
     "drift_of",
     "estimate_pose",
+    "is_noticed",
     "learn_site",
     "link_pieces",
     "log_creep",

@@ -67,7 +67,7 @@ class PoseFinding:
     @property
     def drift(self) -> Drift:
         """The drift from the prior pose, with standard deviations."""
-        return drift_of(self.fused, self.joint.walking_groups, self.prior)
+        return drift_of(self.posterior, self.fused)
 
     @property
     def pose(self) -> CameraPose:

@@ -21,7 +21,6 @@ from models.geometry.rotation import Array
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
-from models.reasons import TracksCode
 
 _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 # Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
@@ -54,13 +53,16 @@ class PosePosterior:
     def move(self) -> MoveProbabilities:
         """How likely a move is, and of what."""
         shares = (self.weights @ self.moved_in).tolist()
+        return MoveProbabilities(
+            moved=self.moved, parameters=dict(zip(PARAMETERS, shares, strict=True))
+        )
+
+    @property
+    def turned(self) -> float:
+        """The probability that an angle which the tracks tell changed, if the camera moved."""
         angles = self.seen & [name != "height" for name in PARAMETERS]
         turned = float(self.weights @ self.moved_in[:, angles].any(axis=1))
-        return MoveProbabilities(
-            moved=self.moved,
-            parameters=dict(zip(PARAMETERS, shares, strict=True)),
-            turned=turned / max(self.moved, 1e-300),
-        )
+        return turned / max(self.moved, 1e-300)
 
     @property
     def offset(self) -> Array:
@@ -130,7 +132,7 @@ def pose_posterior(
         heavy = (degrees + squared) / (degrees + seen.sum())
         covariances[number] = (move - gain @ move[seen]) * heavy
     log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
-    if fused.reason is not None and fused.reason.code == TracksCode.PATHS_CHANGED:
+    if fused.paths_changed:
         away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]
         log_weights += np.log(np.where(away, config.LEAVES_PATHS, config.PATHS_CHANGE))
     return PosePosterior(
@@ -143,35 +145,28 @@ def pose_posterior(
     )
 
 
-def drift_of(
-    fused: FusedEstimate,
-    walking_groups: int,
-    prior: CameraPose,
-    moved_prior: float = config.MOVED_PRIOR,
-) -> Drift:
-    """The drift of a window's estimate from the prior pose, as of `pose_posterior`.
+def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
+    """The drift from the prior pose, by the posterior of an estimate.
 
-    A heading that certainly moved is told, however unsure it is how far.
+    A heading that certainly changed is told, however unsure it is how far.
     """
-    posterior = pose_posterior(fused, walking_groups, prior, moved_prior)
     move = posterior.move
-    sds = np.sqrt(np.diag(fused.covariance))[[name != "height" for name in PARAMETERS]]
-    noticed = fused.registered and bool((sds < config.NOTICED_SD).all())
-    ends = [end for name in ANGLES for end in posterior.interval(name, 0.9)]
     told = [
         name
         for name in PARAMETERS
         if name in fused.identifiable
         or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
     ]
-    return drift_between(
-        posterior.parameters,
-        posterior.sd,
-        told,
-        prior,
-        move,
-        noticed=noticed and max(map(abs, ends)) < config.NOTICED_RAD,
-    )
+    return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
+
+
+def is_noticed(posterior: PosePosterior, fused: FusedEstimate) -> bool:
+    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made."""
+    sds = np.sqrt(np.diag(fused.covariance))[[name != "height" for name in PARAMETERS]]
+    if not fused.registered or not (sds < config.NOTICED_SD).all():
+        return False
+    ends = [abs(end) for name in ANGLES for end in posterior.interval(name, 0.9)]
+    return max(ends) < config.NOTICED_RAD
 
 
 def _log_prior(moved_prior: float) -> Array:

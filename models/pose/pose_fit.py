@@ -20,7 +20,7 @@ from models.geometry.pose import (
 )
 from models.geometry.rotation import Array
 from models.pose import config
-from models.reasons import Reason
+from models.reasons import Reason, TracksCode
 from models.serialization import Format, flattened, from_bytes, restored, to_bytes
 from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate
@@ -72,6 +72,11 @@ class FusedEstimate:
     def registered(self) -> bool:
         """True if the paths had a part."""
         return self.raw is not None
+
+    @property
+    def paths_changed(self) -> bool:
+        """True if people walk on none of the site's paths, wherever the camera looks."""
+        return self.reason is not None and self.reason.code == TracksCode.PATHS_CHANGED
 
     @property
     def parameters(self) -> PoseParameters:

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import (
+    LIKELY,
     Drift,
     DriftVerdict,
     clock_fault,
@@ -19,18 +20,19 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import CLOCK, drift_of
+from models.pose import CLOCK, drift_of, is_noticed
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
-from service.estimation.evidence import Evidence
+from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.finding import Finding
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
 from service.store import estimates, journal, references
+from service.store.alerts import MOVED_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
@@ -56,13 +58,16 @@ class History:
 class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
-    `clock` is why its clock or frame rate looks wrong; `charted` says that the chart or the creep
-    is beyond its level.
+    `after` is when it last stood where it should, as far as is known. `moved` is the probability
+    that it has moved. `clock` is why its clock or frame rate looks wrong; `charted` says that the
+    chart or the creep is beyond its level.
     """
 
     state: PoseState
     reasons: Reasons
+    moved: float
     verdict: DriftVerdict = _UNJUDGED
+    after: datetime | None = None
     since: datetime | None = None
     clock: Reason | None = None
     charted: bool = False
@@ -80,16 +85,18 @@ def save_estimate(
     camera = session.get(CameraRecord, evidence.camera_id)
     if reference is None or camera is None:
         return None
-    drift = drift_of(finding.fused, evidence.prior)
+    drift = drift_of(finding.posterior, finding.fused)
     if evidence.site is None:
         learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
-        judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
+        judgement = Judgement(
+            state=PoseState.LEARNING, reasons=learning, moved=settings.moved_prior
+        )
         record = _record(reference, evidence, finding, drift, judgement)
         record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
     else:
         if finding.change is not None:
             reference.window_from_s = finding.change.ended_s
-            reference.changed_s = finding.change.started_s
+            reference.changed_after_s, reference.changed_s = _change_of(evidence, finding.change)
         history = _history(session, reference)
         judgement = _judge(reference, history, evidence, finding, drift, camera.frame_rate_hz)
         record = _record(reference, evidence, finding, drift, judgement)
@@ -131,7 +138,7 @@ def _history(session: Session, reference: SiteReferenceRecord) -> History:
     last = estimates.newest(session, camera_id)
     if last is not None and not made_against(reference, last):
         last = None
-    if not fired_by_estimate(session, camera_id):
+    if not fired_by_estimate(session, camera_id) & set(MOVED_KINDS):
         return History(last=last, drifted=())
     # An alert of before this reference stands until what is seen after it ends it.
     before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
@@ -148,35 +155,67 @@ def _judge(
     frame_rate_hz: float | None,
 ) -> Judgement:
     """The judgement of an estimate after its reference."""
-    clock = clock_fault(drift, evidence.prior, frame_rate_hz)
-    reading, creep = finding.reading, finding.creep
+    clock = clock_fault(drift, finding.posterior.turned, evidence.prior, frame_rate_hz)
+    # What people do who are not where the reference's were says nothing of which parameter moved.
+    gone = finding.fused.paths_changed
+    reading, creep = None if gone else finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
         reading = None
-    earlier = None if finding.earlier is None else drift_of(finding.earlier, evidence.prior)
-    verdict = judge(drift, evidence.limits, history.drifted, reading, earlier, creep)
+    verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=finding.enough)
     reasons = some(
+        finding.fused.reason if gone else None,
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
         clock,
         None if finding.reading is None else reason_of_chart(finding.reading),
-        finding.fused.reason,
+        None if gone else finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
         finding.pieces,
         *finding.failures,
     )
-    state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     charted = reading if reading is not None and reading.moved else None
     if charted is not None and clock is None and charted.parameter == CLOCK:
         clock = reason_of_chart(charted)
+    alarmed = charted is not None or (creep is not None and creep.moved)
+    moved = drift.move.moved
+    if alarmed:
+        moved = max(moved, _moved_by_alarm(evidence))
+    after, since = _since(reference, history, verdict, evidence, finding)
     return Judgement(
-        state=PoseState.DRIFTING if verdict.drifting else state,
+        state=_state(verdict, finding, moved, gone=gone),
         reasons=reasons,
+        moved=moved,
         verdict=verdict,
-        since=_since(reference, history, verdict, evidence, finding),
+        after=after,
+        since=since,
         clock=clock,
-        charted=charted is not None or (creep is not None and creep.moved),
+        charted=alarmed,
     )
+
+
+def _state(verdict: DriftVerdict, finding: Finding, moved: float, *, gone: bool) -> PoseState:
+    """The state of a camera; that it stands is said where a turn would have been noticed."""
+    if verdict.drifting:
+        return PoseState.DRIFTING
+    if gone:
+        return PoseState.UNSURE
+    if moved >= LIKELY:
+        return PoseState.SUSPECTED
+    return PoseState.OK if is_noticed(finding.posterior, finding.fused) else PoseState.LEARNING
+
+
+def _moved_by_alarm(evidence: Evidence) -> float:
+    """The probability that a camera moved whose chart alarms, by how seldom a still one's does."""
+    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
+    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
+    return evidence.moved_prior / (evidence.moved_prior + (1 - evidence.moved_prior) * false)
+
+
+def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:
+    """The end of the last track before a change and the begin of the first after it."""
+    at = evidence.tracks.index(change)
+    return (evidence.tracks[at - 1].ended_s if at else None), change.started_s
 
 
 def _since(
@@ -185,23 +224,31 @@ def _since(
     verdict: DriftVerdict,
     evidence: Evidence,
     finding: Finding,
-) -> datetime | None:
-    """The time at which the camera had moved at the latest, as far as the tracks tell."""
-    since = None if history.last is None else history.last.drift_since
+) -> tuple[datetime | None, datetime | None]:
+    """The times between which the camera moved, as far as the tracks tell."""
+    last = history.last
+    before = (None, None) if last is None else (last.drift_after, last.drift_since)
     if verdict.streak <= 0:
-        return since if verdict.drifting else None
+        return before if verdict.drifting else (None, None)
     if reference.changed_s is not None:
-        return datetime.fromtimestamp(reference.changed_s, UTC)
-    if since is not None:
-        return since
+        return _at(reference.changed_after_s), _at(reference.changed_s)
+    if before[1] is not None:
+        return before
     reading, creep = finding.reading, finding.creep
     if reading is not None and reading.moved:
-        return datetime.fromtimestamp(evidence.tracks[reading.track_idx].started_s, UTC)
+        at = reading.track_idx
+        ended_s = evidence.tracks[at - 1].ended_s if at else reference.to_s
+        return _at(ended_s), _at(evidence.tracks[at].started_s)
     if creep is not None and creep.moved:
-        return datetime.fromtimestamp(creep.since_day * DAY_S, UTC)
+        return None, _at(creep.since_day * DAY_S)
     # One pose since the reference, and never another one: it had moved before all of them.
-    first = history.last is None
-    return datetime.fromtimestamp(finding.tracks[0 if first else -1].ended_s, UTC)
+    if last is None:
+        return _at(reference.to_s), _at(finding.tracks[0].ended_s)
+    return _at(last.to_s), _at(finding.tracks[-1].ended_s)
+
+
+def _at(time_s: float | None) -> datetime | None:
+    return None if time_s is None else datetime.fromtimestamp(time_s, UTC)
 
 
 def _update_alerts(
@@ -210,16 +257,27 @@ def _update_alerts(
     """Open, update or end the alerts that an estimate stands behind."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
     if not verdict.drifting:
-        for kind in firing:
+        unsure = judgement.state == PoseState.UNSURE
+        for kind in firing - {AlertKind.UNSURE} if unsure else firing:
             end_alert(session, camera_id, kind, Outcome.CLEARED)
+        if unsure:
+            open_alert(
+                session,
+                settings,
+                camera_id,
+                AlertKind.UNSURE,
+                Severity.WARNING,
+                identifiable_drift(drift),
+                None,
+                reasons=judgement.reasons,
+            )
         return
     # What was named a clock fault stays one until an angle has drifted too.
     still_clock = AlertKind.CLOCK in firing and verdict.drifted == ("height",)
-    kind, other = AlertKind.DRIFT, AlertKind.CLOCK
-    if judgement.clock is not None or still_clock:
-        kind, other = other, kind
-    if other in firing:
-        end_alert(session, camera_id, other, Outcome.CLEARED, note=fired_as(kind))
+    clock = judgement.clock is not None or still_clock
+    kind = AlertKind.CLOCK if clock else AlertKind.DRIFT
+    for before in firing - {kind}:
+        end_alert(session, camera_id, before, Outcome.CLEARED, note=fired_as(kind))
     if drift.identifiable or judgement.charted:
         open_alert(
             session,
@@ -230,6 +288,7 @@ def _update_alerts(
             identifiable_drift(drift),
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
+            changed_after=judgement.after,
         )
 
 
@@ -255,6 +314,9 @@ def _record(
         suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=judgement.verdict.streak,
         drifted=list(judgement.verdict.drifted),
+        moved=judgement.moved,
+        moved_parameters=dict(drift.move.parameters),
+        drift_after=judgement.after,
         drift_since=judgement.since,
         raw=_raw(finding),
         tracks=len(finding.tracks),

@@ -20,7 +20,7 @@ from models.pose import (
     JointEstimate,
     Observations,
     PartialFailure,
-    SecondLook,
+    PosePosterior,
     WarmStart,
     alarm_chart_result,
     assume_site,
@@ -29,6 +29,7 @@ from models.pose import (
     estimate_pose,
     observe_walks,
     paths_from_bytes,
+    pose_posterior,
     reference_from_bytes,
     unless_failed,
     warm_start_from_bytes,
@@ -91,9 +92,9 @@ class PartialFailures:
 class Finding:
     """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
-    `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
-    for it. `reading` is what the drift chart says of the tracks after the change, or of all where
-    these are too few, long before a pose can say how far; None where there is no chart. `creep`
+    `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
+    said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
+    the change, or of all where these are too few, long before a pose can say how far; None where there is no chart. `creep`
     is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
@@ -101,7 +102,8 @@ class Finding:
 
     joint: JointEstimate
     fused: FusedEstimate
-    earlier: FusedEstimate | None
+    posterior: PosePosterior
+    enough: bool
     averaged: PoseEstimate | None
     reading: ChartResult | None
     creep: Creep | None
@@ -146,13 +148,7 @@ def compute_finding(
     reading = _read(evidence, observed, site, 0, failures)
     suspicious = reading is not None and reading.suspicious
     basis = basis_of(evidence, crept=crept, suspicious=suspicious)
-    look_twice = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
-    found = estimate_pose(
-        observed,
-        site,
-        look_twice if asked_enough(evidence) else None,
-        begin_of(evidence.last, basis),
-    )
+    found = estimate_pose(observed, site, begin_of(evidence.last, basis))
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
@@ -161,7 +157,10 @@ def compute_finding(
     return Finding(
         joint=found.joint,
         fused=found.fused,
-        earlier=found.earlier,
+        posterior=pose_posterior(
+            found.fused, found.joint.walking_groups, evidence.prior, evidence.moved_prior
+        ),
+        enough=asked_enough(evidence),
         averaged=averaged,
         reading=reading,
         creep=creep,

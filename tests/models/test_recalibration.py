@@ -9,7 +9,6 @@ from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
 from models.monitoring.group_scores import score_groups
-from models.monitoring.verdict import DriftLimits
 from models.paths.folds import fold_maps
 from models.pose import (
     AlarmRate,
@@ -33,7 +32,6 @@ from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
