@@ -160,13 +160,18 @@ def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
     return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
 
 
-def is_noticed(posterior: PosePosterior, fused: FusedEstimate) -> bool:
-    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made."""
-    sds = np.sqrt(np.diag(fused.covariance))[[name != "height" for name in PARAMETERS]]
-    if not fused.registered or not (sds < config.NOTICED_SD).all():
+def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:
+    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made.
+
+    Of a site that is `mapped`, in heading too; without a map nobody can tell that.
+    """
+    angles = [name for name in ANGLES if mapped or name != "heading"]
+    sds = np.sqrt(np.diag(fused.covariance))
+    if (mapped and not fused.registered) or fused.paths_changed:
         return False
-    ends = [abs(end) for name in ANGLES for end in posterior.interval(name, 0.9)]
-    return max(ends) < config.NOTICED_RAD
+    noticed = all(sds[PARAMETERS.index(name)] < config.NOTICED_SD for name in angles)
+    ends = [abs(end) for name in angles for end in posterior.interval(name, 0.9)]
+    return noticed and max(ends) < config.NOTICED_RAD
 
 
 def _log_prior(moved_prior: float) -> Array:

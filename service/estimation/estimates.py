@@ -183,7 +183,7 @@ def _judge(
         moved = max(moved, _moved_by_alarm(evidence))
     after, since = _since(reference, history, verdict, evidence, finding)
     return Judgement(
-        state=_state(verdict, finding, moved, gone=gone),
+        state=_state(verdict, finding, moved, mapped=evidence.flow is not None),
         reasons=reasons,
         moved=moved,
         verdict=verdict,
@@ -194,15 +194,16 @@ def _judge(
     )
 
 
-def _state(verdict: DriftVerdict, finding: Finding, moved: float, *, gone: bool) -> PoseState:
+def _state(verdict: DriftVerdict, finding: Finding, moved: float, *, mapped: bool) -> PoseState:
     """The state of a camera; that it stands is said where a turn would have been noticed."""
     if verdict.drifting:
         return PoseState.DRIFTING
-    if gone:
+    if finding.fused.paths_changed:
         return PoseState.UNSURE
     if moved >= LIKELY:
         return PoseState.SUSPECTED
-    return PoseState.OK if is_noticed(finding.posterior, finding.fused) else PoseState.LEARNING
+    noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
+    return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
 
 
 def _moved_by_alarm(evidence: Evidence) -> float:

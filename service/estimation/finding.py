@@ -94,8 +94,9 @@ class Finding:
 
     `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
     said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
-    the change, or of all where these are too few, long before a pose can say how far; None where there is no chart. `creep`
-    is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
+    the change, or of all where these are too few, long before a pose can say how far; None where
+    there is no chart. `creep` is what the anchor says of weeks; once the camera has crept, all else
+    is by its first map, too.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """

@@ -202,8 +202,8 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
     TracksCode.PATHS_CHANGED: (
-        "people walk on none of the paths that were learned: the camera was turned far, or they walk "
-        "elsewhere"
+        "people walk on none of the paths that were learned: the camera was turned far, or they "
+        "walk elsewhere"
     ),
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
     TracksCode.HEADING_UNIDENTIFIABLE: (

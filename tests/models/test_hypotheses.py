@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import multivariate_t, norm
 
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
-from models.pose import config, drift_of, pose_posterior
+from models.pose import config, drift_of, is_noticed, pose_posterior
 from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason, TracksCode
 
@@ -65,7 +65,7 @@ def test_what_moved_is_named_and_the_rest_stands(name, by):
     assert found.offset[PARAMETERS.index(parameter)] == pytest.approx(true, rel=0.05)
     low, high = found.interval(parameter, 0.9)
     assert low < true < high
-    assert found.move.turned == pytest.approx(1.0 if parameter != "height" else 0.2, abs=0.2)
+    assert found.turned == pytest.approx(1.0 if parameter != "height" else 0.2, abs=0.2)
 
 
 def test_a_height_does_not_take_what_the_tilt_should_have():
@@ -124,20 +124,29 @@ def test_an_interval_is_of_the_whole_mixture():
         )
 
 
+def noticed(fused, *, mapped=True):
+    return is_noticed(pose_posterior(fused, 40, PRIOR), fused, mapped=mapped)
+
+
 def test_steady_is_said_only_where_a_turn_would_have_been_noticed():
-    assert drift_of(estimate(), 40, PRIOR).noticed
-    assert not drift_of(estimate(sd=SD * [1, 1, 1, 4]), 40, PRIOR).noticed
-    assert not drift_of(estimate(sd=SD * [11, 1, 1, 1]), 40, PRIOR).noticed
-    assert not drift_of(estimate(raw=None), 40, PRIOR).noticed
-    assert not drift_of(estimate(heading=8), 40, PRIOR).noticed
+    gone = Reason(code=TracksCode.PATHS_CHANGED)
+    assert noticed(estimate())
+    assert not noticed(estimate(sd=SD * [1, 1, 1, 4]))
+    assert not noticed(estimate(sd=SD * [11, 1, 1, 1]))
+    assert not noticed(estimate(raw=None))
+    assert noticed(estimate(raw=None), mapped=False)
+    assert not noticed(estimate(raw=None, reason=gone), mapped=False)
+    assert not noticed(estimate(heading=8))
+
+
+def drift(fused):
+    return drift_of(pose_posterior(fused, 40, PRIOR), fused)
 
 
 def test_a_heading_that_surely_moved_is_told_however_unsure_it_is_how_far():
     three = PARAMETERS[:3]
     wide = SD * np.array([1, 1, 1, 4])
-    told = drift_of(estimate(heading=30, sd=wide, identifiable=three), 40, PRIOR)
+    told = drift(estimate(heading=30, sd=wide, identifiable=three))
     assert told.identifiable == PARAMETERS
     assert math.degrees(told.by.heading_rad) == pytest.approx(30, abs=3)
-    assert (
-        drift_of(estimate(heading=3, sd=wide, identifiable=three), 40, PRIOR).identifiable == three
-    )
+    assert drift(estimate(heading=3, sd=wide, identifiable=three)).identifiable == three

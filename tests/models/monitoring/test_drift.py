@@ -20,7 +20,7 @@ PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), headi
 LIMITS = DriftLimits(
     certainty=0.99, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7
 )
-SURE = MoveProbabilities(moved=1.0, parameters=dict.fromkeys(PARAMETERS, 1.0), turned=1.0)
+SURE = MoveProbabilities(moved=1.0, parameters=dict.fromkeys(PARAMETERS, 1.0))
 
 
 THREE = ("tilt", "roll", "height")
@@ -54,10 +54,10 @@ def drift(
     return drift_between(found, sd, identifiable, PRIOR, move)
 
 
-def likely(moved, turned=1.0, **parameters):
+def likely(moved, **parameters):
     """A move of such a probability, in these parameters."""
     shares = {name: parameters.get(name, 0.0) for name in PARAMETERS}
-    return MoveProbabilities(moved=moved, parameters=shares, turned=turned)
+    return MoveProbabilities(moved=moved, parameters=shares)
 
 
 def drifting(now, drifted=()):
@@ -163,18 +163,18 @@ def test_what_drifted_has_to_be_told_to_end():
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():
-    scale = likely(1.0, turned=0.2, height=1.0)
-    found = clock_fault(drift(height_m=7.2, move=scale), PRIOR, 25.0)
+    scale = likely(1.0, height=1.0)
+    found = clock_fault(drift(height_m=7.2, move=scale), 0.2, PRIOR, 25.0)
     assert found is not None
     assert found.code is TracksCode.SCALE_CHANGED
     assert found.values == {"factor": pytest.approx(1.2), "rate_hz": 25.0}
-    lowered = clock_fault(drift(height_m=5.0, move=scale), PRIOR, None)
+    lowered = clock_fault(drift(height_m=5.0, move=scale), 0.2, PRIOR, None)
     assert lowered is not None
     assert lowered.values == {"factor": pytest.approx(5 / 6), "rate_hz": 25.0}
+    assert clock_fault(drift(height_m=7.2, move=scale), 0.3, PRIOR, 25.0) is None  # maybe turned
     for found in (
         drift(height_m=6.4, move=scale),  # 7 %: under the least
-        drift(height_m=7.2, move=likely(0.6, turned=0.2, height=0.4)),  # hardly of the height
-        drift(height_m=7.2, move=likely(1.0, turned=0.3, height=1.0)),  # may have turned
+        drift(height_m=7.2, move=likely(0.6, height=0.4)),  # hardly of the height
         drift(height_m=7.2, move=scale, unidentifiable=("roll",)),
     ):
-        assert clock_fault(found, PRIOR, 25.0) is None
+        assert clock_fault(found, 0.2, PRIOR, 25.0) is None
