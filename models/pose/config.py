@@ -76,6 +76,7 @@ FAR_SHARE, FAR_MOVE = 0.15, 5.0  # of moves are so many times as far
 # Degrees of freedom of Student's t: by few groups an estimate is farther off than its covariance.
 LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
 OCCAM = 3.0  # log evidence that a pose which is free to fit gains by that alone
+HABIT_LOSS = 0.2  # of a group's own scatter, by which hours differ in how they fit the prior pose
 MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
 # How often paths are not found again: of cameras turned far, and of those that stand.
 LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02

@@ -189,11 +189,13 @@ def _by_paths(
     """The most that the log weight of a standing camera may be, by how people fit its paths.
 
     The covariance is of a Gaussian around the best pose; the prior pose can be far outside of what
-    that is good for. There, each walking group says how much worse it fits: a t test.
+    that is good for. There, each walking group says how much worse it fits: a t test, whose mean
+    differs from hour to hour, too.
     """
     if fused.prior_loss <= 0:
         return float(log_weights[0])
-    loss, groups = min(fused.prior_loss, config.MOST_LOSS), max(walking_groups, 2)
+    groups = max(walking_groups, 2)
+    loss = min(fused.prior_loss, config.MOST_LOSS) / math.sqrt(1 + groups * config.HABIT_LOSS**2)
     ratio = groups / 2 * math.log1p(loss**2 / (groups - 1)) - config.OCCAM
     return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
 

@@ -88,8 +88,9 @@ def test_who_fits_far_worse_at_the_prior_pose_is_not_before_a_camera_that_stands
     alone = pose_posterior(estimate(heading=12, sd=wide), 40, PRIOR)
     assert alone.moved < 0.9
     beside = pose_posterior(estimate(heading=12, sd=wide, prior_loss=6.0), 40, PRIOR)
-    # A t test of 40 groups: 20 log(1 + 36 / 39) = 13.1, less 3 for a pose that is free to fit.
-    assert beside.moved == pytest.approx(1 / (1 + 4 * math.exp(-10.08)), abs=1e-4)
+    # Of 36, 40 groups' own scatter and the hours' leave 36 / (1 + 40 * 0.04) = 13.85; a t test of
+    # them: 20 log(1 + 13.85 / 39) = 6.08, less 3 for a pose that is free to fit.
+    assert beside.moved == pytest.approx(1 / (1 + 4 * math.exp(-3.08)), abs=1e-3)
     for harmless in (-3.0, 0.0, 1.0):
         found = pose_posterior(estimate(heading=12, sd=wide, prior_loss=harmless), 40, PRIOR)
         assert found.moved == pytest.approx(alone.moved)
