@@ -73,7 +73,8 @@ CHANGED_RATE = 1e-4  # of windows with unchanged paths that are called changed
 # 0.5 at the most (20 simulated sites, 6 cameras of recordings of days).
 TIDE, NEW_PATHS = 0.35, 1.0
 FEWEST_FITS = 5  # walking groups on seen ground by which two poses are told apart
-MOSTLY_SEEN = 0.5  # of a place's ground, and of the people, must have been seen
+MOSTLY_SEEN = 0.5  # of a place's ground must have been seen
+PEOPLE_SEEN = 0.25  # of people must be on seen ground, for it to hold a pose
 
 # Whether halves of the people find the same heading.
 AWAY_RAD = np.radians(4.0)  # from where it was found, both ways: half of a map's peak

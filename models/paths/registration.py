@@ -224,11 +224,11 @@ def _scatter(scores: Array) -> Array:
 
 
 def on_seen_ground(walkers: Walkers, paths: PathModel, candidate: Array) -> bool:
-    """True if most of what people do, from a candidate (4,), is on ground the reference saw."""
+    """True if enough of what people do, from a candidate (4,), is on ground the reference saw."""
     placed = place_steps(walkers.steps, candidate)
     unseen, _ = paths.density.unseen_at(placed.place)
     seen = float((walkers.weight * placed.valid * (1 - unseen)).sum())
-    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.MOSTLY_SEEN
+    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.PEOPLE_SEEN
 
 
 def variance_of_halves(

@@ -11,13 +11,10 @@ from models.monitoring.config import HABITS_OF_DAYS
 
 # The search for modes.
 HEADING_SD = math.radians(15.0)  # a pose offset's, before any track, around its peak
-HEADINGS = np.radians(
-    np.arange(-30.0, 31.0, 2.0)
-).tolist()  # tried: a map's peaks are some 4 deg wide
-FAR_HEADINGS = np.radians(
-    np.arange(33.0, 328.0, 3.0)
-).tolist()  # tried where people fit none of the near
-ON_MAP = 0.5  # of the walking groups must be on seen ground, for a pose to be held by the paths
+# Tried: a map's peaks are some 4 deg wide; the far ones where people fit none of the near.
+HEADINGS = np.radians(range(-30, 31, 2)).tolist()
+FAR_HEADINGS = np.radians([*range(-180, -30, 3), *range(33, 180, 3)]).tolist()
+ON_MAP = 0.3  # of the walking groups must be on seen ground, for a pose to be held by the paths
 ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hundredths of a sd
 WARM_ROUNDS = 1  # from a warm start, whose heading is known
 UNLIKELY = 12.0  # of the log posterior, below the best: speeds are not fitted again there

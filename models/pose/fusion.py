@@ -3,6 +3,8 @@
 Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / variance inflation.
 """
 
+from functools import partial
+
 import numpy as np
 
 from models.geometry.pose import IDENTIFIABLE_SD, PARAMETERS, CameraPose, array_of, identifiable_of
@@ -70,12 +72,15 @@ def fused_estimate(
     if warm_start is None and (not fitting or paths.fit.is_doubtful(fitting[0][1])):
         modes += find_modes(posterior, tracks, site, joint, headings=config.FAR_HEADINGS)
         fitting = _fitting(sorted(modes, key=lambda mode: -mode.peak.value), paths)
+    changed = partial(_changed_paths, posterior, paths, joint, prior)
     if not fitting:
-        return by_speeds_alone(joint, prior, _changed_paths(posterior, paths, joint, prior))
+        return by_speeds_alone(joint, prior, changed())
     modes, fits = [mode for mode, _ in fitting], fitting[0][1]
     values, covariance = _refined(modes[0], paths, prior, fits, warm_start)
+    if covariance[3, 3] > config.HEADING_SD**2:  # the paths say nothing
+        return by_speeds_alone(joint, prior, changed())
     if not on_seen_ground(walkers, posterior.paths, values):
-        return by_speeds_alone(joint, prior, _unidentifiable(config.HEADING_SD))
+        return by_speeds_alone(joint, prior, changed() or _unidentifiable(config.HEADING_SD))
     odds = odds_of(modes)
     extra = _extra_covariance(modes, odds, values, covariance, warm_start)
     return _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
