@@ -28,6 +28,7 @@ class TracksCode(StrEnum):
     CREPT = "crept"
     SCALE_CHANGED = "scale_changed"
     PATHS_CHANGED = "paths_changed"
+    WAYS_CHANGED = "ways_changed"
     HEADING_AMBIGUOUS = "heading_ambiguous"
     HEADING_UNIDENTIFIABLE = "heading_untold"
     UNIDENTIFIABLE = "numbers_untold"

@@ -103,11 +103,19 @@ def _fitting(modes: list[Mode], paths: PathReference) -> list[tuple[Mode, Array]
 def _changed_paths(
     posterior: Posterior, paths: PathReference, joint: JointEstimate, prior: CameraPose
 ) -> Reason | None:
-    """The reason of people who fit no pose; None if only times changed, by a clock."""
-    at_prior = group_fits(posterior.walkers, posterior.paths, array_of(prior))
+    """The reason of people who fit no pose; None if only times changed, by a clock.
+
+    A crowd that turns over a day walks the same ground another way; a camera that was turned has
+    people on other ground.
+    """
+    at = array_of(prior)
+    at_prior = group_fits(posterior.walkers, posterior.paths, at)
     if not paths.fit.has_changed(at_prior) and _same_angles(joint, prior):
         return None
-    return Reason(code=TracksCode.PATHS_CHANGED)
+    places = group_fits(posterior.walkers, posterior.paths.undirected, at)
+    if paths.place_fit.has_changed(places):
+        return Reason(code=TracksCode.PATHS_CHANGED)
+    return Reason(code=TracksCode.WAYS_CHANGED)
 
 
 def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:

@@ -205,6 +205,9 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         "people walk on none of the paths that were learned: the camera was turned far, or they "
         "walk elsewhere"
     ),
+    TracksCode.WAYS_CHANGED: (
+        "people walk the same ground other ways than they did: where they do tells no pose"
+    ),
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
     TracksCode.HEADING_UNIDENTIFIABLE: (
         "where people walk does not tell the heading (sd {heading_sd_deg:.1f} deg)"
