@@ -113,7 +113,7 @@ def _covers(interval: tuple[float, float], offset: float, name: str) -> bool:
     """True where an interval holds an offset; one that is a point is as wide as its rounding."""
     low, high = interval
     true = offset if name == "height" else math.remainder(offset, 2 * math.pi)
-    return low - _ROUNDING <= true <= high + _ROUNDING
+    return bool(low - _ROUNDING <= true <= high + _ROUNDING)
 
 
 def _apart(name: str, one: float, other: float) -> float:

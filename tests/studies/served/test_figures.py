@@ -7,7 +7,7 @@ import pytest
 from studies.served.figures import figures_of
 from studies.served.outcomes import ParameterOutcome, ServedOutcome
 
-RIGHT = ParameterOutcome(moved=0.0, error=0.0, sd=0.5, identifiable=True)
+RIGHT = ParameterOutcome(moved=0.0, error=0.0, sd=0.5, identifiable=True, covered=True)
 
 
 def outcome(

@@ -20,7 +20,7 @@ from studies.served.tables import BETWEEN, all_tables
 from studies.served.tasks import CaseId, CaseResult, Table, tasks_of
 from tests.studies.test_partings import scene_of
 
-NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True)
+NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True, covered=True)
 SERVED = ServedOutcome(
     reference_tracks=100,
     seen_tracks=50,
