@@ -25,7 +25,12 @@ SERVED = ServedOutcome(
     reference_tracks=100,
     seen_tracks=50,
     used_tracks=45,
-    parameters=(NUMBER, replace(NUMBER, error=1.0), replace(NUMBER, error=0.01, sd=0.02), NUMBER),
+    parameters=(
+        NUMBER,
+        replace(NUMBER, error=1.0, covered=False),
+        replace(NUMBER, error=0.01, sd=0.02),
+        NUMBER,
+    ),
     rotation_deg=0.75,
     height_error=0.0123,
     cuts=1,
