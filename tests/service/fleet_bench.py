@@ -149,8 +149,10 @@ class Fleet:
                 drift_tilt_rad=tilt * share + noise(0, 0.0002),
                 drift_roll_rad=noise(0, 0.0003), drift_heading_rad=pan * share + noise(0, 0.0003),
                 drift_angle_rad=angle * share, suspected=False,
+                moved=0.999 if share and state == "drifting" else 0.03, moved_parameters={},
                 drift_streak=5 if share and state != "ok" else 0,
-                drifted=["tilt"] if share and state != "ok" else [], drift_since=None, raw={},
+                drifted=["tilt"] if share and state != "ok" else [], drift_after=None, drift_since=None,
+                raw={},
                 tracks=200, from_s=self.now.timestamp() - 9e4, to_s=self.now.timestamp(),
                 newest_track_pk=1, created_at=self.now - timedelta(minutes=count - n),
             )  # fmt: skip
