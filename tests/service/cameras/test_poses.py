@@ -70,9 +70,7 @@ def test_a_told_heading_is_in_the_pose_and_all_that_is_said_of_it(bench):
     assert body["pose"]["heading_deg"] == pytest.approx(40)  # not told: the prior's
     assert (body["sd"]["heading_deg"], body["drift"]["heading_deg"]) == (None, None)
     first, second = bench.http.get("/cameras/corner/pose/history").json()["items"]
-    assert [first["heading_deg"], second["heading_deg"]] == pytest.approx(
-        [37.1, 40], abs=0.01
-    )
+    assert [first["heading_deg"], second["heading_deg"]] == pytest.approx([37.1, 40], abs=0.01)
     assert (first["drift"]["heading_deg"], second["drift"]["heading_deg"]) == (
         pytest.approx(-2.9, abs=0.01),
         None,
@@ -121,9 +119,7 @@ def test_a_refresh_without_news_writes_nothing(bench):
 
 def test_a_number_that_is_not_told_is_nowhere_taken_for_known(bench):
     for _ in range(4):
-        bench.see(
-            moved(tilt_deg=5.0, roll_deg=1.3), unidentifiable=("tilt", "height"), sd_deg=0.05
-        )
+        bench.see(moved(tilt_deg=5.0, roll_deg=1.3), unidentifiable=("tilt", "height"), sd_deg=0.05)
     body = bench.pose()
     assert body["state"] == "drifting"
     assert body["estimated"] == ["roll_deg"]
