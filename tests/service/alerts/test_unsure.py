@@ -139,7 +139,7 @@ def test_a_suspected_camera_has_no_alert_and_one_word_everywhere(bench):
     assert "which is not sure enough for an alert" in body["reason"]
     assert f"It may have moved ({share})" in headline(bench.http)
     row = fleet_row(bench.http)
-    assert row.count("May have moved") == 1  # the badge's word
+    assert row.count("Maybe moved") == 1  # the badge's word
     assert "may have moved" in row
     assert '<span class="badge suspected">' in bench.http.get("/ui/cameras/corner").text
     found = scrape(bench.http)

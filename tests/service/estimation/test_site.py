@@ -20,7 +20,6 @@ from tests.conftest import CAMERA, track
 from tests.service.estimation.conftest import WANTED
 from tests.service.street import KNOCKED, LENS, PRIOR, Street, tall
 
-
 # Of people who walk everywhere alike, as `walk` has them: a turn would not be noticed.
 STILL = "learning"
 
