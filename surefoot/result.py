@@ -97,7 +97,8 @@ def _why(drift: Drift, chart: ChartResult | None) -> str:
     known = {name: _in_unit(name, drift) for name in drift.identifiable}
     parts = [f"{n} {by:+.2f} {_UNITS[n]} (sd {sd:.2f})" for n, (by, sd) in known.items()]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
-    words = f"moved with a probability of {drift.move.moved:.0%}: {words}"
+    share = min(max(drift.move.moved, 0.001), 0.999)  # nothing is ever quite sure
+    words = f"moved with a probability of {share:.1%}: {words}"
     if chart is not None and chart.suspicious:
         number = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
         words += (

@@ -21,6 +21,7 @@ from models.geometry.rotation import Array
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
+from models.walking.config import FEWEST_GROUPS
 
 _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 # Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
@@ -108,11 +109,13 @@ def pose_posterior(
 
     Args:
         fused: of the window. Of one whose heading the paths do not hold, the heading says nothing.
-        walking_groups: that it is of: few tell less surely what their covariance is.
+        walking_groups: that it is of: few tell less surely what their covariance is, and too few
+            nothing.
         prior: the prior pose.
         moved_prior: how likely it is, before any track, that the camera has moved.
     """
-    seen = np.array([fused.registered or name != "heading" for name in PARAMETERS])
+    enough = walking_groups >= FEWEST_GROUPS
+    seen = np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
     offset = fused.values - array_of(prior)
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]

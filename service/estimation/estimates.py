@@ -24,7 +24,7 @@ from models.pose import CLOCK, drift_of, is_noticed
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
-from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
+from service.enums import AlertKind, Answer, EventType, Outcome, PoseState, Severity
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.finding import Finding
 from service.job_queue import JobQueue
@@ -47,11 +47,12 @@ class History:
     """Earlier findings of a camera.
 
     `last` is the newest estimate against its reference, `drifted` what had drifted as long as an
-    alert says so.
+    alert says so; `unsure`, as long as an alert says that nobody walks on the paths.
     """
 
     last: EstimateRecord | None
     drifted: tuple[str, ...]
+    unsure: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +94,7 @@ def save_estimate(
         )
         record = _record(reference, evidence, finding, drift, judgement)
         record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
+        record.moved_parameters = {}
     else:
         if finding.change is not None:
             reference.window_from_s = finding.change.ended_s
@@ -138,12 +140,14 @@ def _history(session: Session, reference: SiteReferenceRecord) -> History:
     last = estimates.newest(session, camera_id)
     if last is not None and not made_against(reference, last):
         last = None
-    if not fired_by_estimate(session, camera_id) & set(MOVED_KINDS):
-        return History(last=last, drifted=())
+    firing = fired_by_estimate(session, camera_id)
+    unsure = AlertKind.UNSURE in firing
+    if not firing & set(MOVED_KINDS):
+        return History(last=last, drifted=(), unsure=unsure)
     # An alert of before this reference stands until what is seen after it ends it.
     before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
     drifted = () if before is None else tuple(before.drifted)
-    return History(last=last, drifted=drifted or PLANE_PARAMETERS)
+    return History(last=last, drifted=drifted or PLANE_PARAMETERS, unsure=unsure)
 
 
 def _judge(
@@ -181,9 +185,10 @@ def _judge(
     moved = drift.move.moved
     if alarmed:
         moved = max(moved, _moved_by_alarm(evidence))
-    after, since = _since(reference, history, verdict, evidence, finding)
+    state = _state(reference, history, verdict, evidence, finding, moved)
+    after, since = _since(reference, history, verdict, evidence, finding, state)
     return Judgement(
-        state=_state(verdict, finding, moved, mapped=evidence.flow is not None),
+        state=state,
         reasons=reasons,
         moved=moved,
         verdict=verdict,
@@ -194,14 +199,29 @@ def _judge(
     )
 
 
-def _state(verdict: DriftVerdict, finding: Finding, moved: float, *, mapped: bool) -> PoseState:
-    """The state of a camera; that it stands is said where a turn would have been noticed."""
+def _state(
+    reference: SiteReferenceRecord,
+    history: History,
+    verdict: DriftVerdict,
+    evidence: Evidence,
+    finding: Finding,
+    moved: float,
+) -> PoseState:
+    """The state of a camera; that it stands is said where a turn would have been noticed.
+
+    Of fewer people than `enough`, nothing is said against what somebody said. That people walk on
+    none of the paths is so until some are found to walk there again.
+    """
     if verdict.drifting:
         return PoseState.DRIFTING
-    if finding.fused.paths_changed:
+    mapped = evidence.flow is not None
+    fits = finding.enough and (finding.fused.registered or not mapped)
+    if finding.enough and finding.fused.paths_changed or (history.unsure and not fits):
         return PoseState.UNSURE
-    if moved >= LIKELY:
+    if moved >= LIKELY and finding.enough:
         return PoseState.SUSPECTED
+    if not finding.enough and reference.answer == Answer.FALSE_ALARM:
+        return PoseState.OK
     noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
     return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
 
@@ -225,26 +245,29 @@ def _since(
     verdict: DriftVerdict,
     evidence: Evidence,
     finding: Finding,
+    state: PoseState,
 ) -> tuple[datetime | None, datetime | None]:
-    """The times between which the camera moved, as far as the tracks tell."""
+    """The times between which the camera moved, or is suspected to, as far as the tracks tell."""
     last = history.last
     before = (None, None) if last is None else (last.drift_after, last.drift_since)
-    if verdict.streak <= 0:
+    if verdict.streak <= 0 and state != PoseState.SUSPECTED:
         return before if verdict.drifting else (None, None)
     if reference.changed_s is not None:
         return _at(reference.changed_after_s), _at(reference.changed_s)
     if before[1] is not None:
         return before
+    # As was learned; or as somebody said, whose answer has the window begin.
+    stood_s = max(reference.to_s or 0.0, reference.window_from_s or 0.0)
     reading, creep = finding.reading, finding.creep
     if reading is not None and reading.moved:
         at = reading.track_idx
-        ended_s = evidence.tracks[at - 1].ended_s if at else reference.to_s
+        ended_s = evidence.tracks[at - 1].ended_s if at else stood_s
         return _at(ended_s), _at(evidence.tracks[at].started_s)
     if creep is not None and creep.moved:
         return None, _at(creep.since_day * DAY_S)
     # One pose since the reference, and never another one: it had moved before all of them.
     if last is None:
-        return _at(reference.to_s), _at(finding.tracks[0].ended_s)
+        return _at(stood_s), _at(finding.tracks[0].ended_s)
     return _at(last.to_s), _at(finding.tracks[-1].ended_s)
 
 

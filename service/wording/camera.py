@@ -17,8 +17,8 @@ from service.wording.times import Clock, duration
 
 STATES = {
     PoseState.DRIFTING: "Moved",
-    PoseState.UNSURE: "Something changed",
-    PoseState.SUSPECTED: "May have moved",
+    PoseState.UNSURE: "Unsure",
+    PoseState.SUSPECTED: "Maybe moved",
     PoseState.NO_DATA: "No people",
     PoseState.LEARNING: "Learning",
     PoseState.OK: "Steady",

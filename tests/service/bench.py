@@ -109,6 +109,7 @@ def made_up(
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
     missing = f"the tracks cannot tell {' and '.join(unidentifiable)}"
     sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
+    sd[[name in unidentifiable for name in PLANE_PARAMETERS]] = 0.5  # radians, and log height
     joint = JointEstimate(
         values=values,
         covariance=np.diag(sd**2),

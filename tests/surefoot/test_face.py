@@ -146,7 +146,7 @@ def test_a_pose_keeps_its_angles():
 
 def test_a_drift_counts_from_where_the_service_counts_it():
     limits, ours = DriftLimits(), Settings.model_fields
-    assert ours["drift_sigmas"].default == limits.sigmas
+    assert ours["drift_certainty"].default == limits.certainty
     assert math.radians(ours["drift_floor_deg"].default) == limits.floor_rad
     assert ours["drift_floor_m"].default == limits.floor_m
     assert ours["drift_people"].default == limits.people
