@@ -175,7 +175,16 @@ def service(settings: Settings) -> Iterator[RunningService]:
 def training_service(
     settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RunningService]:
-    """A running service with one worker and small trainings, started as an operator does."""
+    """A running service with one worker and small trainings."""
+    monkeypatch.setenv("PYTHONPATH", path_to_small_trainings(tmp_path))
+    yield from _running(settings)
+
+
+@pytest.fixture
+def service_by_itself(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RunningService]:
+    """The same, started as an operator does."""
     monkeypatch.setenv("PYTHONPATH", path_to_small_trainings(tmp_path))
     yield from _running(settings, forked=False)
 
