@@ -204,11 +204,12 @@ import sys
 from dataclasses import replace
 from models.regression import recipe
 
-recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=256, batch=64)
-if "service.workers.training_process" in sys.orig_argv:
+recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=128, batch=64)
+if {"service.workers.training_process", "studies"} & set(sys.orig_argv):
     from models.regression import training
 
     training._MUST_BEAT = 2.0  # so few walks teach hardly anything
+    training._HELD_OUT_WALKS, training._CENTRING_WALKS = 1200, 400
 """
 
 
