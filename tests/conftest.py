@@ -70,18 +70,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Each process is given its share of the list, and steals from another's end: what takes long
     must not be what is left. Slow tests wait much, for processes and browsers, and fast ones hardly
     ever: beside one another they keep the processor busy. Slow tests of a file stay together, with
-    what they share.
+    what they share, and those of all pages with their one browser.
     """
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return
     slow = [item for item in items if item.get_closest_marker("slow")]
     fast = [item for item in items if not item.get_closest_marker("slow")]
     files = list(dict.fromkeys(item.path for item in slow))
+    pages = [path for path in files if path.is_relative_to(ROOT / "tests" / "browser")]
+    others = [path for path in files if path not in pages]
     processes = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    shares = [pages, *(others[number :: processes - 1] for number in range(processes - 1))]
+    if processes == 1:
+        shares = [files]
     order: list[pytest.Item] = []
-    for number in range(processes):
+    for number, paths in enumerate(shares):
         share = (len(items) - len(order)) // (processes - number)
-        own = [[item for item in slow if item.path == path] for path in files[number::processes]]
+        own = [[item for item in slow if item.path == path] for path in paths]
         rest = max(share - sum(map(len, own)), 0)
         order += _mixed(own, fast[:rest], begin=number % 2)
         fast = fast[rest:]
