@@ -157,7 +157,7 @@ def test_one_serve_a_data_directory_and_workers_beside_it(service, tmp_path):
         in (line)
     )
     assert service.ready()
-    log = tmp_path / "beside.log"
+    (log := tmp_path / "beside.log").touch()
     words = ["worker", "--name", "beside"]
     beside = forked.Forked(words, service.settings.as_environment(), log, log)
     try:
