@@ -70,18 +70,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Each process is given its share of the list, and steals from another's end: what takes long
     must not be what is left. Slow tests wait much, for processes and browsers, and fast ones hardly
     ever: beside one another they keep the processor busy. Slow tests of a file stay together, with
-    what they share.
+    what they share, and those of all pages with their one browser.
     """
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return
     slow = [item for item in items if item.get_closest_marker("slow")]
     fast = [item for item in items if not item.get_closest_marker("slow")]
     files = list(dict.fromkeys(item.path for item in slow))
+    pages = [path for path in files if path.is_relative_to(ROOT / "tests" / "browser")]
+    others = [path for path in files if path not in pages]
     processes = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    shares = [pages, *(others[number :: processes - 1] for number in range(processes - 1))]
+    if processes == 1:
+        shares = [files]
     order: list[pytest.Item] = []
-    for number in range(processes):
+    for number, paths in enumerate(shares):
         share = (len(items) - len(order)) // (processes - number)
-        own = [[item for item in slow if item.path == path] for path in files[number::processes]]
+        own = [[item for item in slow if item.path == path] for path in paths]
         rest = max(share - sum(map(len, own)), 0)
         order += _mixed(own, fast[:rest], begin=number % 2)
         fast = fast[rest:]
@@ -175,7 +180,16 @@ def service(settings: Settings) -> Iterator[RunningService]:
 def training_service(
     settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RunningService]:
-    """A running service with one worker and small trainings, started as an operator does."""
+    """A running service with one worker and small trainings."""
+    monkeypatch.setenv("PYTHONPATH", path_to_small_trainings(tmp_path))
+    yield from _running(settings)
+
+
+@pytest.fixture
+def service_by_itself(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RunningService]:
+    """The same, started as an operator does."""
     monkeypatch.setenv("PYTHONPATH", path_to_small_trainings(tmp_path))
     yield from _running(settings, forked=False)
 
@@ -195,11 +209,12 @@ import sys
 from dataclasses import replace
 from models.regression import recipe
 
-recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=256, batch=64)
-if "service.workers.training_process" in sys.orig_argv:
+recipe.RECIPES["default"] = replace(recipe.DEFAULT, random_poses=128, batch=64)
+if {"service.workers.training_process", "studies"} & set(sys.orig_argv):
     from models.regression import training
 
     training._MUST_BEAT = 2.0  # so few walks teach hardly anything
+    training._HELD_OUT_WALKS, training._CENTRING_WALKS = 1200, 400
 """
 
 

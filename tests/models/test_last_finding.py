@@ -104,7 +104,7 @@ def test_a_few_new_tracks_refine_the_last_pose_and_come_to_the_same(site, people
 
 def test_a_knock_in_mid_window_is_found_as_soon(site, people):
     every = observe(knocked(people, LENS, PRIOR, LARGE, 0.8), LENS, PRIOR)
-    looks = list(follow(every, site, step=5))
+    looks = list(follow(every, site))
     assert any(full.change_idx is not None for full, _, _ in looks)
     assert max(apart(full, found) for full, found, _ in looks) < SAME
 

@@ -45,6 +45,7 @@ def tiny() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(regressors, "plan_training", tiny_plan)
         patch.setattr(training, "_HELD_OUT_WALKS", 100)
+        patch.setattr(training, "_CENTRING_WALKS", 100)
         patch.setattr(
             regressors, "learn_calibration", partial(regressors.learn_calibration, sites=60)
         )

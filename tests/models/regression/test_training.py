@@ -49,7 +49,9 @@ def plan(lens: Intrinsics, pose: CameraPose) -> TrainingPlan:
     # What a training does is seen where it has everything to learn.
     fresh = replace(DEFAULT, start="fresh", learning_rate=0.002)
     tiny = replace(fresh, random_poses=40, walks_per_pose=2, epochs=3, batch=40)
-    return TrainingPlan(intrinsics=lens, prior_pose=pose, recipe=tiny, walk=WalkConfig(), seed=5)
+    # A batch is of walks of one length: of few lengths, an epoch is of few steps.
+    walk = WalkConfig(min_points=10, max_points=12)
+    return TrainingPlan(intrinsics=lens, prior_pose=pose, recipe=tiny, walk=walk, seed=5)
 
 
 def weights(plan: TrainingPlan) -> torch.Tensor:

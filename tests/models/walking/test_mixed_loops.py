@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import stats
 
 from models.tracks.observations import Rows
 from models.walking.mixed_model import (
@@ -41,6 +40,8 @@ def rows_of(*lengths: int, owners: int | None = None) -> Rows:
 
 
 def log_density(residual, value):
+    from scipy import stats  # here: it takes longer to import than these tests
+
     usual = stats.t.pdf(residual / TOTAL_SD, df=4) / TOTAL_SD
     return np.log(0.9 * usual + 0.1 * stats.norm.pdf(value, -2.0, 0.8))
 
@@ -69,6 +70,8 @@ def test_a_row_above_the_horizon_is_all_but_impossible_and_no_row_says_nothing()
 
 
 def test_at_their_fixed_point_a_tracks_level_and_trend_are_the_likeliest():
+    from scipy import stats  # here: it takes longer to import than these tests
+
     rng = np.random.default_rng(1)
     rows = rows_of(7, 12, 1)
     residual = rng.normal(0, 0.5, 20)

@@ -3,10 +3,10 @@
 import os
 import re
 import shutil
-import subprocess
-import sys
+import tempfile
 import threading
 from functools import partial
+from pathlib import Path
 
 import httpx
 import pytest
@@ -23,19 +23,15 @@ from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 from tests.service.access.test_access import bearer, filled, routes_of
+from tests.service.commands import forked
 
 pytestmark = pytest.mark.slow
 
 
-def surefoot(settings, *command, code=0, **variables):
-    done = subprocess.run(
-        [sys.executable, "-m", "service.cli", *command],
-        env={**settings.as_environment(), "COLUMNS": "200", **variables},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+def surefoot(settings, *command, code=0):
+    environment = {**settings.as_environment(), "COLUMNS": "200"}
+    with tempfile.TemporaryDirectory() as folder:
+        done = forked.run(command, environment, Path(folder), timeout_s=60)
     assert done.returncode == code, done.stderr
     return (done.stdout if code == 0 else done.stderr).strip()
 

@@ -59,7 +59,14 @@ def configured(seed, phase, examples):
             "cache": {"enabled": False},
             "generation": generation,
             "checks": {"enabled": False} | {name: {"enabled": True} for name in _CHECKS},
-            "phases": {name: {"enabled": name == phase} for name in ("examples", *_PHASES)},
+            "phases": {
+                **{name: {"enabled": name == phase} for name in ("examples", *_PHASES)},
+                # A method that no path knows and one that some do, of nine.
+                "coverage": {
+                    "enabled": phase == "coverage",
+                    "unexpected-methods": ["QUERY", "DELETE"],
+                },
+            },
         }
     )
 

@@ -16,9 +16,9 @@ URL = "/cameras/corner/snapshot"
 JPEG, PNG = {"Content-Type": "image/jpeg"}, {"Content-Type": "image/png"}
 
 
-def image(width=1280, height=720, form="JPEG", **how):
+def image(width=1280, height=720, form="JPEG", mode="RGB", **how):
     made = BytesIO()
-    Image.new("RGB", (width, height), (90, 120, 80)).save(made, form, **how)
+    Image.new(mode, (width, height), "gray").save(made, form, **how)
     return made.getvalue()
 
 
@@ -72,7 +72,7 @@ def test_a_png_with_holes_becomes_a_jpeg_and_takes_the_place_of_the_one_before(a
         (image(), {"Content-Type": ""}, 415, "unsupported_media_type"),
         (image(720, 1280), JPEG, 422, "malformed"),
         (b"\xff" * (8 * 1024 * 1024 + 1), JPEG, 413, "too_large"),
-        (image(9000, 5700, form="PNG"), PNG, 413, "too_large"),
+        (image(9000, 5700, form="PNG", mode="1"), PNG, 413, "too_large"),
     ],
 )
 def test_what_is_no_picture_of_the_camera_is_refused(allowed, content, headers, status, code):

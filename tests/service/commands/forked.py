@@ -4,6 +4,8 @@ Importing is most of what a command takes that refuses to start, or that serves 
 `python -m service.cli` itself is run by the slow tests.
 """
 
+import contextlib
+import importlib
 import multiprocessing
 import os
 import subprocess
@@ -91,5 +93,9 @@ def _surefoot(words: Sequence[str], environment: dict[str, str], printed: Sequen
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND), number)
     os.environ.clear()
     os.environ.update(environment)
+    # As python itself does at its start.
+    sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
+    with contextlib.suppress(ImportError):
+        importlib.import_module("sitecustomize")
     sys.argv = ["surefoot", *words]
     main()

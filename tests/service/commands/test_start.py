@@ -149,7 +149,7 @@ def test_a_read_only_disk(small_disk, settings):
 
 
 @pytest.mark.slow
-def test_one_serve_a_data_directory_and_workers_beside_it(service):
+def test_one_serve_a_data_directory_and_workers_beside_it(service, tmp_path):
     wait_for(service.ready)
     line = start("serve", service.settings.data_dir)
     assert (
@@ -157,15 +157,11 @@ def test_one_serve_a_data_directory_and_workers_beside_it(service):
         in (line)
     )
     assert service.ready()
-    beside = subprocess.Popen(
-        [sys.executable, "-m", "service.cli", "worker", "--name", "beside"],
-        env=service.settings.as_environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert beside.stderr is not None
+    (log := tmp_path / "beside.log").touch()
+    words = ["worker", "--name", "beside"]
+    beside = forked.Forked(words, service.settings.as_environment(), log, log)
     try:
-        assert any("worker_started" in said for said in beside.stderr)
+        wait_for(lambda: "worker_started" in log.read_text())
     finally:
         beside.terminate()
         beside.wait(20)

@@ -10,9 +10,8 @@ import secrets
 import shutil
 import sqlite3
 import stat
-import subprocess
-import sys
 import tarfile
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -30,6 +29,7 @@ from service.store.engines.store import Store
 from service.store.webhooks import WebhookRecord
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
+from tests.service.commands import forked
 from tests.service.notifications.test_sealing import hook
 from tests.test_migrations import put
 
@@ -275,13 +275,9 @@ def test_the_commands_on_a_service_that_runs(service, tmp_path):
     assert service.http.post("/cameras/corner/tracks", json=batch).json()["accepted"] == 10
 
     def run(*words, code=0):
-        ended = subprocess.run(
-            [sys.executable, "-m", "service.cli", *words],
-            env={**service.settings.as_environment(), "COLUMNS": "300"},  # of its tables
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        environment = {**service.settings.as_environment(), "COLUMNS": "300"}  # of its tables
+        with tempfile.TemporaryDirectory() as folder:
+            ended = forked.run(words, environment, Path(folder), timeout_s=60)
         assert ended.returncode == code, ended.stderr + ended.stdout
         return ended.stdout + ended.stderr
 

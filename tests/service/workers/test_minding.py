@@ -32,9 +32,9 @@ def start(settings, monkeypatch):
     """Start a service with some settings changed."""
     running = []
 
-    def start_one(environment=None, **changes):
+    def start_one(environment=None, *, forked=True, **changes):
         changed = settings.model_copy(update={"port": free_port(), "trainings": "off", **changes})
-        service = RunningService(changed, forked=False)
+        service = RunningService(changed, forked=forked)
         running.append(service)
         with monkeypatch.context() as patch:
             for name, value in (environment or {}).items():
@@ -127,7 +127,7 @@ def test_a_clock_that_is_set_stops_nothing_and_doubles_nothing(start, tmp_path, 
     clock = Clock(tmp_path)
     if clock.environment is None:
         pytest.skip("no C compiler (cc) to make a clock with")
-    service = start(clock.environment, worker_lost_s=6)
+    service = start(clock.environment, forked=False, worker_lost_s=6)
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
     service.http.post("/cameras/corner/tracks", json={"tracks": people(10)}).raise_for_status()

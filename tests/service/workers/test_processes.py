@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 
@@ -15,6 +13,8 @@ import pytest
 from service.workers.processes import exits
 from tests.conftest import CAMERA, track
 from tests.running import pid_exists, wait_for
+from tests.service.commands import forked
+from tests.service.commands.forked import Forked
 
 pytestmark = pytest.mark.slow
 
@@ -78,7 +78,8 @@ def test_tracks_in_a_worker_killed_in_training_one_pose_out_and_a_clean_stop(ser
     assert not pid_exists(worker)
 
 
-def test_the_http_process_holds_no_torch_and_little_memory(service):
+def test_the_http_process_holds_no_torch_and_little_memory(service_by_itself):
+    service = service_by_itself
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
     for part in range(5):
@@ -167,16 +168,10 @@ def test_events_arrive_as_they_happen_and_resume(service):
     assert seen == live[1:]
 
 
-def test_two_workers_of_one_name_do_not_run_beside_each_other(service):
+def test_two_workers_of_one_name_do_not_run_beside_each_other(service, tmp_path):
     wait_for(service.ready)
-    second = subprocess.run(
-        [sys.executable, "-m", "service.cli", "worker", "--name", "local-0"],
-        env=service.settings.as_environment(),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    words = ["worker", "--name", "local-0"]
+    second = forked.run(words, service.settings.as_environment(), tmp_path, timeout_s=60)
     assert second.returncode == exits.REFUSED
     assert "running already" in second.stderr
 
@@ -185,22 +180,24 @@ def test_a_lost_workers_training_is_taken_over(service):
     """A worker that never comes back: another one takes its jobs."""
     service.start_again(workers=0)
     environment = service.settings.as_environment() | {"SUREFOOT_WORKER_LOST_S": "3"}
-    command = [sys.executable, "-m", "service.cli", "worker", "--name"]
-    with service.log.open("a") as log:
-        first = subprocess.Popen([*command, "one"], env=environment, stderr=log)
-        service.http.post("/cameras", json=CAMERA).raise_for_status()
-        wait_for(lambda: states(service) == ["running"])
-        second = subprocess.Popen([*command, "two"], env=environment, stderr=log)
-        try:
-            wait_for(lambda: 'worker_started worker="two' in service.log.read_text())
-            first.kill()
-            begun = service.log.read_text().count("training_started")
-            assert begun == 1
-            wait_for(lambda: service.log.read_text().count("training_started") == 2, timeout_s=120)
-            assert states(service) == ["running"]
-            second.terminate()
-            assert second.wait(20) == 0
-        finally:
-            for process in (first, second):
-                process.kill()
-                process.wait(10)
+
+    def worker(name):
+        return Forked(["worker", "--name", name], environment, service.log, service.log)
+
+    first = worker("one")
+    service.http.post("/cameras", json=CAMERA).raise_for_status()
+    wait_for(lambda: states(service) == ["running"])
+    second = worker("two")
+    try:
+        wait_for(lambda: 'worker_started worker="two' in service.log.read_text())
+        first.kill()
+        begun = service.log.read_text().count("training_started")
+        assert begun == 1
+        wait_for(lambda: service.log.read_text().count("training_started") == 2, timeout_s=120)
+        assert states(service) == ["running"]
+        second.terminate()
+        assert second.wait(20) == 0
+    finally:
+        for process in (first, second):
+            process.kill()
+            process.wait(10)

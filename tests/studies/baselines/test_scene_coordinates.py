@@ -106,6 +106,7 @@ def test_it_learns_a_toy_whose_pictures_show_their_places():
     assert mean_places_off(network, held_out) < 0.5 * mean_places_off(constant, held_out)
 
 
+@pytest.mark.slow
 def test_of_black_pictures_it_learns_the_mean_place_and_no_pose():
     rng = np.random.default_rng(8)
     data, held_out = patch_set(PLAN, 64, rng), patch_set(PLAN, 64, rng)

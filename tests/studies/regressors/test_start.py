@@ -14,7 +14,7 @@ from models.regression.recipe import DEFAULT, PAPER
 from studies.regressors.start_training import StartPlan, StartTraining
 from studies.regressors.start_weights import held_out_figures, making_of, store_start
 
-SMALL = StartPlan(seed=3, rounds=2, cameras=3, walks_each=30, batch=30)
+SMALL = StartPlan(seed=3, rounds=2, cameras=2, walks_each=10, batch=10)
 
 
 def weights(network: torch.nn.Module) -> torch.Tensor:

@@ -25,8 +25,9 @@ def test_a_creep_that_was_never_noticed_is_the_worst():
     assert "1.40, inf, inf (n 3)" in capture.get()
 
 
-@pytest.mark.parametrize(("code", "kept"), [(code_hash(), 1), ("0" * 12, 0)])
+@pytest.mark.parametrize(("code", "kept"), [(None, 1), ("0" * 12, 0)])
 def test_cases_by_the_same_plan_and_code_are_not_run_again(tmp_path, code, kept):
+    code = code or code_hash()
     output = tmp_path / "creep.json"
     plan = {name: getattr(PLAN, name) for name in PLAN.__slots__}
     case = {name: getattr(CASE, name) for name in CASE.__slots__}
