@@ -225,8 +225,9 @@ def suspected_moves(
 def _move_of(record: AlertRecord, settings: Settings) -> SuspectedMove | None:
     if record.resolved_at is None:
         return None
-    if record.changed_at is not None:
-        from_s = record.changed_at.timestamp() - _SAME_S
+    began = record.changed_after or record.changed_at
+    if began is not None:
+        from_s = began.timestamp() - _SAME_S
     else:  # it was fired by a window of tracks
         from_s = record.opened_at.timestamp() - settings.window_days * DAY_S
     return SuspectedMove(

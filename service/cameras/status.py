@@ -191,6 +191,8 @@ def _since(
     reference = newest.reference
     if alerts:
         return alert_since(alerts[0])
+    if state == PoseState.SUSPECTED and newest.estimate and newest.estimate.drift_since:
+        return newest.estimate.drift_since
     if state == PoseState.NO_DATA and newest.last_track_s is not None:
         return datetime.fromtimestamp(newest.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:

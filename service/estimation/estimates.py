@@ -253,7 +253,7 @@ def _since(
     if verdict.streak <= 0 and state != PoseState.SUSPECTED:
         return before if verdict.drifting else (None, None)
     if reference.changed_s is not None:
-        return _at(reference.changed_after_s), _at(reference.changed_s)
+        return _between(reference.changed_after_s, reference.changed_s)
     if before[1] is not None:
         return before
     # As was learned; or as somebody said, whose answer has the window begin.
@@ -262,13 +262,20 @@ def _since(
     if reading is not None and reading.moved:
         at = reading.track_idx
         ended_s = evidence.tracks[at - 1].ended_s if at else stood_s
-        return _at(ended_s), _at(evidence.tracks[at].started_s)
+        return _between(ended_s, evidence.tracks[at].started_s)
     if creep is not None and creep.moved:
         return None, _at(creep.since_day * DAY_S)
     # One pose since the reference, and never another one: it had moved before all of them.
     if last is None:
-        return _at(stood_s), _at(finding.tracks[0].ended_s)
-    return _at(last.to_s), _at(finding.tracks[-1].ended_s)
+        return _between(stood_s, finding.tracks[0].ended_s)
+    return _between(last.to_s, finding.tracks[-1].ended_s)
+
+
+def _between(stood_s: float | None, moved_s: float) -> tuple[datetime | None, datetime | None]:
+    """The times of a move between a person before it and one after it, who may overlap."""
+    if stood_s is None:
+        return None, _at(moved_s)
+    return _at(min(stood_s, moved_s)), _at(max(stood_s, moved_s))
 
 
 def _at(time_s: float | None) -> datetime | None:

@@ -161,7 +161,10 @@ def test_the_alert_says_when_the_camera_moved(bench):
     for _ in range(2):
         bench.see(moved(tilt_deg=5.0))
     (alert,) = bench.alerts(state="firing")
-    assert datetime.fromisoformat(alert["changed_at"]).timestamp() == pytest.approx(first)
+    # The person before walked on for some seconds beside the first one after it.
+    since = [datetime.fromisoformat(alert["since"][end]).timestamp() for end in ("after", "before")]
+    assert since == pytest.approx([first, first - 1 + 0.4 * 19])
+    assert alert["changed_at"] == alert["since"]["before"]
     body = bench.pose()
     assert datetime.fromisoformat(body["from"]).timestamp() >= first
 
