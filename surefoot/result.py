@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from statistics import NormalDist
+from dataclasses import dataclass, field
 
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import AlarmRate, alarm_chart_result, estimate_pose, observe
+from models.pose import AlarmRate, PosePosterior, alarm_chart_result, estimate_pose, observe
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
@@ -25,7 +24,7 @@ class Result:
 
     `moved` is what an alert would say, `probability` how likely it is by the pose alone.
     `estimated` names the numbers that the tracks determine; the others are the prior pose's.
-    `sd` and `drift` (pose less prior pose) are of those.
+    `sd` and `drift` (pose less prior pose) are of those. `posterior` is over what moved.
     """
 
     moved: bool
@@ -35,6 +34,7 @@ class Result:
     estimated: tuple[str, ...]
     sd: dict[str, float]
     drift: dict[str, float]
+    posterior: PosePosterior = field(repr=False)
 
     def intervals(self, level: float = 0.9) -> dict[str, tuple[float, float]]:
         """The interval of each estimated number that holds the truth with a probability.
@@ -44,12 +44,16 @@ class Result:
         """
         if not 0 < level < 1:
             raise ValueError(f"level: between 0 and 1, got {level}")
-        z = NormalDist().inv_cdf((1 + level) / 2)
-        values = {name: float(getattr(self.pose, name)) for name in self.estimated}
-        return {
-            name: (value - z * self.sd[name], value + z * self.sd[name])
-            for name, value in values.items()
-        }
+        known = [name for name in PARAMETERS if _field(name) in self.estimated]
+        return {_field(name): self._interval(name, level) for name in known}
+
+    def _interval(self, name: str, level: float) -> tuple[float, float]:
+        low, high = self.posterior.interval(name, level)
+        prior = self.posterior.prior
+        if name == "height":
+            return prior.height_m * math.exp(low), prior.height_m * math.exp(high)
+        at = math.degrees(getattr(prior, f"{name}_rad"))
+        return at + math.degrees(low), at + math.degrees(high)
 
 
 def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0) -> Result:
@@ -78,6 +82,7 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
         estimated=tuple(_field(name) for name in known),
         sd={_field(name): sd for name, (_, sd) in known.items()},
         drift={_field(name): by for name, (by, _) in known.items()},
+        posterior=found.posterior,
     )
 
 

@@ -69,6 +69,8 @@ NO_TURN_RAD = np.radians(0.02)
 MOVED_PRIOR = 0.2  # that a window is of a camera that has moved: lower, and small moves are missed
 MOVES_IN = (0.5, 0.4, 0.4, 0.5)  # of moves change tilt, roll, height, heading
 MOVE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.10, math.radians(6.0)])
+# How far a camera that stands may be from its prior pose: brackets sway, and poses are rounded.
+REST_SD = np.array([math.radians(0.1), math.radians(0.1), 0.003, math.radians(0.1)])
 FAR_SHARE, FAR_MOVE = 0.15, 5.0  # of moves are so many times as far
 # Degrees of freedom of Student's t: by few groups an estimate is farther off than its covariance.
 LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25

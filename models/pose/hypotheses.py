@@ -90,7 +90,7 @@ class PosePosterior:
     def interval(self, name: str, level: float) -> tuple[float, float]:
         """The central interval of a parameter's offset that holds it with a probability.
 
-        Of a mixture: where the camera surely stands it is a point, and nowhere two sd to each side.
+        Of a mixture: where the camera surely stands it is as narrow as that is known.
         """
         at = PARAMETERS.index(name)
         means, sds = self.means[:, at], np.sqrt(self.covariances[:, at, at])
@@ -133,7 +133,7 @@ def pose_posterior(
         log_weights[number] += _log_student(squared, marginal, degrees)
         means[number] = gain @ offset[seen]
         heavy = (degrees + squared) / (degrees + seen.sum())
-        covariances[number] = (move - gain @ move[seen]) * heavy
+        covariances[number] = (move - gain @ move[seen]) * heavy + np.diag(config.REST_SD**2)
     log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
     if fused.paths_changed:
         away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]

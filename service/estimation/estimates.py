@@ -59,14 +59,12 @@ class History:
 class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
-    `after` is when it last stood where it should, as far as is known. `moved` is the probability
-    that it has moved. `clock` is why its clock or frame rate looks wrong; `charted` says that the
-    chart or the creep is beyond its level.
+    `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
+    frame rate looks wrong; `charted` says that the chart or the creep is beyond its level.
     """
 
     state: PoseState
     reasons: Reasons
-    moved: float
     verdict: DriftVerdict = _UNJUDGED
     after: datetime | None = None
     since: datetime | None = None
@@ -89,12 +87,10 @@ def save_estimate(
     drift = drift_of(finding.posterior, finding.fused)
     if evidence.site is None:
         learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
-        judgement = Judgement(
-            state=PoseState.LEARNING, reasons=learning, moved=settings.moved_prior
-        )
+        judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
         record = _record(reference, evidence, finding, drift, judgement)
         record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
-        record.moved_parameters = {}
+        record.moved, record.moved_parameters = settings.moved_prior, {}
     else:
         if finding.change is not None:
             reference.window_from_s = finding.change.ended_s
@@ -182,15 +178,11 @@ def _judge(
     if charted is not None and clock is None and charted.parameter == CLOCK:
         clock = reason_of_chart(charted)
     alarmed = charted is not None or (creep is not None and creep.moved)
-    moved = drift.move.moved
-    if alarmed:
-        moved = max(moved, _moved_by_alarm(evidence))
-    state = _state(reference, history, verdict, evidence, finding, moved)
+    state = _state(reference, history, verdict, evidence, finding)
     after, since = _since(reference, history, verdict, evidence, finding, state)
     return Judgement(
         state=state,
         reasons=reasons,
-        moved=moved,
         verdict=verdict,
         after=after,
         since=since,
@@ -205,7 +197,6 @@ def _state(
     verdict: DriftVerdict,
     evidence: Evidence,
     finding: Finding,
-    moved: float,
 ) -> PoseState:
     """The state of a camera; that it stands is said where a turn would have been noticed.
 
@@ -218,19 +209,12 @@ def _state(
     fits = finding.enough and (finding.fused.registered or not mapped)
     if finding.enough and finding.fused.paths_changed or (history.unsure and not fits):
         return PoseState.UNSURE
-    if moved >= LIKELY and finding.enough:
+    if finding.posterior.moved >= LIKELY and finding.enough:
         return PoseState.SUSPECTED
     if not finding.enough and reference.answer == Answer.FALSE_ALARM:
         return PoseState.OK
     noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
     return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
-
-
-def _moved_by_alarm(evidence: Evidence) -> float:
-    """The probability that a camera moved whose chart alarms, by how seldom a still one's does."""
-    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
-    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
-    return evidence.moved_prior / (evidence.moved_prior + (1 - evidence.moved_prior) * false)
 
 
 def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:
@@ -345,7 +329,7 @@ def _record(
         suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=judgement.verdict.streak,
         drifted=list(judgement.verdict.drifted),
-        moved=judgement.moved,
+        moved=drift.move.moved,
         moved_parameters=dict(drift.move.parameters),
         drift_after=judgement.after,
         drift_since=judgement.since,

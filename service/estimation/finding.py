@@ -9,8 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.errors import CheckpointError
 from models.pose import (
+    CLOCK,
     CREEP_SHARE,
     AlarmRate,
     CameraSite,
@@ -50,6 +52,8 @@ from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord
 
 log = logging.getLogger("surefoot.recalibration")
+
+_LEAST_FALSE = 1e-4  # of windows alarm though the camera stands, whatever their length
 
 _Made = TypeVar("_Made")
 
@@ -159,7 +163,10 @@ def compute_finding(
         joint=found.joint,
         fused=found.fused,
         posterior=pose_posterior(
-            found.fused, found.joint.walking_groups, evidence.prior, evidence.moved_prior
+            found.fused,
+            found.joint.walking_groups,
+            evidence.prior,
+            _moved_prior(evidence, found.fused, reading, creep),
         ),
         enough=asked_enough(evidence),
         averaged=averaged,
@@ -171,6 +178,24 @@ def compute_finding(
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
     )
+
+
+def _moved_prior(
+    evidence: Evidence, fused: FusedEstimate, reading: ChartResult | None, creep: Creep | None
+) -> float:
+    """The probability that the camera moved, before the pose says more.
+
+    Where the chart or the creep alarms, by how seldom that of a still camera does in so long a
+    window. Of people on none of the paths, and of times, the chart says nothing about the pose.
+    """
+    charted = reading is not None and reading.moved and reading.parameter != CLOCK
+    crept = creep is not None and creep.moved
+    prior = evidence.moved_prior
+    if not crept and (not charted or fused.paths_changed):
+        return prior
+    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
+    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
+    return prior / (prior + (1 - prior) * max(false, _LEAST_FALSE))
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:

@@ -12,8 +12,6 @@ from models.pose import CameraSite, PoseFinding
 from studies.protocol.cases import ProtocolCase, angle_deg
 from studies.served.windows import Window, looks
 
-_ROUNDING = 1e-6  # radians, or the log of the height
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterOutcome:
@@ -110,10 +108,10 @@ def parameters_beside(
 
 
 def _covers(interval: tuple[float, float], offset: float, name: str) -> bool:
-    """True where an interval holds an offset; one that is a point is as wide as its rounding."""
+    """True where an interval holds an offset."""
     low, high = interval
     true = offset if name == "height" else math.remainder(offset, 2 * math.pi)
-    return bool(low - _ROUNDING <= true <= high + _ROUNDING)
+    return bool(low <= true <= high)
 
 
 def _apart(name: str, one: float, other: float) -> float:

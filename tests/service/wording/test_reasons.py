@@ -67,6 +67,8 @@ SAID = [
     (T.SCALE_CHANGED, {"factor": 0.8, "rate_hz": 25.0},
      "the scale has changed by -20 % and the angles have not: as if 20 frames a second were taken "
      "for 25, or the camera was lowered"),
+    (T.WAYS_CHANGED, {},
+     "people walk the same ground other ways than they did: where they do tells no pose"),
     (T.PATHS_CHANGED, {},
      "people walk on none of the paths that were learned: the camera was turned far, or they walk "
      "elsewhere"),
