@@ -34,7 +34,7 @@ class Result:
     estimated: tuple[str, ...]
     sd: dict[str, float]
     drift: dict[str, float]
-    posterior: PosePosterior = field(repr=False)
+    posterior: PosePosterior = field(repr=False, compare=False)
 
     def intervals(self, level: float = 0.9) -> dict[str, tuple[float, float]]:
         """The interval of each estimated number that holds the truth with a probability.

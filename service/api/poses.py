@@ -100,7 +100,7 @@ class ServedPoseOut(BaseModel):
     sd: SdOut | None
     drift: DriftOut | None
     moved: float | None
-    moved_parameters: dict[str, float]
+    moved_parameters: dict[str, float | None]
     since: SinceOut
     estimates: dict[str, Any]
     reference: ReferenceOut
@@ -178,10 +178,10 @@ class History(BaseModel):
     items: list[HistoryPoint]
 
 
-def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float]:
-    """The probability that each number of a pose changed."""
+def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None]:
+    """The probability that each number of a pose changed; None where nothing is known."""
     shares = {} if estimate is None else estimate.moved_parameters
-    return {field: shares[name] for name, field in _FIELDS.items() if name in shares}
+    return {field: shares.get(name) for name, field in _FIELDS.items()}
 
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])

@@ -20,6 +20,8 @@ from tests.service.operations.test_metrics import scrape, value
 
 MAYBE = moved(tilt_deg=0.9)  # likelier than not that it is beyond what a still camera shows
 
+UNKNOWN = dict.fromkeys(("height_m", "tilt_deg", "roll_deg", "heading_deg"))
+
 
 def add_flow_map(bench):
     with bench.store.write() as session:
@@ -193,11 +195,11 @@ def test_since_names_the_last_person_before_a_move_and_the_first_after_it(bench)
 def test_the_pose_says_how_likely_what_has_moved(bench):
     bench.http.post("/cameras/corner/reference/reset").raise_for_status()
     body = bench.pose()
-    assert (body["moved"], body["moved_parameters"]) == (None, {})
+    assert (body["moved"], body["moved_parameters"]) == (None, UNKNOWN)
     assert body["since"] == {"after": None, "before": None}
     bench.see(PRIOR)
     body = bench.pose()
-    assert (body["state"], body["moved"], body["moved_parameters"]) == ("learning", 0.2, {})
+    assert (body["state"], body["moved"], body["moved_parameters"]) == ("learning", 0.2, UNKNOWN)
     bench.learn()
     bench.see(PRIOR, paths=True)
     body = bench.pose()

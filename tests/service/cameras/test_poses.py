@@ -19,7 +19,10 @@ def test_before_there_is_an_estimate_the_prior_pose_is_served(corner):
     assert body["estimated"] == []
     assert body["pose"]["tilt_deg"] == pytest.approx(22)
     assert (body["sd"], body["drift"], body["from"], body["to"]) == (None, None, None, None)
-    assert (body["moved"], body["moved_parameters"]) == (None, {})
+    assert body["moved"] is None
+    assert body["moved_parameters"] == dict.fromkeys(
+        ("height_m", "tilt_deg", "roll_deg", "heading_deg")
+    )
     assert body["since"] == {"after": None, "before": None}
     assert body["reason"] == "0 of 200 reference tracks"
     assert body["reference"] == {
@@ -38,8 +41,8 @@ def test_the_pose_is_the_estimate_and_heading_is_carried_over(bench):
     assert body["pose"]["heading_deg"] == pytest.approx(40)
     assert body["drift"]["tilt_deg"] == pytest.approx(1.9, abs=0.01)
     assert body["drift"]["angle_deg"] == pytest.approx(math.hypot(1.9, 1.5), rel=0.02)
-    assert body["sd"]["tilt_deg"] == pytest.approx(0.02, rel=0.2)
-    assert body["sd"]["height_m"] == pytest.approx(0.001 * 6.2, rel=0.2)
+    assert body["sd"]["tilt_deg"] == pytest.approx(math.hypot(0.02, 0.1), rel=0.05)
+    assert body["sd"]["height_m"] == pytest.approx(math.hypot(0.001, 0.003) * 6.2, rel=0.05)
     raw = body["estimates"]["joint"]  # before the reference's offset is taken off
     assert raw["tilt_deg"] == pytest.approx(23.9 + math.degrees(0.01))
     assert raw["tracks"] == body["tracks"] == 20
@@ -56,8 +59,8 @@ def test_a_told_heading_is_in_the_pose_and_all_that_is_said_of_it(bench):
     assert body["pose"]["heading_deg"] == pytest.approx(37.1, abs=0.01)
     assert body["drift"]["heading_deg"] == pytest.approx(-2.9, abs=0.01)
     assert body["drift"]["angle_deg"] == pytest.approx(math.hypot(2.5, 2.9), rel=0.1)
-    assert body["sd"]["heading_deg"] == pytest.approx(0.02, rel=0.2)
-    assert "heading -2.90 deg (sd 0.02)" in body["reason"]
+    assert body["sd"]["heading_deg"] == pytest.approx(math.hypot(0.02, 0.1), rel=0.05)
+    assert "heading -2.90 deg (sd 0.10)" in body["reason"]
     assert body["estimates"]["registered"] == {
         "height_m": pytest.approx(6.0 * math.exp(0.01)),
         "tilt_deg": pytest.approx(24.5 + math.degrees(0.01)),
@@ -127,7 +130,7 @@ def test_a_number_that_is_not_told_is_nowhere_taken_for_known(bench):
     assert body["pose"]["height_m"] == pytest.approx(6.0)
     assert body["pose"]["roll_deg"] == pytest.approx(2.3, abs=0.01)
     sd = body["sd"]
-    assert sd.pop("roll_deg") == pytest.approx(0.05, rel=0.2)
+    assert sd.pop("roll_deg") == pytest.approx(math.hypot(0.05, 0.1), rel=0.05)
     assert set(sd.values()) == {None}
     assert body["drift"]["tilt_deg"] is None
     assert body["drift"]["angle_deg"] == pytest.approx(1.3, abs=0.01)
