@@ -43,7 +43,7 @@ def test_a_new_camera_says_how_much_is_missing(corner):
 def test_a_still_camera_says_so_and_by_whom(bench):
     bench.see(PRIOR, paths=True)
     assert headline(bench.http) == (
-        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.1°."
+        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.2°."
     )
 
 
