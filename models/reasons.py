@@ -20,7 +20,7 @@ class TracksCode(StrEnum):
     """Codes of reasons that tracks give. They are kept by clients and in stores: they stay."""
 
     BEYOND_LIMITS = "beyond_limits"
-    BEYOND_LIMITS_UNCONFIRMED = "beyond_limits_unconfirmed"
+    SUSPECTED = "suspected"
     BEYOND_LIMITS_BEFORE = "beyond_limits_before"
     BEYOND_LIMITS_LAST_IDENTIFIABLE = "beyond_limits_last_told"
     WITHIN_LIMITS = "within_limits"
@@ -28,6 +28,7 @@ class TracksCode(StrEnum):
     CREPT = "crept"
     SCALE_CHANGED = "scale_changed"
     PATHS_CHANGED = "paths_changed"
+    WAYS_CHANGED = "ways_changed"
     HEADING_AMBIGUOUS = "heading_ambiguous"
     HEADING_UNIDENTIFIABLE = "heading_untold"
     UNIDENTIFIABLE = "numbers_untold"

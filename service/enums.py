@@ -12,6 +12,8 @@ class PoseState(StrEnum):
 
     LEARNING = "learning"
     OK = "ok"
+    UNSURE = "unsure"
+    SUSPECTED = "suspected"
     DRIFTING = "drifting"
     NO_DATA = "no_data"
 
@@ -49,6 +51,7 @@ class AlertKind(StrEnum):
     DRIFT = "drift"
     NO_DATA = "no_data"
     CLOCK = "clock"
+    UNSURE = "unsure"
     STALE = "stale"
     TRACKER = "tracker"
 

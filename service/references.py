@@ -144,7 +144,8 @@ def keep_answer(session: Session, camera_id: str, answer: Answer, by: str | None
         begin_reference(session, camera_id, Origin.PUT_BACK, from_s=newest_s, by=by)
     elif reference.ready_at is not None:
         if newest_s is not None:
-            reference.window_from_s, reference.changed_s = math.nextafter(newest_s, math.inf), None
+            reference.window_from_s = math.nextafter(newest_s, math.inf)
+            reference.changed_after_s = reference.changed_s = None
         reference.answer, reference.answered_by = answer, by
         reference.answered_at = datetime.now(UTC)
     forget_streak(session, camera_id)
@@ -154,7 +155,8 @@ def forget_streak(session: Session, camera_id: str) -> None:
     """Have a drift earn its updates anew: those so far were of before somebody was there."""
     last = estimates.newest(session, camera_id)
     if last is not None:
-        last.drift_streak, last.drifted, last.drift_since = 0, [], None
+        last.drift_streak, last.drifted = 0, []
+        last.drift_after = last.drift_since = None
 
 
 def is_before(to_s: float, bounds: WindowBounds) -> bool:
@@ -186,7 +188,7 @@ def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: i
 def drift_limits(settings: Settings) -> DriftLimits:
     """The limits from which on a drift counts, by the settings."""
     return DriftLimits(
-        sigmas=settings.drift_sigmas,
+        certainty=settings.drift_certainty,
         floor_rad=math.radians(settings.drift_floor_deg),
         floor_m=settings.drift_floor_m,
         people=settings.drift_people,
@@ -223,8 +225,9 @@ def suspected_moves(
 def _move_of(record: AlertRecord, settings: Settings) -> SuspectedMove | None:
     if record.resolved_at is None:
         return None
-    if record.changed_at is not None:
-        from_s = record.changed_at.timestamp() - _SAME_S
+    began = record.changed_after or record.changed_at
+    if began is not None:
+        from_s = began.timestamp() - _SAME_S
     else:  # it was fired by a window of tracks
         from_s = record.opened_at.timestamp() - settings.window_days * DAY_S
     return SuspectedMove(

@@ -110,13 +110,16 @@ class Settings(BaseSettings):
         6.0, gt=0, description="hours of silence after which another source takes over"
     )
 
-    drift_sigmas: float = Field(
-        5.0, gt=0, description="an identifiable drift must exceed so many sd"
+    moved_prior: float = Field(
+        0.2, gt=0, lt=1, description="how likely a camera has moved, before any track of a window"
     )
-    drift_floor_deg: float = Field(1.0, ge=0, description="and this angle")
+    drift_certainty: float = Field(
+        0.99, ge=0.5, lt=1, description="how likely a camera must have moved, for an alert"
+    )
+    drift_floor_deg: float = Field(1.0, ge=0, description="and by more than this angle")
     drift_floor_m: float = Field(0.3, ge=0, description="or this height")
     drift_people: int = Field(
-        12, ge=1, description="and so without so many of the newest people: none alarms alone"
+        12, ge=1, description="people who must come after an answer, for a pose to be judged"
     )
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 

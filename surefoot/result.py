@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from statistics import NormalDist
+from dataclasses import dataclass, field
 
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import AlarmRate, SecondLook, alarm_chart_result, drift_of, estimate_pose, observe
+from models.pose import AlarmRate, PosePosterior, alarm_chart_result, estimate_pose, observe
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
@@ -23,16 +22,19 @@ _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 class Result:
     """The pose of tracks beside the prior pose.
 
+    `moved` is what an alert would say, `probability` how likely it is by the pose alone.
     `estimated` names the numbers that the tracks determine; the others are the prior pose's.
-    `sd` and `drift` (pose less prior pose) are of those.
+    `sd` and `drift` (pose less prior pose) are of those. `posterior` is over what moved.
     """
 
     moved: bool
+    probability: float
     why: str
     pose: Pose
     estimated: tuple[str, ...]
     sd: dict[str, float]
     drift: dict[str, float]
+    posterior: PosePosterior = field(repr=False, compare=False)
 
     def intervals(self, level: float = 0.9) -> dict[str, tuple[float, float]]:
         """The interval of each estimated number that holds the truth with a probability.
@@ -42,12 +44,16 @@ class Result:
         """
         if not 0 < level < 1:
             raise ValueError(f"level: between 0 and 1, got {level}")
-        z = NormalDist().inv_cdf((1 + level) / 2)
-        values = {name: float(getattr(self.pose, name)) for name in self.estimated}
-        return {
-            name: (value - z * self.sd[name], value + z * self.sd[name])
-            for name, value in values.items()
-        }
+        known = [name for name in PARAMETERS if _field(name) in self.estimated]
+        return {_field(name): self._interval(name, level) for name in known}
+
+    def _interval(self, name: str, level: float) -> tuple[float, float]:
+        low, high = self.posterior.interval(name, level)
+        prior = self.posterior.prior
+        if name == "height":
+            return prior.height_m * math.exp(low), prior.height_m * math.exp(high)
+        at = math.degrees(getattr(prior, f"{name}_rad"))
+        return at + math.degrees(low), at + math.degrees(high)
 
 
 def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0) -> Result:
@@ -64,18 +70,19 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     """
     model, ordered = site.model, in_order(tracks)
     observed = observe(ordered, model.intrinsics, model.prior)
-    found = estimate_pose(observed, model, SecondLook(limits=_LIMITS, drifting=False))
+    found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
-    earlier = None if found.earlier is None else drift_of(found.earlier, model.prior)
-    verdict = judge(found.drift, _LIMITS, (), chart, earlier)
+    verdict = judge(found.drift, _LIMITS, (), chart)
     known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
     return Result(
         moved=verdict.drifting,
+        probability=found.drift.move.moved,
         why=_why(found.drift, chart),
         pose=Pose.of(found.pose),
         estimated=tuple(_field(name) for name in known),
         sd={_field(name): sd for name, (_, sd) in known.items()},
         drift={_field(name): by for name, (by, _) in known.items()},
+        posterior=found.posterior,
     )
 
 
@@ -95,6 +102,8 @@ def _why(drift: Drift, chart: ChartResult | None) -> str:
     known = {name: _in_unit(name, drift) for name in drift.identifiable}
     parts = [f"{n} {by:+.2f} {_UNITS[n]} (sd {sd:.2f})" for n, (by, sd) in known.items()]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"
+    share = min(max(drift.move.moved, 0.001), 0.999)  # nothing is ever quite sure
+    words = f"moved with a probability of {share:.1%}: {words}"
     if chart is not None and chart.suspicious:
         number = "times" if chart.parameter == CLOCK else PARAMETERS[chart.parameter]
         words += (

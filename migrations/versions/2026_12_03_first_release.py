@@ -23,7 +23,7 @@ TABLES = sa.MetaData(
 )
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
-ALERT_KINDS = "drift no_data clock stale tracker"
+ALERT_KINDS = "drift no_data clock unsure stale tracker"
 OUTCOMES = "put_back accepted false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.removed pose.accepted pose.put_back pose.false_alarm "
@@ -155,7 +155,7 @@ table(
     *optional(LargeBinary, "data"),
     *optional(Double, "walking_speed_mps"),
     *needed(JSON, "doubts"),
-    *optional(Double, "window_from_s", "changed_s"),
+    *optional(Double, "window_from_s", "changed_after_s", "changed_s"),
     *optional(String, "answer", "answered_by"),
     *optional(DateTime, "answered_at"),
     *needed(DateTime, "created_at"),
@@ -247,17 +247,18 @@ table(
     *needed(Double, "height_sd_m", "tilt_sd_rad", "roll_sd_rad"),
     *optional(Double, "heading_sd_rad"),
     *needed(Double, "drift_height_m", "drift_tilt_rad", "drift_roll_rad"),
-    *needed(Double, "drift_heading_rad", "drift_angle_rad"),
+    *needed(Double, "drift_heading_rad", "drift_angle_rad", "moved"),
+    *needed(JSON, "moved_parameters"),
     *needed(Boolean, "suspected"),
     *needed(NUMBER, "drift_streak"),
     *needed(JSON, "drifted"),
-    *optional(DateTime, "drift_since"),
+    *optional(DateTime, "drift_after", "drift_since"),
     *needed(JSON, "raw"),
     *needed(NUMBER, "tracks"),
     *needed(Double, "from_s", "to_s"),
     *needed(NUMBER, "newest_track_pk"),
     *needed(DateTime, "created_at"),
-    one_of("state", "learning ok drifting"),
+    one_of("state", "learning ok unsure suspected drifting"),
     Index(None, "camera_id", "id"),
 )
 table(
@@ -272,7 +273,7 @@ table(
     *needed(String, "severity"),
     *needed(JSON, "reasons", "drift"),
     *needed(DateTime, "opened_at"),
-    *optional(DateTime, "changed_at"),
+    *optional(DateTime, "changed_after", "changed_at"),
     *needed(DateTime, "updated_at"),
     *optional(String, "acknowledged_by"),
     *optional(DateTime, "acknowledged_at", "silenced_until"),

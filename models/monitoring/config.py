@@ -44,8 +44,8 @@ BLOCK = 24
 LEAST_BLOCKS = 12  # of a reference: short ones have shorter blocks
 
 # A clock that is wrong: the scale of a pose has jumped, its angles have not
-CLOCK_SIGMAS, CLOCK_LEAST_LOG = 4.0, math.log(1.08)  # that the height has changed by, at least
-STILL_SIGMAS, STILL_RAD = 2.0, math.radians(1.0)  # that angles have changed by, at the most
+CLOCK_LEAST_LOG = math.log(1.08)  # that the height has changed by, at least
+CLOCK_TURNED = 0.25  # at the most, how likely an angle changed, too
 USUAL_RATE_HZ = 25.0  # frames, where nobody says: for the words alone
 GROUPS_FOR_POSE = 24  # walking groups; after fewer, an alarm about a scale waits for the pose
 

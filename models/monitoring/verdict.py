@@ -1,7 +1,7 @@
-"""The verdict, by the chart at once, by the pose twice, with hysteresis; and its reasons."""
+"""The verdict, by the chart at once and by what surely moved, with hysteresis; and its reasons."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -13,51 +13,66 @@ from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.creep import Creep
 from models.reasons import Reason, TracksCode, Value
 
+LIKELY = 0.5  # likelier than not
 # What a clock that is wrong looks like in a pose is a height.
 _CHARTED = (*PARAMETERS, "height")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MoveProbabilities:
+    """How likely a camera has moved, and changed each of its parameters by that."""
+
+    moved: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """Estimate minus prior pose: `by` how much, and the standard deviations of the estimate.
+    """Pose minus prior pose: `by` how much, and its standard deviations.
 
     `identifiable` names the parameters that the tracks determine; the others stand here but count
-    nowhere. `angle_rad` is the whole rotation that the identifiable angles make.
+    nowhere. `angle_rad` is the whole rotation that the identifiable angles make. `move` is how
+    likely one is.
     """
 
     by: PoseParameters
     sd: PoseParameters
     angle_rad: float
     identifiable: tuple[str, ...]
+    move: MoveProbabilities
 
     def of(self, name: str) -> tuple[float, float]:
         """A parameter's drift and its standard deviation: in metres for height, else in radians."""
         return self.by.of(name), self.sd.of(name)
 
+    def ratio(self, name: str, limits: "DriftLimits") -> float:
+        """A parameter's drift in units of its floor."""
+        return abs(self.by.of(name)) / max(limits.floor(name), 1e-12)
+
     @property
-    def turned(self) -> bool:
+    def has_angle(self) -> bool:
         """True where an angle is identifiable."""
         return bool(set(ANGLES) & set(self.identifiable))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriftLimits:
-    """Limits of a drift: so many standard deviations, and a floor.
+    """Limits of a drift: how certain a move has to be, and floors of its size.
 
-    And so without the newest `people`, too; it ends below `clear_ratio` of that, likewise. The
-    defaults are those of the service's settings.
+    A drift ends below `clear_ratio` of the floor. Once a person has said how the camera stands, so
+    many `people` have to come before anything else is said. The defaults are those of the service's
+    settings.
     """
 
-    sigmas: float = 5.0
+    certainty: float = 0.99
     floor_rad: float = math.radians(1.0)
     floor_m: float = 0.3
     people: int = 12
     clear_ratio: float = 0.7
 
-    def of(self, name: str, sd: float) -> float:
-        """Limit of a parameter's drift, given its standard deviation."""
-        floor = self.floor_m if name == "height" else self.floor_rad
-        return max(self.sigmas * sd, floor, 1e-12)
+    def floor(self, name: str) -> float:
+        """The least drift of a parameter that counts: metres, or radians."""
+        return self.floor_m if name == "height" else self.floor_rad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,15 +95,20 @@ class DriftVerdict:
 
 
 def drift_between(
-    found: PoseParameters, sd: PoseParameters, identifiable: Sequence[str], prior: CameraPose
+    found: PoseParameters,
+    sd: PoseParameters,
+    identifiable: Sequence[str],
+    prior: CameraPose,
+    move: MoveProbabilities,
 ) -> Drift:
-    """Drift: estimate less prior pose; x and y count as unmoved.
+    """Drift: pose less prior pose; x and y count as unmoved.
 
     Args:
         found: what is estimated.
         sd: its standard deviations.
         identifiable: those of tilt, roll, height, heading that the tracks determine.
         prior: the prior pose.
+        move: how likely one is.
     """
     drift = Drift(
         by=PoseParameters(
@@ -100,6 +120,7 @@ def drift_between(
         sd=sd,
         angle_rad=0.0,
         identifiable=tuple(name for name in PARAMETERS if name in identifiable),
+        move=move,
     )
     turned = pose_after(drift, prior)
     return replace(
@@ -122,29 +143,23 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
     )
 
 
-def asks_again(drift: Drift, limits: DriftLimits, *, drifting: bool) -> bool:
-    """True where a verdict on a drift needs the estimate without the window's newest people."""
-    excess = max(_ratios(drift, limits).values(), default=0.0)
-    return excess < limits.clear_ratio if drifting else excess >= 1
-
-
 def judge(
     drift: Drift,
     limits: DriftLimits,
     drifted: tuple[str, ...],
     chart: ChartResult | None = None,
-    earlier: Drift | None = None,
     creep: Creep | None = None,
+    *,
+    enough: bool = True,
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
-    Drifting begins at once where the chart or the creep is beyond its level, and where an
-    identifiable parameter is beyond its limit, by the window and by the same without its newest
-    `people`: one outlier does not do it, and it matters not how many jobs have looked meanwhile.
-    The chart's level is of a rate of false alarms already, and far moves, which the chart is not
-    made for, are seen in the pose. It ends where both, the chart and the creep are below
-    `clear_ratio`. A parameter that is not identifiable is never beyond, and its drift does not end
-    until it is identifiable again or the chart, which asks for all four, is calm. Where nothing is
+    Drifting begins at once where the chart or the creep is beyond its level, and where it is
+    certain that the camera moved, and by more than the floor. The chart's level is of a rate of
+    false alarms already, and far moves, which the chart is not made for, are seen in the pose. It
+    ends where a move is unlikely, or all are below `clear_ratio`, and the chart and the creep are
+    calm. A parameter that is not identifiable is never beyond, and its drift does not end until it
+    is identifiable again or the chart, which asks for all four, is calm. Where nothing is
     identifiable, nothing changes.
 
     Args:
@@ -152,60 +167,50 @@ def judge(
         limits: what counts.
         drifted: the parameters that have drifted, by the verdicts before; empty where none has.
         chart: its result, where there is one.
-        earlier: of the window without its newest people; None where too few are left, or nobody
-            has asked (`asks_again`).
         creep: of the weeks up to now, where there is an anchor.
+        enough: whether enough people came since somebody said how the camera stands: of fewer, the
+            pose neither begins nor ends a drift.
     """
-    ratios = _ratios(drift, limits)
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
-    if not ratios and chart is None and not crept:
+    if not drift.identifiable and chart is None and not crept:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
-    excess = max(ratios.values(), default=0.0)
-    beyond = _beyond(drift, limits)
+    beyond = _beyond(drift, limits) if enough else {}
     charted = (_CHARTED[chart.parameter],) if chart is not None and chart.moved else crept
     calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
-    well = calm and _is_well(drift, limits, drifted, chart)
+    known = set(drift.identifiable) if chart is None else set(PARAMETERS)
+    well = enough and calm and set(drifted) <= known and _is_well(drift, limits)
     streak = 1 if beyond or charted else -1 if well else 0
-    if drifted:
-        drifted = tuple(n for n in PARAMETERS if n in drifted or n in beyond)
-        if streak < 0 and earlier is not None and _is_well(earlier, limits, drifted, chart):
-            drifted = ()
-    elif charted or (earlier is not None and beyond.items() & _beyond(earlier, limits).items()):
+    if not drifted:
         drifted = tuple(beyond) or charted
-    return DriftVerdict(streak=streak, excess=excess, drifted=drifted)
+    elif streak < 0:
+        drifted = ()
+    else:
+        drifted = tuple(name for name in PARAMETERS if name in drifted or name in beyond)
+    return DriftVerdict(streak=streak, excess=max(beyond.values(), default=0.0), drifted=drifted)
 
 
-def _ratios(drift: Drift, limits: DriftLimits) -> dict[str, float]:
-    """The identifiable parameters in units of their limits."""
-    found = {name: drift.of(name) for name in drift.identifiable}
-    return {name: abs(value) / limits.of(name, sd) for name, (value, sd) in found.items()}
+def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
+    """The parameters that certainly moved beyond their floors, in units of these."""
+    if drift.move.moved < limits.certainty:
+        return {}
+    ratios = {name: drift.ratio(name, limits) for name in drift.identifiable}
+    return {
+        n: ratio for n, ratio in ratios.items() if ratio >= 1 and drift.move.parameters[n] >= LIKELY
+    }
 
 
-def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, bool]:
-    """The identifiable parameters beyond their limits, and whether they have grown."""
-    found = _ratios(drift, limits).items()
-    return {name: drift.by.of(name) > 0 for name, ratio in found if ratio >= 1}
-
-
-def _is_well(
-    drift: Drift, limits: DriftLimits, drifted: tuple[str, ...], chart: ChartResult | None
-) -> bool:
-    identifiable = set(drift.identifiable) if chart is None else set(PARAMETERS)
-    excess = max(_ratios(drift, limits).values(), default=0.0)
-    return excess < limits.clear_ratio and set(drifted) <= identifiable
-
-
-_HEIGHT = 2
+def _is_well(drift: Drift, limits: DriftLimits) -> bool:
+    ratios = [drift.ratio(name, limits) for name in drift.identifiable]
+    return drift.move.moved < LIKELY or max(ratios, default=0.0) < limits.clear_ratio
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:
     """The identifiable parameters against the prior pose and the limits; None where none is."""
     values: dict[str, Value] = {
-        "sigmas": limits.sigmas,
+        "moved": drift.move.moved,
+        "certainty": limits.certainty,
         "floor_rad": limits.floor_rad,
         "floor_m": limits.floor_m,
-        "people": limits.people,
-        "clear_ratio": limits.clear_ratio,
     }
     if not drift.identifiable:
         code = TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE
@@ -213,11 +218,11 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
     for name in drift.identifiable:
         unit = "m" if name == "height" else "rad"
         values[f"{name}_{unit}"], values[f"{name}_sd_{unit}"] = drift.of(name)
-    beyond = verdict.excess >= 1
     if verdict.drifting:
+        beyond = verdict.excess >= 1
         code = TracksCode.BEYOND_LIMITS if beyond else TracksCode.BEYOND_LIMITS_BEFORE
     else:
-        code = TracksCode.BEYOND_LIMITS_UNCONFIRMED if beyond else TracksCode.WITHIN_LIMITS
+        code = TracksCode.SUSPECTED if drift.move.moved >= LIKELY else TracksCode.WITHIN_LIMITS
     return Reason(code=code, values=values)
 
 
@@ -263,29 +268,34 @@ def may_be_clock(chart: ChartResult) -> bool:
 
     An alarm about a scale that waits for a few more people can be called what it is.
     """
-    return chart.parameter in (_HEIGHT, CLOCK) and chart.walking_groups < config.GROUPS_FOR_POSE
+    return (
+        chart.parameter in (PARAMETERS.index("height"), CLOCK)
+        and chart.walking_groups < config.GROUPS_FOR_POSE
+    )
 
 
-def clock_fault(drift: Drift, prior: CameraPose, frame_rate_hz: float | None) -> Reason | None:
+def clock_fault(
+    drift: Drift, turned: float, prior: CameraPose, frame_rate_hz: float | None
+) -> Reason | None:
     """Reason of a change of scale with unchanged angles; None where there is none.
 
     Times that are too long by a factor make people slow, and only a higher camera makes them walk
     as before: the height grows by that factor and nothing else does. A camera that was raised
-    without turning looks the same.
+    without turning looks the same; one that may have turned has a clock that is right.
 
     Args:
-        drift: the estimate against the prior pose.
+        drift: the pose against the prior pose.
+        turned: the probability that an angle changed, given that the camera moved.
         prior: that pose.
         frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
     """
     if not set(PLANE_PARAMETERS) <= set(drift.identifiable):
         return None
     factor = 1 + drift.by.height_m / prior.height_m
-    relative_sd = drift.sd.height_m / (factor * prior.height_m)
-    if abs(math.log(factor)) <= max(config.CLOCK_SIGMAS * relative_sd, config.CLOCK_LEAST_LOG):
+    changed = drift.move.moved >= LIKELY and drift.move.parameters["height"] >= LIKELY
+    if not changed or turned > config.CLOCK_TURNED:
         return None
-    for angle, sd in (drift.of(name) for name in ANGLES if name in drift.identifiable):
-        if abs(angle) > min(config.STILL_SIGMAS * sd, config.STILL_RAD):
-            return None
+    if abs(math.log(factor)) <= config.CLOCK_LEAST_LOG:
+        return None
     values = {"factor": factor, "rate_hz": frame_rate_hz or config.USUAL_RATE_HZ}
     return Reason(code=TracksCode.SCALE_CHANGED, values=values)

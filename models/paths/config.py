@@ -32,7 +32,8 @@ BLOCK_NODES = 3  # along a side of a block of ground that is in view or not: coa
 STANDING_MPS = 0.35  # slower steps are nobody's who walks
 TRACK_STEPS = 2.0  # a track tells as much as two independent steps at the most
 NO_GROUND = -30.0  # log likelihood of a step above the horizon
-LEAST_SEEN = 1e-3  # of all people, whom a camera sees: a view of nobody is rare, not impossible
+# Of all people, whom a camera sees, at least: else views of empty ground explain whoever comes.
+LEAST_SEEN = 0.1
 VIEW_STEP = 0.01  # radians, and log height: of differences of what is seen
 # How busy unseen ground is against the seen: tried, and a log-normal prior. Wider, far poses win.
 BUSY_LOG = np.linspace(math.log(0.02), math.log(4.0), 9)
@@ -72,7 +73,8 @@ CHANGED_RATE = 1e-4  # of windows with unchanged paths that are called changed
 # 0.5 at the most (20 simulated sites, 6 cameras of recordings of days).
 TIDE, NEW_PATHS = 0.35, 1.0
 FEWEST_FITS = 5  # walking groups on seen ground by which two poses are told apart
-MOSTLY_SEEN = 0.5  # of a place's ground, and of the people, must have been seen
+MOSTLY_SEEN = 0.5  # of a place's ground must have been seen
+PEOPLE_SEEN = 0.25  # of people must be on seen ground, for it to hold a pose
 
 # Whether halves of the people find the same heading.
 AWAY_RAD = np.radians(4.0)  # from where it was found, both ways: half of a map's peak

@@ -6,7 +6,7 @@ radians from +X towards +Y.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -208,6 +208,13 @@ class PathDensityMap:
     def slots(self) -> int:
         """The number of parts of the day."""
         return int(self.log_density.shape[0])
+
+    @property
+    def undirected(self) -> "PathDensityMap":
+        """The map of places alone: at each, all directions are as likely."""
+        density = np.exp(self.log_density).mean(axis=3, keepdims=True)
+        log_density = np.broadcast_to(np.log(density), self.log_density.shape)
+        return replace(self, log_density=log_density)
 
     def slot_of(self, time_s: Array) -> Index:
         """The part of the day of each time (M,)."""

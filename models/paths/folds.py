@@ -66,6 +66,7 @@ class CrossFit:
     scores: Array
     bent: Array
     fits: Array
+    place_fits: Array
 
 
 def fold_maps(
@@ -144,6 +145,9 @@ def cross_fit(folds: Sequence[Fold], at: Array) -> CrossFit:
         scores=np.concatenate([scores for scores, _ in scored])[order],
         bent=np.stack(bent, axis=1),
         fits=np.concatenate([group_fits(fold.walkers, fold.paths, at) for fold in folds]),
+        place_fits=np.concatenate(
+            [group_fits(fold.walkers, fold.paths.undirected, at) for fold in folds]
+        ),
     )
 
 

@@ -5,7 +5,7 @@ where the share is that of the map which the camera sees; a track's steps count 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,6 +77,11 @@ class PathModel:
     density: PathDensityMap
     coverage: Coverage
     intrinsics: Intrinsics
+
+    @property
+    def undirected(self) -> "PathModel":
+        """The places of people, whichever way they walk."""
+        return replace(self, density=self.density.undirected)
 
     def likelihood(self, walkers: Walkers, candidate: Array) -> Likelihood:
         """The likelihood of the walkers' steps in the image, given that they are seen (4,)."""

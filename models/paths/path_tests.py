@@ -200,6 +200,10 @@ class UsualFit:
         limit = -value_below(config.CHANGED_RATE, self.walking_groups - 1) * sd
         return self._drop(fits) > max(config.NEW_PATHS, limit)
 
+    def is_doubtful(self, fits: Array) -> bool:
+        """True if walking groups (P,) fit worse than other hours' do."""
+        return bool(fits.size) and self._drop(fits) > config.TIDE
+
     def variance_inflation(self, fits: Array) -> float:
         """The inflation of the map's squared errors for walking groups (P,) that fit so well."""
         return 1.0 + (max(self._drop(fits), 0.0) / config.TIDE) ** 2 if fits.size else 1.0

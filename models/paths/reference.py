@@ -33,7 +33,8 @@ class PathReference:
     `curvature_variance_inflation` is how much larger squared errors are than the curvature at a
     peak says, and `score_variance_inflation` than curvature and the scatter of walking groups
     together say, for a map of endless people; this one is of `people`. `still` and `fit` are what
-    its two tests go by. `bandwidths` are what the map was learned by, for the next one.
+    its two tests go by, `place_fit` the same for places alone. `bandwidths` are what the map was
+    learned by, for the next one.
     """
 
     density: PathDensityMap
@@ -46,6 +47,7 @@ class PathReference:
     people: float
     still: StillScores
     fit: UsualFit
+    place_fit: UsualFit
     bandwidths: ChosenBandwidths
 
     def model(self, intrinsics: Intrinsics) -> PathModel:
@@ -128,6 +130,7 @@ def learn_paths(
         people=float(counted.sum() ** 2 / (counted**2).sum()),
         still=learn_scores(crossed.scores, crossed.bent, seed),
         fit=usual_fit(crossed.fits),
+        place_fit=usual_fit(crossed.place_fits),
         bandwidths=folds.chosen,
     )
 

@@ -4,6 +4,7 @@ Source: Berndt, Hall, Hall and Hausman 1974, steps by the scores' outer product;
 Levenberg 1944. The curvature by differences of the scores is ours.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,15 +21,33 @@ _SHORTEST_SHARE = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
-    """A Gaussian on tilt, roll, log height, heading: mean (4,) and precision (4, 4)."""
+    """A Gaussian on tilt, roll, log height and a Cauchy density on heading, which is far at times.
+
+    Mean (4,) and precision (4, 4) are those at its peak; the heading's are apart from the others.
+    """
 
     mean: Array
     precision: Array
 
     def log_density(self, candidate: Array) -> float:
         """The log density up to a constant."""
+        apart = self._apart(candidate)
+        squared = float(apart[:3] @ self.precision[:3, :3] @ apart[:3])
+        return -0.5 * squared - math.log1p(0.5 * float(self.precision[3, 3]) * apart[3] ** 2)
+
+    def gaussian_at(self, candidate: Array) -> tuple[Array, Array]:
+        """Slope (4,) at a candidate (4,), and the precision (4, 4) of a Gaussian with that slope.
+
+        Source: Holland and Welsch 1977, iteratively reweighted least squares.
+        """
+        apart, precision = self._apart(candidate), self.precision.copy()
+        precision[3, 3] /= 1 + 0.5 * precision[3, 3] * apart[3] ** 2
+        return -precision @ apart, precision
+
+    def _apart(self, candidate: Array) -> Array:
         apart = candidate - self.mean
-        return -0.5 * float(apart @ self.precision @ apart)
+        apart[3] = math.remainder(float(apart[3]), 2 * math.pi)
+        return np.asarray(apart)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,9 +93,9 @@ class Posterior:
         """The peak above a candidate (4,), up to a gain that is not worth a step."""
         value, found = self._at(candidate)
         for _ in range(config.MOST_ROUNDS):
-            believed = self.belief.precision @ (candidate - self.belief.mean)
-            slope = found.scores.sum(axis=0) / self.variance_inflation - believed
-            matrix = _scatter(found.scores) / self.variance_inflation + self.belief.precision
+            believed, precision = self.belief.gaussian_at(candidate)
+            slope = found.scores.sum(axis=0) / self.variance_inflation + believed
+            matrix = _scatter(found.scores) / self.variance_inflation + precision
             move = np.linalg.solve(matrix + np.diag(1 + 1e-3 * np.diag(matrix)), slope)
             move = move * min(1.0, config.LONGEST_MOVE / max(float(np.abs(move).max()), 1e-12))
             share, gain = 1.0, -1.0
@@ -107,7 +126,7 @@ def register(posterior: Posterior, headings: Sequence[float]) -> list[Peak]:
     log_posteriors = posterior.values(tried)
     begin: list[Array] = []
     for number in np.argsort(log_posteriors)[::-1]:
-        turns = [abs(tried[number][3] - other[3]) for other in begin]
+        turns = [abs(math.remainder(tried[number][3] - o[3], 2 * math.pi)) for o in begin]
         hopeless = log_posteriors[number] < log_posteriors.max() - config.HOPELESS
         apart = min(turns, default=np.inf) > config.STARTS_APART_RAD
         if len(begin) < config.STARTS and not hopeless and apart:
@@ -147,14 +166,14 @@ def refined(
         bias: a person's mean score at the truth (4,).
         warm: from almost the same tracks' pose, where it ends once hardly anything moves.
     """
-    belief = posterior.belief
-    information = precision + belief.precision
+    _, believed = posterior.belief.gaussian_at(candidate)
+    information = precision + believed
     covariance = np.linalg.inv(information)
     gain = precision @ np.linalg.inv(shape.curvature)
     for _ in range(config.REFINING_ROUNDS):
         scores = posterior.paths.scores(posterior.walkers, candidate, candidate)
         slope = scores.sum(axis=0) - bias * scores.any(axis=1).sum()
-        move = covariance @ (gain @ slope - belief.precision @ (candidate - belief.mean))
+        move = covariance @ (gain @ slope + posterior.belief.gaussian_at(candidate)[0])
         share = min(1.0, config.LONGEST_MOVE / max(np.abs(move).max(), 1e-12))
         candidate = candidate + move * share
         if warm and float(move @ information @ move) < config.ROUGHLY**2:
@@ -205,11 +224,11 @@ def _scatter(scores: Array) -> Array:
 
 
 def on_seen_ground(walkers: Walkers, paths: PathModel, candidate: Array) -> bool:
-    """True if most of what people do, from a candidate (4,), is on ground the reference saw."""
+    """True if enough of what people do, from a candidate (4,), is on ground the reference saw."""
     placed = place_steps(walkers.steps, candidate)
     unseen, _ = paths.density.unseen_at(placed.place)
     seen = float((walkers.weight * placed.valid * (1 - unseen)).sum())
-    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.MOSTLY_SEEN
+    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.PEOPLE_SEEN
 
 
 def variance_of_halves(

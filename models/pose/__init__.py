@@ -27,11 +27,10 @@ from models.pose.config import FEWEST_BESIDE
 from models.pose.estimating import (
     PartialFailure,
     PoseFinding,
-    SecondLook,
-    drift_of,
     estimate_pose,
     unless_failed,
 )
+from models.pose.hypotheses import PosePosterior, drift_of, is_noticed, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
     WarmStart,
@@ -73,8 +72,8 @@ __all__ = [
     "Observations",
     "PartialFailure",
     "PoseFinding",
+    "PosePosterior",
     "ChartResult",
-    "SecondLook",
     "Trajectory",
     "WalkConfig",
     "Walks",
@@ -84,10 +83,12 @@ __all__ = [
     "count_walks",
     "drift_of",
     "estimate_pose",
+    "is_noticed",
     "learn_site",
     "link_pieces",
     "log_creep",
     "observe",
+    "pose_posterior",
     "observe_walks",
     "alarm_chart_result",
     "creep_result",

@@ -10,10 +10,11 @@ import numpy as np
 from models.monitoring.config import HABITS_OF_DAYS
 
 # The search for modes.
-HEADING_SD = math.radians(15.0)  # a pose offset's, before any track: wider, and far headings win
-REACH_RAD = math.radians(30.0)  # of the headings tried, both ways: beyond, none is identifiable
-EDGE_RAD = math.radians(2.0)  # of that reach: so near to it, a better heading may be beyond
-HEADINGS = np.radians(np.arange(-30.0, 31.0, 2.0))  # tried: a map's peaks are some 4 deg wide
+HEADING_SD = math.radians(15.0)  # a pose offset's, before any track, around its peak
+# Tried: a map's peaks are some 4 deg wide; the far ones where people fit none of the near.
+HEADINGS = np.radians(range(-30, 31, 2)).tolist()
+FAR_HEADINGS = np.radians([*range(-180, -30, 3), *range(33, 180, 3)]).tolist()
+ON_MAP = 0.3  # of the walking groups must be on seen ground, for a pose to be held by the paths
 ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hundredths of a sd
 WARM_ROUNDS = 1  # from a warm start, whose heading is known
 UNLIKELY = 12.0  # of the log posterior, below the best: speeds are not fitted again there
@@ -62,3 +63,22 @@ SUSPICION, MORE_SUSPICION = 0.4, 1.25  # of the limit; times what it was where n
 
 # An anchor's creep, in radians: a track turned by less is taken as it is.
 NO_TURN_RAD = np.radians(0.02)
+
+# What moved. Shares and sizes are guesses by what brackets do: a screw slips in tilt, a hand turns
+# the pan, nearly nothing changes a pole's height. Chosen once on seven scenes by time.
+MOVED_PRIOR = 0.2  # that a window is of a camera that has moved: lower, and small moves are missed
+MOVES_IN = (0.5, 0.4, 0.4, 0.5)  # of moves change tilt, roll, height, heading
+MOVE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.10, math.radians(6.0)])
+# How far a camera that stands may be from its prior pose: brackets sway, and poses are rounded.
+REST_SD = np.array([math.radians(0.1), math.radians(0.1), 0.003, math.radians(0.1)])
+FAR_SHARE, FAR_MOVE = 0.15, 5.0  # of moves are so many times as far
+# Degrees of freedom of Student's t: by few groups an estimate is farther off than its covariance.
+LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
+OCCAM = 3.0  # log evidence that a pose which is free to fit gains by that alone
+HABIT_LOSS = 0.2  # of a group's own scatter, by which hours differ in how they fit the prior pose
+MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
+# How often paths are not found again: of cameras turned far, and of those that stand.
+LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
+# A still camera is told to stand where a turn would have been noticed: at four sd, 12 deg would.
+NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
+CERTAIN = 0.99  # that a heading moved: then it is told, however unsure

@@ -11,12 +11,13 @@ from typing import TypeVar
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.monitoring.verdict import Drift, DriftLimits, asks_again, drift_between, pose_after
+from models.monitoring.verdict import Drift, pose_after
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import config
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
 from models.pose.fusion import fused_estimate
+from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
 from models.pose.pose_fit import (
     FullSearch,
     FusedEstimate,
@@ -41,37 +42,32 @@ class PartialFailure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SecondLook:
-    """The limits of a verdict, and whether the camera is taken for moved by now."""
-
-    limits: DriftLimits
-    drifting: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PoseFinding:
     """The pose of a window, from the newest change on.
 
-    `joint` is by speeds alone and `fused` by places too: the one to be served. `earlier` is the
-    same without the newest people; None unless a verdict asks for it. `change_idx` is the first
-    track after the change, None where there was none, and `first` the first that counts.
-    `failures` are of what is beside. `warm_start` is where the next estimate may begin; None where
-    it has to search all poses.
+    `joint` is by speeds alone and `fused` by places too. `change_idx` is the first track after the
+    change, None where there was none, and `first` the first that counts. `failures` are of what is
+    beside. `warm_start` is where the next estimate may begin; None where it has to search all
+    poses.
     """
 
     prior: CameraPose
     joint: JointEstimate
     fused: FusedEstimate
-    earlier: FusedEstimate | None = None
     change_idx: int | None = None
     first: int = 0
     failures: tuple[PartialFailure, ...] = ()
     warm_start: WarmStart | None = None
 
     @property
+    def posterior(self) -> PosePosterior:
+        """The posterior over what moved."""
+        return pose_posterior(self.fused, self.joint.walking_groups, self.prior)
+
+    @property
     def drift(self) -> Drift:
         """The drift from the prior pose, with standard deviations."""
-        return drift_of(self.fused, self.prior)
+        return drift_of(self.posterior, self.fused)
 
     @property
     def pose(self) -> CameraPose:
@@ -82,7 +78,6 @@ class PoseFinding:
 def estimate_pose(
     tracks: Observations,
     site: CameraSite,
-    second_look: SecondLook | None = None,
     warm_start: WarmStart | None = None,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
@@ -93,8 +88,6 @@ def estimate_pose(
     Args:
         tracks: of the window, in the order of their ends.
         site: of the camera.
-        second_look: what a verdict goes by, if there is to be one: where it is about to change, the
-            pose is estimated without the newest people, too. That takes as long again.
         warm_start: of the finding of almost the same tracks at the same site, the newest of them
             left out and some older ones: where nothing speaks against it, its pose is refined,
             which takes a quarter to a half of the time and comes to the same.
@@ -115,15 +108,10 @@ def estimate_pose(
     if found is None:
         site = replace(site, paths=None)
         found = search_change(tracks, site, None if failures else _at_site(warm_start, site))
-    fused = found.fit.fused
-    earlier = None
-    if second_look is not None:
-        earlier = _look_again(found.tracks, drift_of(fused, prior), second_look, site)
     return PoseFinding(
         prior=prior,
         joint=found.fit.joint,
-        fused=fused,
-        earlier=earlier,
+        fused=found.fit.fused,
         change_idx=found.change_idx,
         first=found.first,
         failures=tuple(failures),
@@ -136,28 +124,6 @@ def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None
     if warm_start is None or warm_start.prior != site.prior:
         return None
     return warm_start if warm_start.registered == (site.paths is not None) else None
-
-
-def drift_of(fused: FusedEstimate, prior: CameraPose) -> Drift:
-    """The drift of an estimate from the prior pose."""
-    return drift_between(fused.parameters, fused.sd, fused.identifiable, prior)
-
-
-def _look_again(
-    tracks: Observations, drift: Drift, second_look: SecondLook, site: CameraSite
-) -> FusedEstimate | None:
-    """The pose without the newest people who walk; None where it is not needed, or too few do.
-
-    A pose takes a second: only a verdict that is about to change needs it.
-    """
-    limits = second_look.limits
-    if not asks_again(drift, limits, drifting=second_look.drifting):
-        return None
-    walkers = np.unique(tracks.steps.rows.owner_idx)
-    if walkers.size < limits.people + FEWEST_WALKERS:
-        return None
-    older = of_tracks(tracks, np.arange(walkers[-limits.people]))
-    return pose_fit_of(older, site).fused
 
 
 _Made = TypeVar("_Made")

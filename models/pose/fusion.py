@@ -3,12 +3,14 @@
 Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / variance inflation.
 """
 
+from functools import partial
+
 import numpy as np
 
 from models.geometry.pose import IDENTIFIABLE_SD, PARAMETERS, CameraPose, array_of, identifiable_of
 from models.geometry.rotation import Array
 from models.paths.likelihood import walkers_of
-from models.paths.path_tests import group_fits
+from models.paths.path_tests import group_fits, loss
 from models.paths.reference import PathReference
 from models.paths.registration import (
     Posterior,
@@ -66,25 +68,54 @@ def fused_estimate(
         variance_inflation=paths.variance_inflation_for(walkers.people),
     )
     modes = find_modes(posterior, tracks, site, joint, warm_start)
-    fits = group_fits(walkers, posterior.paths, modes[0].candidate)
-    if paths.fit.has_changed(fits):
-        return by_speeds_alone(joint, prior, _changed_paths(posterior, paths, joint, prior))
+    fitting = _fitting(modes, paths)
+    if warm_start is None and (not fitting or paths.fit.is_doubtful(fitting[0][1])):
+        modes += find_modes(posterior, tracks, site, joint, headings=config.FAR_HEADINGS)
+        fitting = _fitting(sorted(modes, key=lambda mode: -mode.peak.value), paths)
+    changed = partial(_changed_paths, posterior, paths, joint, prior)
+    if not fitting:
+        return by_speeds_alone(joint, prior, changed())
+    modes, fits = [mode for mode, _ in fitting], fitting[0][1]
     values, covariance = _refined(modes[0], paths, prior, fits, warm_start)
-    if _out_of_reach(values, prior) or not on_seen_ground(walkers, posterior.paths, values):
-        return by_speeds_alone(joint, prior, _unidentifiable(config.HEADING_SD))
+    if covariance[3, 3] > config.HEADING_SD**2:  # the paths say nothing
+        return by_speeds_alone(joint, prior, changed())
+    if not on_seen_ground(walkers, posterior.paths, values):
+        return by_speeds_alone(joint, prior, changed() or _unidentifiable(config.HEADING_SD))
     odds = odds_of(modes)
     extra = _extra_covariance(modes, odds, values, covariance, warm_start)
     return _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
 
 
+def _fitting(modes: list[Mode], paths: PathReference) -> list[tuple[Mode, Array]]:
+    """The modes at which people walk where they did, each with the fits of walking groups (P,).
+
+    Elsewhere they are on ground of which nothing is known, or have left their paths.
+    """
+    found = []
+    for mode in modes:
+        walkers = mode.posterior.walkers
+        fits = group_fits(walkers, mode.posterior.paths, mode.candidate)
+        if fits.size >= config.ON_MAP * walkers.walking_groups and not paths.fit.has_changed(fits):
+            found.append((mode, fits))
+    return found
+
+
 def _changed_paths(
     posterior: Posterior, paths: PathReference, joint: JointEstimate, prior: CameraPose
 ) -> Reason | None:
-    """The reason of people who fit no pose; None if only times changed, by a clock."""
-    at_prior = group_fits(posterior.walkers, posterior.paths, array_of(prior))
+    """The reason of people who fit no pose; None if only times changed, by a clock.
+
+    A crowd that turns over a day walks the same ground another way; a camera that was turned has
+    people on other ground.
+    """
+    at = array_of(prior)
+    at_prior = group_fits(posterior.walkers, posterior.paths, at)
     if not paths.fit.has_changed(at_prior) and _same_angles(joint, prior):
         return None
-    return Reason(code=TracksCode.PATHS_CHANGED)
+    places = group_fits(posterior.walkers, posterior.paths.undirected, at)
+    if paths.place_fit.has_changed(places):
+        return Reason(code=TracksCode.PATHS_CHANGED)
+    return Reason(code=TracksCode.WAYS_CHANGED)
 
 
 def _same_angles(joint: JointEstimate, prior: CameraPose) -> bool:
@@ -111,11 +142,6 @@ def _refined(
         mode.posterior, mode.candidate, shape, precision, paths.bias, warm=warm
     )
     return values, covariance * birge_ratio(mode.posterior.belief, precision, values)
-
-
-def _out_of_reach(values: Array, prior: CameraPose) -> bool:
-    """True if a heading is at the edge of those that were tried: beyond may be a better one."""
-    return abs(float(values[3]) - prior.heading_rad) > config.REACH_RAD - config.EDGE_RAD
 
 
 def _extra_covariance(
@@ -176,6 +202,9 @@ def _estimate_of(
         rivals=rivals,
         modes=(best.candidate, *near),
         path_fit=float(fits.sum()),
+        prior_loss=loss(
+            best.posterior.walkers, best.posterior.paths, best.candidate, array_of(prior)
+        ),
         neighbourhood=PathNeighbourhood(speeds=best.speeds.warm_start, extra_covariance=extra),
     )
 

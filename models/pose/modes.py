@@ -1,6 +1,7 @@
 """The modes of speeds and places together, from several headings, and their covariances."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +42,7 @@ class Mode:
 
 
 def belief_of(joint: JointEstimate, prior: CameraPose) -> Belief:
-    """The Gaussian of the speeds, with that of a pose offset's heading."""
+    """The belief by speeds, with that in a pose offset's heading."""
     precision = np.zeros((4, 4))
     precision[:3, :3] = np.linalg.inv(joint.covariance)
     precision[3, 3] = config.HEADING_SD**-2.0
@@ -54,6 +55,7 @@ def find_modes(
     site: CameraSite,
     joint: JointEstimate,
     warm_start: WarmStart | None = None,
+    headings: Sequence[float] = config.HEADINGS,
 ) -> list[Mode]:
     """The modes that are climbed to from several headings and from poses by speeds, the best first.
 
@@ -63,9 +65,10 @@ def find_modes(
         site: of the camera.
         joint: by speeds, the heading taken for the prior pose's.
         warm_start: whose modes alone are climbed from, where there is one.
+        headings: that are tried, from the prior pose's on (radians).
     """
     if warm_start is None:
-        begin = _from_afar(posterior, joint)
+        begin = _from_afar(posterior, joint, headings)
     else:
         modes = warm_start.fused.modes
         begin = [(Peak(candidate=mode, value=-math.inf), config.WARM_ROUNDS) for mode in modes]
@@ -80,12 +83,14 @@ def find_modes(
     return [next(mode for mode in found if mode.peak is peak) for peak in kept]
 
 
-def _from_afar(posterior: Posterior, joint: JointEstimate) -> list[tuple[Peak, int]]:
+def _from_afar(
+    posterior: Posterior, joint: JointEstimate, headings: Sequence[float]
+) -> list[tuple[Peak, int]]:
     """The peaks of several headings and the poses by speeds, with their rounds of speeds.
 
     Speeds are fitted again at the likely ones only.
     """
-    peaks = register(posterior, config.HEADINGS)
+    peaks = register(posterior, headings)
     best = peaks[0].value
     begin = [(peak, config.ROUNDS if peak.value > best - config.UNLIKELY else 0) for peak in peaks]
     others = np.array([np.append(other, peaks[0].candidate[3]) for other in joint.others])
@@ -146,10 +151,8 @@ def birge_ratio(belief: Belief, precision: Array, values: Array) -> float:
 
     Source: Birge 1932, the ratio of external to internal consistency.
     """
-    pull = belief.precision @ (values - belief.mean)
-    squared = pull @ np.linalg.solve(belief.precision, pull) + pull @ np.linalg.solve(
-        precision, pull
-    )
+    pull, believed = belief.gaussian_at(values)
+    squared = pull @ np.linalg.solve(believed, pull) + pull @ np.linalg.solve(precision, pull)
     return max(1.0, float(squared) / config.SHARED)
 
 

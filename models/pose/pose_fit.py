@@ -20,7 +20,7 @@ from models.geometry.pose import (
 )
 from models.geometry.rotation import Array
 from models.pose import config
-from models.reasons import Reason
+from models.reasons import Reason, TracksCode
 from models.serialization import Format, flattened, from_bytes, restored, to_bytes
 from models.tracks.observations import Observations
 from models.walking.estimate import JointEstimate
@@ -54,7 +54,7 @@ class FusedEstimate:
     `rivals` are headings (radians) of other poses that explain the tracks about as well. `modes`
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `path_fit` is the sum over walking groups of how well they fit the paths at `raw`,
-    in logs.
+    in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors.
     """
 
     values: Array
@@ -65,12 +65,18 @@ class FusedEstimate:
     rivals: tuple[float, ...] = ()
     modes: tuple[Array, ...] = ()
     path_fit: float = 0.0
+    prior_loss: float = 0.0
     neighbourhood: PathNeighbourhood | None = None
 
     @property
     def registered(self) -> bool:
         """True if the paths had a part."""
         return self.raw is not None
+
+    @property
+    def paths_changed(self) -> bool:
+        """True if people walk on none of the site's paths, wherever the camera looks."""
+        return self.reason is not None and self.reason.code == TracksCode.PATHS_CHANGED
 
     @property
     def parameters(self) -> PoseParameters:

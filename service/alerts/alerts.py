@@ -55,6 +55,7 @@ def open_alert(
     changed_at: datetime | None,
     *,
     reasons: Reasons,
+    changed_after: datetime | None = None,
     source: AlertSource = AlertSource.ESTIMATE,
 ) -> AlertRecord | None:
     """Open an alert, or bring the open one up to date; None where somebody is at the camera.
@@ -75,6 +76,7 @@ def open_alert(
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
             _keep_activity(session, record, AlertActivity.ESCALATED, None)
         record.changed_at = changed_at or record.changed_at
+        record.changed_after = changed_after or record.changed_after
     else:
         record = AlertRecord(
             id=secrets.token_hex(16),
@@ -84,6 +86,7 @@ def open_alert(
             state=AlertState.FIRING,
             notified=False,
             opened_at=now,
+            changed_after=changed_after,
             changed_at=changed_at,
         )
     record.severity, record.source = severity, source

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
-from service.api.schemas import Body, Moment, Out, ReasonCode, ReasonValues, Text, Who
+from service.api.schemas import Body, Moment, Out, ReasonCode, ReasonValues, SinceOut, Text, Who
 from service.cameras import decisions
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.notifications.outbox import alert_body
@@ -56,6 +56,7 @@ class AlertOut(BaseModel):
     drift: dict[str, Any]
     opened_at: datetime
     changed_at: datetime | None
+    since: SinceOut
     updated_at: datetime
     acknowledged: bool = False
     acknowledged_by: str | None

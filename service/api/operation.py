@@ -82,6 +82,12 @@ def _of_cameras(metrics: Metrics) -> Iterator[Metric]:
         {(c.camera_id,): c.last_track_s for c in metrics.cameras if c.last_track_s is not None},
     )
     yield _gauge(
+        "surefoot_camera_moved_probability",
+        "The probability that a camera has moved, by its newest estimate.",
+        ["camera_id"],
+        {(c.camera_id,): c.estimate.moved for c in metrics.cameras if c.estimate is not None},
+    )
+    yield _gauge(
         "surefoot_camera_drift_radians",
         "Drift of tilt, roll or heading against the prior pose, where it is identifiable.",
         ["camera_id", "number"],

@@ -17,7 +17,7 @@ from service.api.middleware.dependencies import (
     StateDep,
     WriteDep,
 )
-from service.api.schemas import Body, Moment, Out, PoseOut, ReasonCode, ReasonValues, Who
+from service.api.schemas import Body, Moment, Out, PoseOut, ReasonCode, ReasonValues, SinceOut, Who
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
 from service.degrees import in_degrees
@@ -99,6 +99,9 @@ class ServedPoseOut(BaseModel):
     estimated: list[str]
     sd: SdOut | None
     drift: DriftOut | None
+    moved: float | None
+    moved_parameters: dict[str, float | None]
+    since: SinceOut
     estimates: dict[str, Any]
     reference: ReferenceOut
     tracks: int
@@ -122,6 +125,12 @@ class ServedPoseOut(BaseModel):
             estimated=[field for name, field in _FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
+            moved=None if estimate is None else estimate.moved,
+            moved_parameters=_moved_parameters(estimate),
+            since=SinceOut(
+                after=None if estimate is None else estimate.drift_after,
+                before=None if estimate is None else estimate.drift_since,
+            ),
             estimates={} if estimate is None else in_degrees(estimate.raw),
             reference=ReferenceOut.of(view.reference, state=learned),
             tracks=0 if estimate is None else estimate.tracks,
@@ -146,6 +155,7 @@ class HistoryPoint(Out):
     heading_deg: float
     sd: SdOut | None
     drift: DriftOut | None
+    moved: float
     tracks: int
     to: datetime
 
@@ -166,6 +176,12 @@ class History(BaseModel):
     """Estimates, oldest first."""
 
     items: list[HistoryPoint]
+
+
+def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None]:
+    """The probability that each number of a pose changed; None where nothing is known."""
+    shares = {} if estimate is None else estimate.moved_parameters
+    return {field: shares.get(name) for name, field in _FIELDS.items()}
 
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])

@@ -174,6 +174,13 @@ class PriorPoseBody(Body):
         )
 
 
+class SinceOut(BaseModel):
+    """The times between which a camera moved: it stood at `after` and had moved by `before`."""
+
+    after: datetime | None
+    before: datetime | None
+
+
 class PoseOut(BaseModel):
     """A pose in every form that clients ask for."""
 

@@ -19,7 +19,7 @@ from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severit
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
 from service.store import fleet
-from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
@@ -138,7 +138,7 @@ def _status_of(
 def _holds(alerts: Sequence[AlertRecord]) -> list[AlertRecord]:
     """The alerts that say that a camera has moved, as estimates found."""
     return [
-        each for each in alerts if each.kind in POSE_KINDS and each.source == AlertSource.ESTIMATE
+        each for each in alerts if each.kind in MOVED_KINDS and each.source == AlertSource.ESTIMATE
     ]
 
 
@@ -191,6 +191,8 @@ def _since(
     reference = newest.reference
     if alerts:
         return alert_since(alerts[0])
+    if state == PoseState.SUSPECTED and newest.estimate and newest.estimate.drift_since:
+        return newest.estimate.drift_since
     if state == PoseState.NO_DATA and newest.last_track_s is not None:
         return datetime.fromtimestamp(newest.last_track_s, UTC)
     if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import (
+    LIKELY,
     Drift,
     DriftVerdict,
     clock_fault,
@@ -19,18 +20,19 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import CLOCK, drift_of
+from models.pose import CLOCK, drift_of, is_noticed
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
-from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
-from service.estimation.evidence import Evidence
+from service.enums import AlertKind, Answer, EventType, Outcome, PoseState, Severity
+from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.finding import Finding
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
 from service.store import estimates, journal, references
+from service.store.alerts import MOVED_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
@@ -45,24 +47,26 @@ class History:
     """Earlier findings of a camera.
 
     `last` is the newest estimate against its reference, `drifted` what had drifted as long as an
-    alert says so.
+    alert says so; `unsure`, as long as an alert says that nobody walks on the paths.
     """
 
     last: EstimateRecord | None
     drifted: tuple[str, ...]
+    unsure: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
-    `clock` is why its clock or frame rate looks wrong; `charted` says that the chart or the creep
-    is beyond its level.
+    `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
+    frame rate looks wrong; `charted` says that the chart or the creep is beyond its level.
     """
 
     state: PoseState
     reasons: Reasons
     verdict: DriftVerdict = _UNJUDGED
+    after: datetime | None = None
     since: datetime | None = None
     clock: Reason | None = None
     charted: bool = False
@@ -80,16 +84,17 @@ def save_estimate(
     camera = session.get(CameraRecord, evidence.camera_id)
     if reference is None or camera is None:
         return None
-    drift = drift_of(finding.fused, evidence.prior)
+    drift = drift_of(finding.posterior, finding.fused)
     if evidence.site is None:
         learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
         judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
         record = _record(reference, evidence, finding, drift, judgement)
         record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
+        record.moved, record.moved_parameters = settings.moved_prior, {}
     else:
         if finding.change is not None:
             reference.window_from_s = finding.change.ended_s
-            reference.changed_s = finding.change.started_s
+            reference.changed_after_s, reference.changed_s = _change_of(evidence, finding.change)
         history = _history(session, reference)
         judgement = _judge(reference, history, evidence, finding, drift, camera.frame_rate_hz)
         record = _record(reference, evidence, finding, drift, judgement)
@@ -131,12 +136,14 @@ def _history(session: Session, reference: SiteReferenceRecord) -> History:
     last = estimates.newest(session, camera_id)
     if last is not None and not made_against(reference, last):
         last = None
-    if not fired_by_estimate(session, camera_id):
-        return History(last=last, drifted=())
+    firing = fired_by_estimate(session, camera_id)
+    unsure = AlertKind.UNSURE in firing
+    if not firing & set(MOVED_KINDS):
+        return History(last=last, drifted=(), unsure=unsure)
     # An alert of before this reference stands until what is seen after it ends it.
     before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
     drifted = () if before is None else tuple(before.drifted)
-    return History(last=last, drifted=drifted or PLANE_PARAMETERS)
+    return History(last=last, drifted=drifted or PLANE_PARAMETERS, unsure=unsure)
 
 
 def _judge(
@@ -148,35 +155,72 @@ def _judge(
     frame_rate_hz: float | None,
 ) -> Judgement:
     """The judgement of an estimate after its reference."""
-    clock = clock_fault(drift, evidence.prior, frame_rate_hz)
-    reading, creep = finding.reading, finding.creep
+    clock = clock_fault(drift, finding.posterior.turned, evidence.prior, frame_rate_hz)
+    # What people do who are not where the reference's were says nothing of which parameter moved.
+    gone = finding.fused.paths_changed
+    reading, creep = None if gone else finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
         reading = None
-    earlier = None if finding.earlier is None else drift_of(finding.earlier, evidence.prior)
-    verdict = judge(drift, evidence.limits, history.drifted, reading, earlier, creep)
+    verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=finding.enough)
     reasons = some(
+        finding.fused.reason if gone else None,
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
         clock,
         None if finding.reading is None else reason_of_chart(finding.reading),
-        finding.fused.reason,
+        None if gone else finding.fused.reason,
         None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
         *reference.doubts,
         finding.pieces,
         *finding.failures,
     )
-    state = PoseState.OK if drift.identifiable else PoseState.LEARNING
     charted = reading if reading is not None and reading.moved else None
     if charted is not None and clock is None and charted.parameter == CLOCK:
         clock = reason_of_chart(charted)
+    alarmed = charted is not None or (creep is not None and creep.moved)
+    state = _state(reference, history, verdict, evidence, finding)
+    after, since = _since(reference, history, verdict, evidence, finding, state)
     return Judgement(
-        state=PoseState.DRIFTING if verdict.drifting else state,
+        state=state,
         reasons=reasons,
         verdict=verdict,
-        since=_since(reference, history, verdict, evidence, finding),
+        after=after,
+        since=since,
         clock=clock,
-        charted=charted is not None or (creep is not None and creep.moved),
+        charted=alarmed,
     )
+
+
+def _state(
+    reference: SiteReferenceRecord,
+    history: History,
+    verdict: DriftVerdict,
+    evidence: Evidence,
+    finding: Finding,
+) -> PoseState:
+    """The state of a camera; that it stands is said where a turn would have been noticed.
+
+    Of fewer people than `enough`, nothing is said against what somebody said. That people walk on
+    none of the paths is so until some are found to walk there again.
+    """
+    if verdict.drifting:
+        return PoseState.DRIFTING
+    mapped = evidence.flow is not None
+    fits = finding.enough and (finding.fused.registered or not mapped)
+    if finding.enough and finding.fused.paths_changed or (history.unsure and not fits):
+        return PoseState.UNSURE
+    if finding.posterior.moved >= LIKELY and finding.enough:
+        return PoseState.SUSPECTED
+    if not finding.enough and reference.answer == Answer.FALSE_ALARM:
+        return PoseState.OK
+    noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
+    return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
+
+
+def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:
+    """The end of the last track before a change and the begin of the first after it."""
+    at = evidence.tracks.index(change)
+    return (evidence.tracks[at - 1].ended_s if at else None), change.started_s
 
 
 def _since(
@@ -185,23 +229,41 @@ def _since(
     verdict: DriftVerdict,
     evidence: Evidence,
     finding: Finding,
-) -> datetime | None:
-    """The time at which the camera had moved at the latest, as far as the tracks tell."""
-    since = None if history.last is None else history.last.drift_since
-    if verdict.streak <= 0:
-        return since if verdict.drifting else None
+    state: PoseState,
+) -> tuple[datetime | None, datetime | None]:
+    """The times between which the camera moved, or is suspected to, as far as the tracks tell."""
+    last = history.last
+    before = (None, None) if last is None else (last.drift_after, last.drift_since)
+    if verdict.streak <= 0 and state != PoseState.SUSPECTED:
+        return before if verdict.drifting else (None, None)
     if reference.changed_s is not None:
-        return datetime.fromtimestamp(reference.changed_s, UTC)
-    if since is not None:
-        return since
+        return _between(reference.changed_after_s, reference.changed_s)
+    if before[1] is not None:
+        return before
+    # As was learned; or as somebody said, whose answer has the window begin.
+    stood_s = max(reference.to_s or 0.0, reference.window_from_s or 0.0)
     reading, creep = finding.reading, finding.creep
     if reading is not None and reading.moved:
-        return datetime.fromtimestamp(evidence.tracks[reading.track_idx].started_s, UTC)
+        at = reading.track_idx
+        ended_s = evidence.tracks[at - 1].ended_s if at else stood_s
+        return _between(ended_s, evidence.tracks[at].started_s)
     if creep is not None and creep.moved:
-        return datetime.fromtimestamp(creep.since_day * DAY_S, UTC)
+        return None, _at(creep.since_day * DAY_S)
     # One pose since the reference, and never another one: it had moved before all of them.
-    first = history.last is None
-    return datetime.fromtimestamp(finding.tracks[0 if first else -1].ended_s, UTC)
+    if last is None:
+        return _between(stood_s, finding.tracks[0].ended_s)
+    return _between(last.to_s, finding.tracks[-1].ended_s)
+
+
+def _between(stood_s: float | None, moved_s: float) -> tuple[datetime | None, datetime | None]:
+    """The times of a move between a person before it and one after it, who may overlap."""
+    if stood_s is None:
+        return None, _at(moved_s)
+    return _at(min(stood_s, moved_s)), _at(max(stood_s, moved_s))
+
+
+def _at(time_s: float | None) -> datetime | None:
+    return None if time_s is None else datetime.fromtimestamp(time_s, UTC)
 
 
 def _update_alerts(
@@ -210,16 +272,27 @@ def _update_alerts(
     """Open, update or end the alerts that an estimate stands behind."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
     if not verdict.drifting:
-        for kind in firing:
+        unsure = judgement.state == PoseState.UNSURE
+        for kind in firing - {AlertKind.UNSURE} if unsure else firing:
             end_alert(session, camera_id, kind, Outcome.CLEARED)
+        if unsure:
+            open_alert(
+                session,
+                settings,
+                camera_id,
+                AlertKind.UNSURE,
+                Severity.WARNING,
+                identifiable_drift(drift),
+                None,
+                reasons=judgement.reasons,
+            )
         return
     # What was named a clock fault stays one until an angle has drifted too.
     still_clock = AlertKind.CLOCK in firing and verdict.drifted == ("height",)
-    kind, other = AlertKind.DRIFT, AlertKind.CLOCK
-    if judgement.clock is not None or still_clock:
-        kind, other = other, kind
-    if other in firing:
-        end_alert(session, camera_id, other, Outcome.CLEARED, note=fired_as(kind))
+    clock = judgement.clock is not None or still_clock
+    kind = AlertKind.CLOCK if clock else AlertKind.DRIFT
+    for before in firing - {kind}:
+        end_alert(session, camera_id, before, Outcome.CLEARED, note=fired_as(kind))
     if drift.identifiable or judgement.charted:
         open_alert(
             session,
@@ -230,6 +303,7 @@ def _update_alerts(
             identifiable_drift(drift),
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
+            changed_after=judgement.after,
         )
 
 
@@ -255,6 +329,9 @@ def _record(
         suspected=finding.reading is not None and finding.reading.suspicious,
         drift_streak=judgement.verdict.streak,
         drifted=list(judgement.verdict.drifted),
+        moved=drift.move.moved,
+        moved_parameters=dict(drift.move.parameters),
+        drift_after=judgement.after,
         drift_since=judgement.since,
         raw=_raw(finding),
         tracks=len(finding.tracks),

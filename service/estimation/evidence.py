@@ -15,7 +15,6 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
-from service.alerts.alerts import fired_by_estimate
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
@@ -155,7 +154,7 @@ class Evidence:
     `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
     `chart`; None where there is none. `predictions` has what the model in use says of the
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
-    `drifting` says that an alert tells of a drift by now. `before` is the piece before each of the
+    `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
     estimate before ended.
     """
@@ -173,7 +172,7 @@ class Evidence:
     tracks_a_year: float
     alarms_a_year: float
     limits: DriftLimits
-    drifting: bool
+    moved_prior: float
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
     before: npt.NDArray[np.int64] | None = None
@@ -234,7 +233,7 @@ def load_evidence(
         tracks_a_year=tracks.a_year(session, camera_id),
         alarms_a_year=settings.false_alarms_per_year,
         limits=drift_limits(settings),
-        drifting=bool(fired_by_estimate(session, camera_id)),
+        moved_prior=settings.moved_prior,
         model_id=None if model is None else model.id,
         predictions=tuple(rows),
         before=gathered.before,

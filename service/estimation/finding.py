@@ -9,8 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from models.durations import DAY_S
 from models.errors import CheckpointError
 from models.pose import (
+    CLOCK,
     CREEP_SHARE,
     AlarmRate,
     CameraSite,
@@ -20,7 +22,7 @@ from models.pose import (
     JointEstimate,
     Observations,
     PartialFailure,
-    SecondLook,
+    PosePosterior,
     WarmStart,
     alarm_chart_result,
     assume_site,
@@ -29,6 +31,7 @@ from models.pose import (
     estimate_pose,
     observe_walks,
     paths_from_bytes,
+    pose_posterior,
     reference_from_bytes,
     unless_failed,
     warm_start_from_bytes,
@@ -49,6 +52,8 @@ from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord
 
 log = logging.getLogger("surefoot.recalibration")
+
+_LEAST_FALSE = 1e-4  # of windows alarm though the camera stands, whatever their length
 
 _Made = TypeVar("_Made")
 
@@ -91,17 +96,19 @@ class PartialFailures:
 class Finding:
     """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
-    `fused` is to be served, `earlier` the same without the newest people, where the verdict asks
-    for it. `reading` is what the drift chart says of the tracks after the change, or of all where
-    these are too few, long before a pose can say how far; None where there is no chart. `creep`
-    is what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
+    `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
+    said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
+    the change, or of all where these are too few, long before a pose can say how far; None where
+    there is no chart. `creep` is what the anchor says of weeks; once the camera has crept, all else
+    is by its first map, too.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """
 
     joint: JointEstimate
     fused: FusedEstimate
-    earlier: FusedEstimate | None
+    posterior: PosePosterior
+    enough: bool
     averaged: PoseEstimate | None
     reading: ChartResult | None
     creep: Creep | None
@@ -146,13 +153,7 @@ def compute_finding(
     reading = _read(evidence, observed, site, 0, failures)
     suspicious = reading is not None and reading.suspicious
     basis = basis_of(evidence, crept=crept, suspicious=suspicious)
-    look_twice = SecondLook(limits=evidence.limits, drifting=evidence.drifting)
-    found = estimate_pose(
-        observed,
-        site,
-        look_twice if asked_enough(evidence) else None,
-        begin_of(evidence.last, basis),
-    )
+    found = estimate_pose(observed, site, begin_of(evidence.last, basis))
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
@@ -161,7 +162,13 @@ def compute_finding(
     return Finding(
         joint=found.joint,
         fused=found.fused,
-        earlier=found.earlier,
+        posterior=pose_posterior(
+            found.fused,
+            found.joint.walking_groups,
+            evidence.prior,
+            _moved_prior(evidence, found.fused, reading, creep),
+        ),
+        enough=asked_enough(evidence),
         averaged=averaged,
         reading=reading,
         creep=creep,
@@ -171,6 +178,24 @@ def compute_finding(
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
     )
+
+
+def _moved_prior(
+    evidence: Evidence, fused: FusedEstimate, reading: ChartResult | None, creep: Creep | None
+) -> float:
+    """The probability that the camera moved, before the pose says more.
+
+    Where the chart or the creep alarms, by how seldom that of a still camera does in so long a
+    window. Of people on none of the paths, and of times, the chart says nothing about the pose.
+    """
+    charted = reading is not None and reading.moved and reading.parameter != CLOCK
+    crept = creep is not None and creep.moved
+    prior = evidence.moved_prior
+    if not crept and (not charted or fused.paths_changed):
+        return prior
+    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
+    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
+    return prior / (prior + (1 - prior) * max(false, _LEAST_FALSE))
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:

@@ -21,7 +21,15 @@ from service.wording.reasons import in_words
 
 _ALERT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
-    *("drift", "opened_at", "changed_at", "updated_at", "acknowledged_by", "acknowledged_at"),
+    *(
+        "drift",
+        "opened_at",
+        "changed_after",
+        "changed_at",
+        "updated_at",
+        "acknowledged_by",
+        "acknowledged_at",
+    ),
     *("silenced_until", "silence_reason", "silenced_by", "resolved_at", "resolved_by"),
     *("outcome", "note", "track_source", "camera_ids", "group_id"),
 )
@@ -87,6 +95,7 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
+    body["since"] = {"after": body.pop("changed_after"), "before": body["changed_at"]}
     body["acknowledged"] = record.acknowledged_at is not None
     body["silenced"] = record.is_silenced(datetime.now(UTC))
     return body

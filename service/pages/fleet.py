@@ -32,6 +32,8 @@ _HISTORY = 24  # estimates of a sparkline
 # How soon a camera without an alert needs a person.
 _RANKS = {
     PoseState.DRIFTING: 2,
+    PoseState.UNSURE: 3,
+    PoseState.SUSPECTED: 5,
     PoseState.NO_DATA: 4,
     PoseState.LEARNING: 6,
     PoseState.OK: 7,

@@ -51,6 +51,7 @@ class AlertRecord(Record):
     reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]
     opened_at: Mapped[datetime]
+    changed_after: Mapped[datetime | None]
     changed_at: Mapped[datetime | None]
     updated_at: Mapped[datetime]
     acknowledged_by: Mapped[str | None]
@@ -99,7 +100,8 @@ class AlertRecord(Record):
         return self.silenced_until is not None and self.silenced_until > now
 
 
-POSE_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that hold a camera against its prior pose
+MOVED_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that say that a camera has moved, or its clock
+POSE_KINDS = (*MOVED_KINDS, AlertKind.UNSURE)  # that hold a camera against its prior pose
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.

@@ -8,7 +8,7 @@ from sqlalchemy import ColumnElement, Index, bindparam, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose import PoseParameters
-from models.monitoring.verdict import Drift
+from models.monitoring.verdict import Drift, MoveProbabilities
 from service.enums import PoseState
 from service.reasons import Reasons
 from service.store.record import (
@@ -69,10 +69,13 @@ class EstimateRecord(Record):
     drift_roll_rad: Mapped[float]
     drift_heading_rad: Mapped[float]
     drift_angle_rad: Mapped[float]
+    moved: Mapped[float]  # the probability that it did
+    moved_parameters: Mapped[dict[str, Any]]  # and that each parameter changed
     suspected: Mapped[bool]  # the score test says that the camera has moved
     drift_streak: Mapped[int]  # 1: beyond the limits; -1: below the share that clears
     drifted: Mapped[list[str]]  # of those: what has been beyond since it began
-    drift_since: Mapped[datetime | None]
+    drift_after: Mapped[datetime | None]  # it stood where it should, before it moved
+    drift_since: Mapped[datetime | None]  # it had moved at the latest
     raw: Mapped[dict[str, Any]]
     tracks: Mapped[int]
     from_s: Mapped[float]
@@ -106,6 +109,7 @@ class EstimateRecord(Record):
             sd=self.pose_sd,
             angle_rad=self.drift_angle_rad,
             identifiable=tuple(self.identifiable),
+            move=MoveProbabilities(moved=self.moved, parameters=self.moved_parameters),
         )
 
 
@@ -166,7 +170,7 @@ def _made_between(
 
 def identifiable_drift(drift: Drift) -> dict[str, float | None]:
     """The identifiable drift as an alert keeps it; None where the tracks leave it open."""
-    angle_rad = drift.angle_rad if drift.turned else None
+    angle_rad = drift.angle_rad if drift.has_angle else None
     return {**_where_identifiable(drift.by, drift.identifiable), "angle_rad": angle_rad}
 
 

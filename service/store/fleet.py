@@ -158,8 +158,8 @@ def drift_history(
 ) -> dict[str, list[float | None]]:
     """The drifts of the newest so many estimates of each camera in units of the limits.
 
-    Oldest first; the largest of what an estimate told, None where it told nothing. What
-    `DriftLimits.of` says, said in SQL: thousands of estimates are one number each.
+    Oldest first; the largest of what an estimate told, None where it told nothing. In
+    SQL: thousands of estimates are one number each.
     """
     earlier = aliased(EstimateRecord)
     first = (
@@ -173,10 +173,10 @@ def drift_history(
     )
     e = EstimateRecord
     ratios = [
-        _ratio("tilt", e.drift_tilt_rad, e.tilt_sd_rad, limits, limits.floor_rad),
-        _ratio("roll", e.drift_roll_rad, e.roll_sd_rad, limits, limits.floor_rad),
-        _ratio("heading", e.drift_heading_rad, e.heading_sd_rad, limits, limits.floor_rad),
-        _ratio("height", e.drift_height_m, e.height_sd_m, limits, limits.floor_m),
+        _ratio("tilt", e.drift_tilt_rad, limits.floor_rad),
+        _ratio("roll", e.drift_roll_rad, limits.floor_rad),
+        _ratio("heading", e.drift_heading_rad, limits.floor_rad),
+        _ratio("height", e.drift_height_m, limits.floor_m),
     ]
     query = (
         select(CameraRecord.id, e.id, func.nullif(largest(*ratios), -1.0))
@@ -295,10 +295,7 @@ def _seen_within(spans: Mapping[str, Spans]) -> ColumnElement[bool]:
     return within.correlate(TrackRecord).exists()
 
 
-def _ratio(
-    name: str, drift: Any, sd: Any, limits: DriftLimits, floor: float
-) -> ColumnElement[float]:
-    """A number's drift in units of its limit; -1 where it is not identifiable."""
+def _ratio(name: str, drift: Any, floor: float) -> ColumnElement[float]:
+    """A number's drift in units of its floor; -1 where it is not identifiable."""
     identifiable = contains_word(EstimateRecord.identifiable, name)
-    limit = largest(limits.sigmas * func.coalesce(sd, 0.0), floor, 1e-12)
-    return case((identifiable, func.abs(drift) / limit), else_=-1.0)
+    return case((identifiable, func.abs(drift) / max(floor, 1e-12)), else_=-1.0)

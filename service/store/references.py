@@ -61,6 +61,7 @@ class SiteReferenceRecord(Record):
     walking_speed_mps: Mapped[float | None]
     doubts: Mapped[Reasons]
     window_from_s: Mapped[float | None]
+    changed_after_s: Mapped[float | None]
     changed_s: Mapped[float | None]
     answer: Mapped[Answer | None] = mapped_column(vocabulary(Answer, checked=False))
     answered_by: Mapped[str | None]

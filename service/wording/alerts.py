@@ -9,6 +9,7 @@ from service.wording.times import Clock
 KINDS = {
     AlertKind.DRIFT: "The camera moved",
     AlertKind.CLOCK: "The clock looks wrong",
+    AlertKind.UNSURE: "Something changed",
     AlertKind.NO_DATA: "No people come",
     AlertKind.STALE: "Its estimate is not being made",
     AlertKind.TRACKER: "Another tracker posts",

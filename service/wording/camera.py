@@ -8,7 +8,7 @@ from models.monitoring.verdict import Drift
 from models.reasons import Reason
 from service.enums import AlertKind, PoseState
 from service.reasons import ServiceCode
-from service.store.alerts import POSE_KINDS, AlertRecord
+from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.wording.alerts import KINDS
 from service.wording.moves import drift_words, moved_words, sure_words
@@ -17,6 +17,8 @@ from service.wording.times import Clock, duration
 
 STATES = {
     PoseState.DRIFTING: "Moved",
+    PoseState.UNSURE: "Unsure",
+    PoseState.SUSPECTED: "Maybe moved",
     PoseState.NO_DATA: "No people",
     PoseState.LEARNING: "Learning",
     PoseState.OK: "Steady",
@@ -24,6 +26,7 @@ STATES = {
 # The alerts that a state speaks for; every other one is named.
 _SPOKEN_FOR = {
     PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
+    PoseState.UNSURE: (AlertKind.UNSURE,),
     PoseState.NO_DATA: (AlertKind.NO_DATA,),
 }
 
@@ -61,7 +64,7 @@ def headline(camera: CameraFacts, clock: Clock) -> str:
 def _status_words(camera: CameraFacts, clock: Clock) -> str:
     state, estimate = camera.state, camera.estimate
     known = estimate is not None and bool(estimate.identifiable)
-    doubts = [alert for alert in camera.alerts if alert.kind in POSE_KINDS]
+    doubts = [alert for alert in camera.alerts if alert.kind in MOVED_KINDS]
     if state == PoseState.DRIFTING and not camera.judged:
         words = _moved(camera, estimate, clock) if estimate and known else _alarmed(doubts)
         return f"{words} That is what is known last: the next people will tell how it stands now."
@@ -69,13 +72,19 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
         return _moved(camera, estimate, clock)
     if doubts:  # of a reference, or about a move whose size is not identifiable
         return _alarmed(doubts)
+    if state == PoseState.UNSURE:
+        return (
+            "Something changed: people walk on none of the paths that were learned. The camera was "
+            "turned far, or people walk elsewhere; a look at its picture tells which."
+        )
     if state == PoseState.LEARNING or estimate is None or not camera.judged:
         return _waiting(camera)
     if state == PoseState.NO_DATA:
         return "When it was last told, it stood where it should."
-    if estimate.drift_streak > 0 or estimate.suspected:
+    if state == PoseState.SUSPECTED:
         how = moved_words(estimate)
-        return f"It may have moved{how and ': it ' + how}. The next people will tell."
+        share = f"{100 * estimate.moved:.0f} %"
+        return f"It may have moved ({share}){how and ': it ' + how}. The next people will tell."
     people = (
         f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
     )
@@ -140,6 +149,8 @@ def fleet_line(
         return f"learning what is usual: {learned} of {wanted} people"
     if state == PoseState.LEARNING:
         return "waiting for people to tell how it stands now"
+    if state == PoseState.UNSURE:
+        return "people walk on none of the learned paths: turned far, or they walk elsewhere"
     if state == PoseState.NO_DATA:
         return f"no people seen for {duration(silent_s)}, longer than is usual here"
     if state == PoseState.OK:
@@ -147,6 +158,8 @@ def fleet_line(
             return "standing still"
         return "where it should be, as somebody said; the next people will tell"
     moved = drift_words(drift)
+    if state == PoseState.SUSPECTED:
+        return f"may have moved{moved and ': ' + moved}"
     if moved and not judged:
         return f"{moved} when it was last told"
     return moved or "moved, but by how much is not told yet"

@@ -53,7 +53,7 @@ def _as_told(values: _Values) -> _Values:
 
 
 def _limit(v: _Values) -> str:
-    return f"{v['sigmas']:g} sd and {v['floor_deg']:g} deg or {v['floor_m']:g} m"
+    return f"{v['floor_deg']:g} deg or {v['floor_m']:g} m"
 
 
 def _numbers(v: _Values) -> str:
@@ -63,17 +63,20 @@ def _numbers(v: _Values) -> str:
             said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
         elif f"{name}_deg" in v:
             said.append(f"{name} {v[f'{name}_deg']:+.2f} deg (sd {v[f'{name}_sd_deg']:.2f})")
-    return ", ".join(said) + " against the prior pose"
+    return f"{', '.join(said)} against the prior pose; moved: {_percent(v['moved'])}"
+
+
+def _percent(share: float) -> str:
+    """A probability in words, never quite sure: "97 %", "under 1 %", "over 99.9 %"."""
+    if share < 0.01:
+        return "under 1 %"
+    if share > 0.999:
+        return "over 99.9 %"
+    return f"{100 * share:.1f} %" if share > 0.99 else f"{100 * share:.0f} %"
 
 
 def _beyond_before(v: _Values) -> str:
-    share = f"{100 * v['clear_ratio']:g} % of that, and so without the newest {v['people']} people"
-    return f"{_numbers(v)}: was beyond {_limit(v)}; it ends once all is below {share}"
-
-
-def _unconfirmed(v: _Values) -> str:
-    hold = f"without the newest {v['people']} people"
-    return f"{_numbers(v)}: beyond {_limit(v)}, but not so {hold}"
+    return f"{_numbers(v)}: was beyond {_limit(v)}; it ends once a move is unlikely"
 
 
 def _chart(v: _Values) -> str:
@@ -188,17 +191,23 @@ def _other_sources(v: _Values) -> str:
 
 # A text takes the values by their names.
 _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
-    TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}: beyond {_limit(v)}",
-    TracksCode.BEYOND_LIMITS_UNCONFIRMED: _unconfirmed,
+    TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}, by more than {_limit(v)}",
+    TracksCode.SUSPECTED: lambda v: f"{_numbers(v)}, which is not sure enough for an alert",
     TracksCode.BEYOND_LIMITS_BEFORE: _beyond_before,
     TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE: lambda v: (
         f"beyond {_limit(v)} when it was last told"
     ),
-    TracksCode.WITHIN_LIMITS: lambda v: f"{_numbers(v)}: not beyond {_limit(v)}",
+    TracksCode.WITHIN_LIMITS: _numbers,
     TracksCode.CHART: _chart,
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
-    TracksCode.PATHS_CHANGED: "the paths have changed: the flow map is left out",
+    TracksCode.PATHS_CHANGED: (
+        "people walk on none of the paths that were learned: the camera was turned far, or they "
+        "walk elsewhere"
+    ),
+    TracksCode.WAYS_CHANGED: (
+        "people walk the same ground other ways than they did: where they do tells no pose"
+    ),
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
     TracksCode.HEADING_UNIDENTIFIABLE: (
         "where people walk does not tell the heading (sd {heading_sd_deg:.1f} deg)"

@@ -9,7 +9,6 @@ import numpy as np
 from models.errors import CalibrationError
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
 from models.pose import CameraSite, PoseFinding
-from models.quantiles import Z90
 from studies.protocol.cases import ProtocolCase, angle_deg
 from studies.served.windows import Window, looks
 
@@ -19,18 +18,15 @@ class ParameterOutcome:
     """One parameter of a pose: degrees, or the log of the height.
 
     `moved` is how far it truly is from the prior pose, `error` how far off the truth the estimate
-    was, `sd` what it gave as its standard deviation. Only `identifiable` ones are served.
+    was, `sd` what it gave as its standard deviation, and `covered` says whether its 90 % interval
+    held the truth. Only `identifiable` ones are served.
     """
 
     moved: float
     error: float
     sd: float
     identifiable: bool
-
-    @property
-    def covered(self) -> bool:
-        """True where the 90 % interval holds the truth."""
-        return abs(self.error) <= Z90 * self.sd
+    covered: bool
 
     @property
     def off_sd(self) -> float:
@@ -94,18 +90,28 @@ def parameters_beside(
     found: PoseFinding, prior: CameraPose, truth: CameraPose
 ) -> tuple[ParameterOutcome, ...]:
     """Each parameter of a finding beside the truth."""
-    estimate = found.fused
-    sds = np.sqrt(np.diag(estimate.covariance))
-    columns = zip(PARAMETERS, array_of(prior), array_of(truth), estimate.values, sds, strict=True)
+    posterior = found.posterior
+    before = array_of(prior)
+    values, sds = before + posterior.offset, np.sqrt(np.diag(posterior.covariance))
+    identifiable = found.drift.identifiable
+    columns = zip(PARAMETERS, before, array_of(truth), values, sds, strict=True)
     return tuple(
         ParameterOutcome(
-            moved=_apart(name, before, true),
+            moved=_apart(name, still, true),
             error=_apart(name, true, value),
             sd=_apart(name, 0.0, sd),
-            identifiable=name in estimate.identifiable,
+            identifiable=name in identifiable,
+            covered=_covers(posterior.interval(name, 0.9), true - still, name),
         )
-        for name, before, true, value, sd in columns
+        for name, still, true, value, sd in columns
     )
+
+
+def _covers(interval: tuple[float, float], offset: float, name: str) -> bool:
+    """True where an interval holds an offset."""
+    low, high = interval
+    true = offset if name == "height" else math.remainder(offset, 2 * math.pi)
+    return bool(low <= true <= high)
 
 
 def _apart(name: str, one: float, other: float) -> float:

@@ -16,10 +16,8 @@ from models.pose import (
     AlarmRate,
     CameraSite,
     DriftLimits,
-    SecondLook,
     Trajectory,
     alarm_chart_result,
-    drift_of,
     learn_site,
     observe,
 )
@@ -142,15 +140,10 @@ def _watch(
     """Looks at tracks with their verdicts, each knowing the one before."""
     found: list[_Watched] = []
     drifted: tuple[str, ...] = ()
-
-    def second_look() -> SecondLook:
-        return SecondLook(limits=plan.limits, drifting=bool(drifted))
-
-    for look in looks(tracks, site, plan.window, second_look):
+    for look in looks(tracks, site, plan.window):
         finding = look.finding
         result = alarm_chart_result(look.seen, site, rate, first=finding.first)
-        earlier = None if finding.earlier is None else drift_of(finding.earlier, finding.prior)
-        verdict = judge(finding.drift, plan.limits, drifted, result, earlier)
+        verdict = judge(finding.drift, plan.limits, drifted, result)
         drifted = verdict.drifted
         found.append(_Watched(look=look, alarm=verdict.drifting))
     return found

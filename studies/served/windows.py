@@ -1,12 +1,12 @@
 """Tracks as they come to the service: in batches, the newest of them, from the newest change on."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.durations import DAY_S
-from models.pose import CameraSite, Observations, PoseFinding, SecondLook, Trajectory, observe
+from models.pose import CameraSite, Observations, PoseFinding, Trajectory, observe
 from models.tracks.observations import of_tracks
 from models.walking.config import FEWEST_WALKERS
 from studies.protocol.served import served_pose
@@ -42,12 +42,11 @@ def looks(
     tracks: Sequence[Trajectory],
     site: CameraSite,
     window: Window,
-    second_look: Callable[[], SecondLook] | None = None,
 ) -> Iterator[Look]:
     """The estimates of tracks that come in the order of their ends, as the service makes them.
 
     Once a change is found no window reaches back beyond it. Nothing is said of fewer than five
-    people who walk. A `second_look` is asked for before each estimate, if there is to be one.
+    people who walk.
 
     Raises:
         Exception: what a part failed with that the service would have done without.
@@ -65,7 +64,7 @@ def looks(
         seen = of_tracks(every, np.arange(first, came))
         if seen.walkers < FEWEST_WALKERS:
             continue
-        found = served_pose(seen, site, None if second_look is None else second_look())
+        found = served_pose(seen, site)
         cut = None if found.change_idx is None else first + found.change_idx
         if cut is not None:
             from_s = float(ended_s[cut])

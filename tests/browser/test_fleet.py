@@ -59,6 +59,9 @@ def test_cells_stand_under_their_heads_and_keep_to_themselves(page, fleet, width
     fleet.add("alpha", "Alpha")
     fleet.now -= timedelta(minutes=20)  # "29 minutes ago" is as wide as such words become
     fleet.knock("alpha", tilt_deg=4.0)
+    fleet.add("beta", "Beta")
+    fleet.knock("beta", kind="unsure", severity="warning")
+    fleet.add("gamma", "Gamma", state="suspected", tilt_deg=1.5)
     page.set_viewport_size({"width": width, "height": 700})
     page.goto("/")
     page.locator("#row-alpha.drifting").wait_for()
@@ -80,6 +83,14 @@ def test_cells_stand_under_their_heads_and_keep_to_themselves(page, fleet, width
     for column in (1, 2, 4, 5):  # a badge and a drawing have edges of their own
         assert texts[column][0] == pytest.approx(heads[column], abs=1)
         assert texts[column][1] <= rights[column] + 1
+    apart = page.evaluate(
+        """() => [...document.querySelectorAll("li.row")].map((row) =>
+          row.querySelector(".who").getBoundingClientRect().left
+          - row.querySelector(".badge").getBoundingClientRect().right)"""
+    )
+    assert len(apart) == 3  # a word of each state that asks for somebody
+    assert min(apart) > 0
+    shoot(page, f"fleet-states-{width}")
 
 
 def test_a_camera_that_comes_and_one_that_goes(page, fleet, server):
@@ -124,7 +135,7 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     page.keyboard.type("nor")
     assert shown(page) == ["North door", "North stairs"]
     assert page.locator("#found").inner_text() == "2 cameras"
-    for _ in range(3):  # the chips of moved, no people, learning
+    for _ in range(5):  # the chips of moved, unsure, maybe moved, no people, learning
         page.keyboard.press("Tab")
     page.keyboard.press("Space")
     assert shown(page) == ["North door"]

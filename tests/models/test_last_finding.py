@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.errors import CheckpointError
-from models.geometry.pose import CameraPose
+from models.geometry.pose import PARAMETERS, CameraPose
 from models.pose import (
     config,
     estimate_pose,
@@ -72,9 +72,9 @@ def apart(full, found):
     assert found.fused.identifiable == full.fused.identifiable
     assert found.fused.registered == full.fused.registered
     names = full.fused.identifiable
-    sd = np.array([full.drift.of(name)[1] for name in names])
-    by, by_sd = (np.array([found.drift.of(name)[place] for name in names]) for place in (0, 1))
-    off = np.abs(by - [full.drift.of(name)[0] for name in names]) / sd
+    at = [PARAMETERS.index(name) for name in names]
+    sd, by_sd = (np.sqrt(np.diag(each.fused.covariance))[at] for each in (full, found))
+    off = np.abs(found.fused.values - full.fused.values)[at] / sd
     return max([0.0, *off, *np.abs(by_sd / sd - 1)])
 
 

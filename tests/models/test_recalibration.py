@@ -9,11 +9,9 @@ from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
 from models.monitoring.group_scores import score_groups
-from models.monitoring.verdict import DriftLimits
 from models.paths.folds import fold_maps
 from models.pose import (
     AlarmRate,
-    SecondLook,
     alarm_chart_result,
     assume_site,
     estimate_pose,
@@ -34,9 +32,6 @@ from tests.models.sites import KNOCKED, LENS, PRIOR, near, seen, tracks_of
 
 CONFIG = SiteConfig(aside_m=0.8, standing_share=0.0)
 ONE_A_YEAR = AlarmRate(alarms_a_year=1.0, tracks_a_year=36_500.0)
-LIMITS = DriftLimits(
-    sigmas=5.0, floor_rad=np.radians(1.0), floor_m=0.3, people=12, clear_ratio=0.7
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -104,17 +99,6 @@ def test_the_chart_asks_those_after_the_change_who_count_or_else_all_who_do(site
     assert alarm_chart_result(window, site, ONE_A_YEAR, counted=nobody) is None
 
 
-def test_the_second_look_leaves_the_newest_people_out_where_a_verdict_may_change(site, tracks):
-    after = seen(tracks[2])
-    asked = SecondLook(limits=LIMITS, drifting=False)
-    found = estimate_pose(after, site, asked)
-    older = estimate_pose(of_tracks(after, np.arange(60 - LIMITS.people)), site)
-    np.testing.assert_array_equal(found.earlier.values, older.fused.values)
-    assert estimate_pose(after, site).earlier is None
-    assert estimate_pose(after, site, replace(asked, drifting=True)).earlier is None
-    assert estimate_pose(seen(tracks[2][:15]), site, asked).earlier is None  # 3 would be left
-
-
 def test_a_map_that_grows_keeps_how_people_walk_and_weighs_its_tracks(site, tracks):
     every = seen([*tracks[0], *tracks[1]])
     evenly = learn_site(every, LENS, PRIOR, speed_reference=site.speed_reference)
@@ -150,11 +134,11 @@ def test_few_people_make_no_map_and_fewer_no_site(tracks):
 def test_a_site_of_which_nothing_is_known_is_searched_for_no_change(window):
     site = assume_site(window, LENS, PRIOR)
     assert not site.learned
-    found = estimate_pose(window, site, SecondLook(limits=LIMITS, drifting=False))
+    found = estimate_pose(window, site)
     joint = joint_estimate(window, PRIOR, site.speed_reference)
     np.testing.assert_array_equal(found.joint.values, joint.values)
     np.testing.assert_array_equal(found.fused.values, by_speeds_alone(joint, PRIOR).values)
-    assert (found.change_idx, found.earlier) == (None, None)
+    assert found.change_idx is None
 
 
 @pytest.mark.parametrize("fails_at", ["search", "pose"])

@@ -7,7 +7,9 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
+from models.pose import pose_posterior
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
+from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
 from service.estimation.estimates import save_estimate
@@ -98,15 +100,16 @@ def made_up(
     unidentifiable=(),
     change=None,
     paths=False,
-    earlier: CameraPose | None = None,
+    changed=False,
 ) -> Finding:
     """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
-    Without the newest of them, they come to the `earlier` one: the same, if it is not said.
+    Where these have `changed`, people walk on none of them.
     """
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
     missing = f"the tracks cannot tell {' and '.join(unidentifiable)}"
     sd = np.array([math.radians(sd_deg), math.radians(sd_deg), sd_log])
+    sd[[name in unidentifiable for name in PLANE_PARAMETERS]] = 0.5  # radians, and log height
     joint = JointEstimate(
         values=values,
         covariance=np.diag(sd**2),
@@ -128,14 +131,13 @@ def made_up(
             reason=None,
             raw=np.append(values, pose.heading_rad) + 0.01,
         )
-    before = fused
-    if earlier is not None:
-        apart = [earlier.tilt_rad, earlier.roll_rad, math.log(earlier.height_m)]
-        before = replace(fused, values=np.array([*apart, earlier.heading_rad]))
+    if changed:
+        fused = replace(fused, reason=Reason(code=TracksCode.PATHS_CHANGED))
     return Finding(
         joint=joint,
         fused=fused,
-        earlier=before if asked_enough(evidence) else None,
+        posterior=pose_posterior(fused, joint.walking_groups, evidence.prior),
+        enough=asked_enough(evidence),
         averaged=None,
         reading=None,
         creep=None,

@@ -21,6 +21,8 @@ from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord
 from service.store.tracks import TrackRecord, pack
 
+STILL = ("ok", "unsure", "suspected")  # nothing is said to have moved
+MOVED = {"drifting": 0.999, "suspected": 0.8, "unsure": 0.4}
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 POSE = CameraPose(height_m=6.0, tilt_rad=math.radians(22), roll_rad=math.radians(1))
 PLACES = (
@@ -77,7 +79,8 @@ class Fleet:
         with self.store.write() as session:
             reference = references.newest(session, camera_id)
             drift = {"tilt_deg": tilt_deg, "pan_deg": -0.8, "height_m": -0.12}
-            last = self._estimates(camera_id, reference, "drifting", 8, drift, still=0.0)
+            state = "unsure" if kind == "unsure" else "drifting"
+            last = self._estimates(camera_id, reference, state, 8, drift, still=0.0)
             session.add_all(last)
             alert = open_alert(
                 session, self.settings, camera_id, kind, severity,
@@ -149,8 +152,10 @@ class Fleet:
                 drift_tilt_rad=tilt * share + noise(0, 0.0002),
                 drift_roll_rad=noise(0, 0.0003), drift_heading_rad=pan * share + noise(0, 0.0003),
                 drift_angle_rad=angle * share, suspected=False,
-                drift_streak=5 if share and state != "ok" else 0,
-                drifted=["tilt"] if share and state != "ok" else [], drift_since=None, raw={},
+                moved=MOVED.get(state, 0.03) if share else 0.03, moved_parameters={},
+                drift_streak=5 if share and state not in STILL else 0,
+                drifted=["tilt"] if share and state not in STILL else [],
+                drift_after=None, drift_since=None, raw={},
                 tracks=200, from_s=self.now.timestamp() - 9e4, to_s=self.now.timestamp(),
                 newest_track_pk=1, created_at=self.now - timedelta(minutes=count - n),
             )  # fmt: skip
@@ -178,11 +183,11 @@ def afternoon(fleet: Fleet, count: int) -> None:
 
 
 def every_state(fleet: Fleet, numbers: Iterable[int]) -> None:
-    """Cameras of some numbers, ten of which are in all states; the first three cost the most."""
+    """Cameras of some numbers, twelve of which are in all states; the first three cost the most."""
     for n in numbers:
         camera_id = f"cam-{n:03}"
         turned = {"tilt_deg": 1.5 + 0.01 * n, "pan_deg": -0.5, "height_m": 0.2}
-        match n % 10:
+        match n % 12:
             case 0:  # moved, and the newest people cannot tell how far
                 fleet.add(camera_id, state="drifting", **turned)
                 fleet.knock(camera_id, tilt_deg=2.0)
@@ -209,6 +214,11 @@ def every_state(fleet: Fleet, numbers: Iterable[int]) -> None:
             case 8:
                 fleet.add(camera_id, state="learning", tracks=5)
                 fleet.train(camera_id)
+            case 9:
+                fleet.add(camera_id)
+                fleet.knock(camera_id, kind="unsure", severity="warning")
+            case 10:
+                fleet.add(camera_id, state="suspected", **turned)
             case _:  # nothing told, no alert
                 fleet.add(camera_id)
                 fleet.tell_nothing(camera_id)

@@ -174,7 +174,7 @@ def test_a_recorded_camera_is_judged_still_and_knocked():
     if not folder.is_dir():
         pytest.skip(f"no recorded scenes in {SCENES}")
     limits = DriftLimits(
-        sigmas=5.0, floor_rad=math.radians(1), floor_m=0.3, people=12, clear_ratio=0.7
+        certainty=0.99, floor_rad=math.radians(1), floor_m=0.3, people=12, clear_ratio=0.7
     )
     found = judge_scene(
         load_scene(folder),

@@ -43,7 +43,7 @@ def test_a_knock_is_told_with_the_pose_and_intervals_that_hold_it(site, people):
     for name, (low, high) in intervals.items():
         assert low < getattr(truth, name) < high, name
     narrow = result.intervals(0.9)["tilt_deg"]
-    assert narrow[1] - narrow[0] == pytest.approx(2 * 1.6449 * result.sd["tilt_deg"], rel=1e-4)
+    assert narrow[1] - narrow[0] == pytest.approx(2 * 1.6449 * result.sd["tilt_deg"], rel=1e-2)
     moved_by = truth.tilt_deg - surefoot.Pose.of(PRIOR).tilt_deg
     assert result.drift["tilt_deg"] == pytest.approx(moved_by, abs=1)
 
@@ -146,7 +146,7 @@ def test_a_pose_keeps_its_angles():
 
 def test_a_drift_counts_from_where_the_service_counts_it():
     limits, ours = DriftLimits(), Settings.model_fields
-    assert ours["drift_sigmas"].default == limits.sigmas
+    assert ours["drift_certainty"].default == limits.certainty
     assert math.radians(ours["drift_floor_deg"].default) == limits.floor_rad
     assert ours["drift_floor_m"].default == limits.floor_m
     assert ours["drift_people"].default == limits.people

@@ -4,11 +4,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.geometry.pose import CameraPose, PoseParameters
+from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
 from models.monitoring.verdict import (
     DriftLimits,
-    asks_again,
+    MoveProbabilities,
     clock_fault,
     drift_between,
     judge,
@@ -17,7 +17,10 @@ from models.monitoring.verdict import (
 from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
-LIMITS = DriftLimits(sigmas=4.0, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7)
+LIMITS = DriftLimits(
+    certainty=0.99, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7
+)
+SURE = MoveProbabilities(moved=1.0, parameters=dict.fromkeys(PARAMETERS, 1.0))
 
 
 THREE = ("tilt", "roll", "height")
@@ -34,8 +37,9 @@ def drift(
     sd_log=0.002,
     unidentifiable=(),
     able=THREE,
+    move=SURE,
 ):
-    """An estimate that is so far from the prior pose; without what is `unidentifiable`."""
+    """A pose that is so far from the prior pose; without what is `unidentifiable`."""
     found = PoseParameters(
         height_m=height_m,
         tilt_rad=PRIOR.tilt_rad + math.radians(tilt_deg),
@@ -47,18 +51,23 @@ def drift(
         height_m=height_m * sd_log, tilt_rad=sd_rad, roll_rad=sd_rad, heading_rad=sd_rad
     )
     identifiable = tuple(name for name in able if name not in unidentifiable)
-    return drift_between(found, sd, identifiable, PRIOR)
+    return drift_between(found, sd, identifiable, PRIOR, move)
 
 
-def drifting(now, earlier, drifted=()):
-    """Whether a window tells a drift, by all of it and without its newest people."""
-    return judge(now, LIMITS, drifted, earlier=earlier).drifting
+def likely(moved, **parameters):
+    """A move of such a probability, in these parameters."""
+    shares = {name: parameters.get(name, 0.0) for name in PARAMETERS}
+    return MoveProbabilities(moved=moved, parameters=shares)
+
+
+def drifting(now, drifted=()):
+    return judge(now, LIMITS, drifted).drifting
 
 
 def test_drift_is_signed_and_roll_goes_round():
     values = np.array([0.3, math.radians(-178), math.log(5.0), 1.0])
     sd = PoseParameters.sd_of_array(np.eye(4) * 1e-6, 5.0)
-    found = drift_between(PoseParameters.of_array(values), sd, THREE, PRIOR)
+    found = drift_between(PoseParameters.of_array(values), sd, THREE, PRIOR, SURE)
     assert found.by.height_m == pytest.approx(-1.0)
     assert found.by.tilt_rad == pytest.approx(-0.1)
     assert found.by.roll_rad == pytest.approx(math.radians(3))
@@ -80,11 +89,11 @@ def test_a_told_heading_is_a_drift_clockwise_positive():
     assert math.degrees(found.by.heading_rad) == pytest.approx(5)
     assert pose_after(found, PRIOR).heading_rad == pytest.approx(PRIOR.heading_rad + 0.0872665)
     assert math.degrees(found.angle_rad) == pytest.approx(5)
-    verdict = judge(found, LIMITS, (), earlier=found)
+    verdict = judge(found, LIMITS, ())
     assert verdict.drifted == ("heading",)
     assert verdict.excess == pytest.approx(2.5)
     panned = drift(heading_deg=5)
-    assert (panned.angle_rad, judge(panned, LIMITS, (), earlier=panned).drifted) == (0.0, ())
+    assert (panned.angle_rad, judge(panned, LIMITS, ()).drifted) == (0.0, ())
     assert pose_after(panned, PRIOR).heading_rad == PRIOR.heading_rad
 
 
@@ -94,47 +103,32 @@ def test_a_heading_goes_round(prior_deg, served_deg):
     whole = round(prior_deg / 360) * 360  # as an estimator may see it
     values = np.array([0.4, prior.roll_rad, math.log(6), math.radians(prior_deg + 5 - whole)])
     sd = PoseParameters.sd_of_array(np.eye(4) * 1e-6, 6.0)
-    found = drift_between(PoseParameters.of_array(values), sd, FOUR, prior)
+    found = drift_between(PoseParameters.of_array(values), sd, FOUR, prior, SURE)
     assert math.degrees(found.by.heading_rad) == pytest.approx(5)
     assert math.degrees(pose_after(found, prior).heading_rad) == pytest.approx(served_deg)
 
 
-def test_a_drift_has_to_be_told_without_the_newest_people_too():
-    assert drifting(drift(5), drift(5))
-    assert drifting(drift(-5), drift(-4))
-    assert drifting(drift(height_m=5.4), drift(height_m=5.4))
-    assert not drifting(drift(5), drift())
-    assert not drifting(drift(5), drift(-5))  # the other way is no confirmation
-    assert not drifting(drift(5), drift(roll_deg=5))
-    assert not drifting(drift(5), None)  # too few are left to ask
-    assert not drifting(drift(), drift(5))
+def test_a_drift_is_certain_and_beyond_its_floor():
+    assert drifting(drift(2.1))
+    assert drifting(drift(-2.1))
+    assert drifting(drift(height_m=5.4))
+    assert not drifting(drift(1.9))
+    assert not drifting(drift(5, move=likely(0.98, tilt=0.98)))
+    assert drifting(drift(5, move=likely(0.995, tilt=0.6)))
+    assert not drifting(drift(5, move=likely(0.995, roll=0.9, tilt=0.4)))  # roll, which is small
 
 
-def test_the_larger_of_floor_and_sd_counts():
-    assert not drifting(drift(1.9), drift(1.9))
-    assert not drifting(drift(5, sd_deg=1.5), drift(5, sd_deg=1.5))
-    assert drifting(drift(6.1, sd_deg=1.5), drift(6.1, sd_deg=1.5))
-
-
-def test_it_clears_below_a_share_of_the_limits_only():
-    assert drifting(drift(1.7), drift(1.7), ("tilt",))
-    assert drifting(drift(1.3), drift(1.7), ("tilt",))
-    assert drifting(drift(1.7), drift(1.3), ("tilt",))
-    assert drifting(drift(1.3), None, ("tilt",))
-    assert not drifting(drift(1.3), drift(1.3), ("tilt",))
+def test_it_clears_where_a_move_is_unlikely_or_below_a_share_of_the_floor():
+    assert drifting(drift(1.5), ("tilt",))
+    assert not drifting(drift(1.3), ("tilt",))
+    assert drifting(drift(5, move=likely(0.6, tilt=0.6)), ("tilt",))
+    assert not drifting(drift(5, move=likely(0.4, tilt=0.4)), ("tilt",))
 
 
 def test_a_window_that_tells_nothing_changes_nothing():
     nothing = drift(5, unidentifiable=("tilt", "roll", "height"))
-    assert not drifting(nothing, nothing)
-    assert drifting(nothing, nothing, ("tilt",))
-
-
-def test_the_second_look_is_asked_for_where_a_verdict_may_change():
-    assert asks_again(drift(5), LIMITS, drifting=False)
-    assert not asks_again(drift(1.9), LIMITS, drifting=False)
-    assert asks_again(drift(1.3), LIMITS, drifting=True)
-    assert not asks_again(drift(1.5), LIMITS, drifting=True)
+    assert not drifting(nothing)
+    assert drifting(nothing, ("tilt",))
 
 
 def charted(statistic, parameter=3):
@@ -156,34 +150,31 @@ def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
     assert verdict.drifted == ("tilt",)  # the pose says better which
     assert not judge(drift(), LIMITS, (), charted(9.5)).drifting
     for statistic, holds in ((7.5, True), (6.5, False)):
-        still = judge(drift(), LIMITS, alarmed.drifted, charted(statistic), drift())
+        still = judge(drift(), LIMITS, alarmed.drifted, charted(statistic))
         assert still.drifting == holds
-    assert judge(drift(), LIMITS, alarmed.drifted, charted(6.5), drift(1.5)).drifting
+    assert judge(drift(1.5), LIMITS, alarmed.drifted, charted(6.5)).drifting
     unknown = drift(unidentifiable=THREE)
     assert judge(unknown, LIMITS, (), charted(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():
-    assert drifting(drift(unidentifiable=("tilt",)), drift(unidentifiable=("tilt",)), ("tilt",))
-    assert drifting(drift(), drift(unidentifiable=("tilt",)), ("tilt",))
-    assert not drifting(drift(unidentifiable=("roll",)), drift(unidentifiable=("roll",)), ("tilt",))
+    assert drifting(drift(unidentifiable=("tilt",)), ("tilt",))
+    assert not drifting(drift(unidentifiable=("roll",)), ("tilt",))
 
 
 def test_a_clock_fault_is_a_jump_in_scale_alone():
-    found = clock_fault(drift(height_m=7.2), PRIOR, 25.0)
+    scale = likely(1.0, height=1.0)
+    found = clock_fault(drift(height_m=7.2, move=scale), 0.2, PRIOR, 25.0)
     assert found is not None
     assert found.code is TracksCode.SCALE_CHANGED
     assert found.values == {"factor": pytest.approx(1.2), "rate_hz": 25.0}
-    assert clock_fault(drift(height_m=7.2, heading_deg=0.05, able=FOUR), PRIOR, 25.0) == found
-    lowered = clock_fault(drift(height_m=5.0), PRIOR, None)
+    lowered = clock_fault(drift(height_m=5.0, move=scale), 0.2, PRIOR, None)
     assert lowered is not None
     assert lowered.values == {"factor": pytest.approx(5 / 6), "rate_hz": 25.0}
+    assert clock_fault(drift(height_m=7.2, move=scale), 0.3, PRIOR, 25.0) is None  # maybe turned
     for found in (
-        drift(height_m=6.4),  # 7 %: under the least
-        drift(height_m=7.2, sd_log=0.05),  # within its deviation
-        drift(0.2, height_m=7.2),  # turned, by four deviations
-        drift(1.1, height_m=7.2, sd_deg=2),  # turned, by more than a degree
-        drift(height_m=7.2, unidentifiable=("roll",)),  # may have turned
-        drift(height_m=7.2, heading_deg=1.1, able=FOUR),  # has panned
+        drift(height_m=6.4, move=scale),  # 7 %: under the least
+        drift(height_m=7.2, move=likely(0.6, height=0.4)),  # hardly of the height
+        drift(height_m=7.2, move=scale, unidentifiable=("roll",)),
     ):
-        assert clock_fault(found, PRIOR, 25.0) is None
+        assert clock_fault(found, 0.2, PRIOR, 25.0) is None

@@ -12,7 +12,6 @@ from models.paths.registration import Belief
 from models.pose.fusion import fused_estimate
 from models.pose.modes import birge_ratio
 from models.pose.site import CameraSite
-from models.reasons import TracksCode
 from models.simulation.walkers import WalkConfig
 from models.walking.estimate import joint_at_heading, joint_estimate
 from models.walking.reference_learning import learn_speed_reference
@@ -87,16 +86,16 @@ def test_what_contradicts_is_less_sure_by_as_much():
     assert birge_ratio(belief, known, np.array([0.1, 0.0, 0.0, 0.0])) == 1.0
 
 
-def test_no_heading_is_identifiable_at_the_edge_of_the_search(lanes, site):
-    tracks = walk(lanes, panned(33), 120, 7)
-    joint, found = fused(tracks, site)
-    assert "heading" not in found.identifiable
-    assert found.reason is not None
-    assert found.reason.code in (
-        TracksCode.HEADING_UNIDENTIFIABLE,
-        TracksCode.HEADING_AMBIGUOUS,
-        TracksCode.PATHS_CHANGED,
-    )
+@pytest.mark.parametrize("turn_deg", [-45, -31, 33, 40])
+def test_a_camera_that_was_turned_far_is_found(lanes, site, turn_deg):
+    tracks = walk(lanes, panned(turn_deg), 120, 7)
+    _, found = fused(tracks, site)
+    assert found.registered
+    turn = math.degrees(found.values[3] - PRIOR.heading_rad)
+    sd = math.degrees(math.sqrt(found.covariance[3, 3]))
+    assert turn == pytest.approx(turn_deg, abs=max(3 * sd, 1.0))
+    assert sd < 6
+    assert found.prior_loss > 3
 
 
 def test_no_heading_is_identifiable_of_people_on_ground_that_the_reference_never_saw(lanes, site):

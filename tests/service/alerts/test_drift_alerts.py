@@ -10,13 +10,13 @@ from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 
 
-def test_a_drift_fires_once_it_holds_without_the_newest_people_and_is_one_alert(bench):
+def test_a_drift_fires_once_it_is_certain_and_is_one_alert(bench):
     knocked = moved(tilt_deg=5.0)
     assert bench.see(PRIOR).state == "ok"
-    for _ in range(5):  # a freak dozen, looked at time and again
-        assert bench.see(knocked, earlier=PRIOR).state == "ok"
+    for _ in range(5):  # a freak hour, looked at time and again
+        assert bench.see(knocked, sd_deg=1.1).state == "suspected"
     assert bench.alerts() == []
-    assert "but not so without the newest 12 people" in bench.pose()["reason"]
+    assert "which is not sure enough for an alert" in bench.pose()["reason"]
     assert bench.see(knocked).state == "drifting"
     bench.see(knocked)
     (alert,) = bench.alerts(state="firing")
@@ -31,10 +31,11 @@ def test_a_drift_fires_once_it_holds_without_the_newest_people_and_is_one_alert(
 
 def test_a_drift_below_the_floor_or_within_its_sd_is_none(bench):
     for _ in range(5):
-        bench.see(moved(tilt_deg=0.95, roll_deg=-0.95, height_m=0.28))
-    assert bench.pose()["state"] == "ok"
+        bench.see(moved(tilt_deg=0.9), sd_deg=0.05)  # it certainly moved, and by too little
+    assert bench.pose()["moved"] > 0.99
+    assert bench.pose()["state"] == "suspected"
     for _ in range(5):
-        bench.see(moved(tilt_deg=5.0), sd_deg=1.1)  # 5 sd = 5.5 deg
+        bench.see(moved(tilt_deg=2.0), sd_deg=1.0)  # which people do without any move
     assert bench.pose()["state"] == "ok"
     assert bench.alerts() == []
 
@@ -43,15 +44,14 @@ def test_an_alert_clears_with_hysteresis(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=1.5))
     for _ in range(4):
-        bench.see(moved(tilt_deg=0.8))  # below the limit of 1 deg, not below 0.7 of it
+        bench.see(moved(tilt_deg=0.8), sd_deg=0.1)  # below the floor of 1 deg, not 0.7 of it
     assert len(bench.alerts(state="firing")) == 1
-    for _ in range(2):
-        bench.see(PRIOR, earlier=moved(tilt_deg=0.8))
-    assert len(bench.alerts(state="firing")) == 1
-    assert "it ends once all is below 70 % of that" in bench.pose()["reason"]
-    bench.see(PRIOR)
+    assert "it ends once a move is unlikely" in bench.pose()["reason"]
+    bench.see(moved(tilt_deg=0.6), sd_deg=0.05)
     (alert,) = bench.alerts()
     assert (alert["state"], alert["outcome"]) == ("resolved", "cleared")
+    assert bench.pose()["state"] == "suspected"
+    bench.see(PRIOR)
     assert bench.pose()["state"] == "ok"
 
 
@@ -61,13 +61,13 @@ def test_a_far_move_queues_one_training_around_the_estimate(bench):
         bench.see(far)
     body = bench.pose()
     assert body["state"] == "drifting"
-    assert body["pose"]["tilt_deg"] == pytest.approx(36.0)
+    assert body["pose"]["tilt_deg"] == pytest.approx(36.0, abs=0.02)
     assert [alert["kind"] for alert in bench.alerts(state="firing")] == ["drift"]
     queued, first = bench.trainings()
     assert (queued["state"], first["state"], first["around"]) == ("queued", "succeeded", None)
-    assert queued["around"]["tilt_deg"] == pytest.approx(36.0)
+    assert queued["around"]["tilt_deg"] == pytest.approx(36.0, abs=0.02)
     plan = bench.publish()
-    assert plan.prior_pose.tilt_rad == pytest.approx(far.tilt_rad)
+    assert plan.prior_pose.tilt_rad == pytest.approx(far.tilt_rad, abs=4e-4)
     assert plan.prior_pose.heading_rad == PRIOR.heading_rad
     bench.see(far)
     assert bench.pose()["state"] == "drifting"
@@ -82,7 +82,7 @@ def test_a_pan_alone_fires_and_clears_as_any_drift(bench):
     assert (alert["kind"], alert["severity"]) == ("drift", "critical")
     assert alert["drift"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
     assert alert["drift"]["angle_deg"] == pytest.approx(5.0, abs=0.5)
-    assert "heading -5.00 deg" in alert["reason"]
+    assert "heading -4.99 deg" in alert["reason"]
     assert alert["reason_code"] == "beyond_limits"
     assert alert["reason_values"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
     assert alert["reason_values"]["floor_deg"] == pytest.approx(1.0)
@@ -133,7 +133,7 @@ def test_a_jump_in_scale_alone_is_named_a_clock_fault(bench):
     assert "as if 30 frames a second were taken for 25" in body["reason"]
     (alert,) = bench.alerts()
     assert (alert["kind"], alert["state"]) == ("clock", "firing")
-    assert alert["drift"]["height_m"] == pytest.approx(1.2)
+    assert alert["drift"]["height_m"] == pytest.approx(1.2, abs=0.02)
     assert "+20 %" in alert["reason"]
     for _ in range(3):
         bench.see(PRIOR)
@@ -161,7 +161,10 @@ def test_the_alert_says_when_the_camera_moved(bench):
     for _ in range(2):
         bench.see(moved(tilt_deg=5.0))
     (alert,) = bench.alerts(state="firing")
-    assert datetime.fromisoformat(alert["changed_at"]).timestamp() == pytest.approx(first)
+    # The person before walked on for some seconds beside the first one after it.
+    since = [datetime.fromisoformat(alert["since"][end]).timestamp() for end in ("after", "before")]
+    assert since == pytest.approx([first, first - 1 + 0.4 * 19])
+    assert alert["changed_at"] == alert["since"]["before"]
     body = bench.pose()
     assert datetime.fromisoformat(body["from"]).timestamp() >= first
 
@@ -176,7 +179,6 @@ def test_an_alert_of_before_a_reference_ends_by_what_is_seen_after_it_alone(benc
     bench.learn()
     for _ in range(3):
         bench.see(PRIOR, unidentifiable=("tilt",))  # what had drifted has to be told to end
-    bench.see(PRIOR, earlier=moved(tilt_deg=0.8))
     assert len(bench.alerts(state="firing")) == 1
     bench.see(PRIOR)
     assert bench.alerts(state="firing") == []

@@ -84,7 +84,7 @@ def test_it_is_ended_early_taken_back_or_moved(corner):
 
 
 def test_no_alert_opens_while_it_lasts_and_the_pose_says_why(bench):
-    bench.see(moved(tilt_deg=5.0), earlier=PRIOR)
+    bench.see(PRIOR)
     begin(bench.http, reason="new lens")
     assert bench.see(moved(tilt_deg=5.0)) is None  # of before the window: judged no more
     assert bench.alerts() == []

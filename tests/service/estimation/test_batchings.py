@@ -54,6 +54,7 @@ def at_random(seed):
     return sizes
 
 
+STANDS = "learning"  # of people who walk everywhere alike: a turn would not be noticed
 BATCHINGS = [
     pytest.param(at_once, id="at once"),
     pytest.param(at_random(1), id="at random", marks=pytest.mark.slow),
@@ -64,9 +65,9 @@ BATCHINGS = [
 @pytest.mark.parametrize(
     ("later", "end"),
     [
-        pytest.param([PRIOR], ("ok", []), id="still"),
+        pytest.param([PRIOR], (STANDS, []), id="still"),
         pytest.param([KNOCKED], ("drifting", ["drift"]), id="knocked"),
-        pytest.param([KNOCKED, PRIOR], ("ok", []), id="knocked and put back"),
+        pytest.param([KNOCKED, PRIOR], (STANDS, []), id="knocked and put back"),
     ],
 )
 def test_it_matters_not_how_tracks_were_posted(recording, later, end, sizes):
@@ -84,9 +85,9 @@ def test_it_matters_not_if_they_are_posted_one_by_one(recording):
     recording.walk(PRIOR, REFERENCE)
     recording.play([REFERENCE])
     for pose, count, end in (
-        (PRIOR, STILL, ("ok", [])),
+        (PRIOR, STILL, (STANDS, [])),
         (KNOCKED, LATER, ("drifting", ["drift"])),
-        (PRIOR, LATER, ("ok", [])),
+        (PRIOR, LATER, (STANDS, [])),
     ):
         recording.walk(pose, count)
         recording.play([1] * count)

@@ -88,7 +88,7 @@ def test_new_paths_leave_the_map_out_and_say_so(street):
     street.keep_to_lanes(PRIOR, 50)
     street.cross(PRIOR, 80)
     body = street.look()
-    assert "the paths have changed: the flow map is left out" in body["reason"]
+    assert "people walk on none of the paths that were learned" in body["reason"]
     assert "heading_deg" not in body["estimated"]
     assert body["pose"]["heading_deg"] == pytest.approx(40)
     assert "registered" not in body["estimates"]

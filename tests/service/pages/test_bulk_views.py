@@ -39,7 +39,7 @@ def said(http, fleet):
 
 
 def test_a_fleet_in_all_states_is_told_of_as_before(http, fleet):
-    every_state(fleet, range(20))
+    every_state(fleet, range(24))
     found, golden = said(http, fleet), json.loads(GOLDEN.read_text())
     assert found["metrics"] == golden["metrics"]
     assert found["rows"] == golden["rows"]
@@ -61,5 +61,5 @@ def test_as_many_statements_are_asked_for_many_cameras_as_for_few(fleet, setting
 
     every_state(fleet, range(3))
     few = statements()
-    every_state(fleet, range(3, 30))
+    every_state(fleet, range(3, 36))
     assert statements() == few <= 15

@@ -43,7 +43,7 @@ def test_a_new_camera_says_how_much_is_missing(corner):
 def test_a_still_camera_says_so_and_by_whom(bench):
     bench.see(PRIOR, paths=True)
     assert headline(bench.http) == (
-        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.3°."
+        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.2°."
     )
 
 
@@ -60,13 +60,13 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
     assert "A person at 10 m is now placed 2.4 m too far" in text
     assert 'class="grid served"' in text
     assert text.count('data-act="acknowledge"') == 1
-    assert "beyond 5 sd" in text  # the reason, as the API says it
+    assert "by more than 1 deg or 0.3 m" in text  # the reason, as the API says it
 
 
 def test_it_may_have_moved_before_an_alert_says_so(bench):
-    bench.see(moved(tilt_deg=5.0), earlier=PRIOR)
+    bench.see(moved(tilt_deg=5.0), sd_deg=1.1)
     assert headline(bench.http) == (
-        "It may have moved: it turned 5.0° (tilt +5.0°). The next people will tell."
+        "It may have moved (89 %): it turned 4.1° (tilt +4.1°). The next people will tell."
     )
 
 

@@ -12,6 +12,7 @@ from models.monitoring.verdict import (
     Drift,
     DriftLimits,
     DriftVerdict,
+    MoveProbabilities,
     reason_of_chart,
     reason_of_drift,
 )
@@ -28,26 +29,28 @@ from service.reasons import (
 )
 from service.wording.reasons import group_in_words, in_words
 
-LIMITS = {
-    "sigmas": 5.0, "floor_rad": math.radians(0.5), "floor_m": 0.2, "people": 12, "clear_ratio": 0.7,
-}  # fmt: skip
+LIMITS = {"certainty": 0.99, "floor_rad": math.radians(0.5), "floor_m": 0.2}
+SURE, MAYBE, HARDLY = {"moved": 0.9996}, {"moved": 0.87}, {"moved": 0.004}
 TILT = {"tilt_rad": math.radians(3.1), "tilt_sd_rad": math.radians(0.3)}
 HEIGHT = {"height_m": -0.234, "height_sd_m": 0.1}
 T, S = TracksCode, ServiceCode
 SAID = [
-    (T.BEYOND_LIMITS, {**LIMITS, **TILT, **HEIGHT},
-     "tilt +3.10 deg (sd 0.30), height -0.23 m (sd 0.10) against the prior pose: "
-     "beyond 5 sd and 0.5 deg or 0.2 m"),
-    (T.BEYOND_LIMITS_UNCONFIRMED, {**LIMITS, **TILT},
-     "tilt +3.10 deg (sd 0.30) against the prior pose: beyond 5 sd and 0.5 deg or 0.2 m, "
-     "but not so without the newest 12 people"),
-    (T.BEYOND_LIMITS_BEFORE, {**LIMITS, **TILT},
-     "tilt +3.10 deg (sd 0.30) against the prior pose: was beyond 5 sd and 0.5 deg or 0.2 m; it "
-     "ends once all is below 70 % of that, and so without the newest 12 people"),
-    (T.BEYOND_LIMITS_LAST_IDENTIFIABLE, LIMITS,
-     "beyond 5 sd and 0.5 deg or 0.2 m when it was last told"),
-    (T.WITHIN_LIMITS, {**LIMITS, **TILT},
-     "tilt +3.10 deg (sd 0.30) against the prior pose: not beyond 5 sd and 0.5 deg or 0.2 m"),
+    (T.BEYOND_LIMITS, {**LIMITS, **SURE, **TILT, **HEIGHT},
+     "tilt +3.10 deg (sd 0.30), height -0.23 m (sd 0.10) against the prior pose; "
+     "moved: over 99.9 %, by more than 0.5 deg or 0.2 m"),
+    (T.BEYOND_LIMITS, {**LIMITS, "moved": 0.9954, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose; moved: 99.5 %, "
+     "by more than 0.5 deg or 0.2 m"),
+    (T.SUSPECTED, {**LIMITS, **MAYBE, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose; moved: 87 %, "
+     "which is not sure enough for an alert"),
+    (T.BEYOND_LIMITS_BEFORE, {**LIMITS, **MAYBE, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose; moved: 87 %: "
+     "was beyond 0.5 deg or 0.2 m; it ends once a move is unlikely"),
+    (T.BEYOND_LIMITS_LAST_IDENTIFIABLE, {**LIMITS, **MAYBE},
+     "beyond 0.5 deg or 0.2 m when it was last told"),
+    (T.WITHIN_LIMITS, {**LIMITS, **HARDLY, **TILT},
+     "tilt +3.10 deg (sd 0.30) against the prior pose; moved: under 1 %"),
     (T.CHART, {"number": "heading", "sign": -1, "parties": 20, "statistic": 30.4, "level": 8.6},
      "the last 20 walking groups walk as they would if the heading had gone down "
      "(drift chart: 30, alarm at 9)"),
@@ -64,7 +67,11 @@ SAID = [
     (T.SCALE_CHANGED, {"factor": 0.8, "rate_hz": 25.0},
      "the scale has changed by -20 % and the angles have not: as if 20 frames a second were taken "
      "for 25, or the camera was lowered"),
-    (T.PATHS_CHANGED, {}, "the paths have changed: the flow map is left out"),
+    (T.WAYS_CHANGED, {},
+     "people walk the same ground other ways than they did: where they do tells no pose"),
+    (T.PATHS_CHANGED, {},
+     "people walk on none of the paths that were learned: the camera was turned far, or they walk "
+     "elsewhere"),
     (T.HEADING_AMBIGUOUS, {"turns_rad": [math.radians(-12), math.radians(0.04)]},
      "turns of -12.0 deg and +0.0 deg explain where people walk about as well"),
     (T.HEADING_UNIDENTIFIABLE, {"heading_sd_rad": math.radians(4.26)},
@@ -151,10 +158,10 @@ def test_every_code_has_words():
 
 def test_reasons_are_said_one_after_the_other():
     assert in_words(()) == ""
-    changed = Reason(code=T.PATHS_CHANGED)
+    changed = Reason(code=T.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": 0.1})
     missing = Reason(code=S.REFERENCE_TRACKS, values={"tracks": 1, "wanted": 2})
     assert in_words((Reason(code=S.LAST_IDENTIFIABLE), changed, missing)) == (
-        "when it was last told: the paths have changed: the flow map is left out; "
+        "when it was last told: where people walk does not tell the heading (sd 5.7 deg); "
         "1 of 2 reference tracks"
     )
     assert in_words(some(None, *as_said("far"), None)) == "far"
@@ -168,13 +175,13 @@ def test_a_group_is_said_beside_its_trackers_name_without_it():
 
 def test_clients_get_the_first_code_and_its_angles_in_degrees():
     reasons = (
-        Reason(code=T.WITHIN_LIMITS, values={**LIMITS, **TILT}),
+        Reason(code=T.WITHIN_LIMITS, values={**LIMITS, **HARDLY, **TILT}),
         Reason(code=T.HEADING_AMBIGUOUS, values={"turns_rad": [0.1]}),
     )
     assert code_of(reasons) == "within_limits"
     assert values_of(reasons) == {
-        "sigmas": 5.0, "floor_deg": pytest.approx(0.5), "floor_m": 0.2, "people": 12,
-        "clear_ratio": 0.7, "tilt_deg": pytest.approx(3.1), "tilt_sd_deg": pytest.approx(0.3),
+        "moved": 0.004, "certainty": 0.99, "floor_deg": pytest.approx(0.5), "floor_m": 0.2,
+        "tilt_deg": pytest.approx(3.1), "tilt_sd_deg": pytest.approx(0.3),
     }  # fmt: skip
     assert values_of(reasons[1:]) == {"turns_deg": [pytest.approx(math.degrees(0.1))]}
     assert (code_of(()), values_of(())) == (None, {})
@@ -184,30 +191,34 @@ DRIFT = Drift(
     by=PoseParameters(height_m=0.3, tilt_rad=0.1, roll_rad=0.0, heading_rad=0.2),
     sd=PoseParameters(height_m=0.1, tilt_rad=0.01, roll_rad=0.01, heading_rad=0.01),
     angle_rad=0.1, identifiable=("tilt", "heading"),
+    move=MoveProbabilities(moved=0.004, parameters={}),
 )  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("excess", "drifted", "identifiable", "code"),
+    ("excess", "drifted", "identifiable", "moved", "code"),
     [
-        (1.5, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS),
-        (0.8, ("tilt",), DRIFT.identifiable, T.BEYOND_LIMITS_BEFORE),
-        (1.5, (), DRIFT.identifiable, T.BEYOND_LIMITS_UNCONFIRMED),
-        (0.8, (), DRIFT.identifiable, T.WITHIN_LIMITS),
-        (0.0, ("tilt",), (), T.BEYOND_LIMITS_LAST_IDENTIFIABLE),
+        (1.5, ("tilt",), DRIFT.identifiable, 0.999, T.BEYOND_LIMITS),
+        (0.8, ("tilt",), DRIFT.identifiable, 0.999, T.BEYOND_LIMITS_BEFORE),
+        (0.0, (), DRIFT.identifiable, 0.5, T.SUSPECTED),
+        (0.0, (), DRIFT.identifiable, 0.49, T.WITHIN_LIMITS),
+        (0.0, ("tilt",), (), 0.999, T.BEYOND_LIMITS_LAST_IDENTIFIABLE),
     ],
 )
-def test_a_verdict_gives_what_is_identifiable_as_its_reason(excess, drifted, identifiable, code):
+def test_a_verdict_gives_what_is_identifiable_as_its_reason(
+    excess, drifted, identifiable, moved, code
+):
     verdict = DriftVerdict(streak=0, excess=excess, drifted=drifted)
+    move = MoveProbabilities(moved=moved, parameters={})
     reason = reason_of_drift(
-        replace(DRIFT, identifiable=identifiable), verdict, DriftLimits(**LIMITS)
+        replace(DRIFT, identifiable=identifiable, move=move), verdict, DriftLimits(**LIMITS)
     )
     assert reason is not None
     assert reason.code is code
     numbers = {} if not identifiable else {
         "tilt_rad": 0.1, "tilt_sd_rad": 0.01, "heading_rad": 0.2, "heading_sd_rad": 0.01,
     }  # fmt: skip
-    assert reason.values == {**LIMITS, **numbers}
+    assert reason.values == {**LIMITS, "moved": moved, **numbers}
 
 
 def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():

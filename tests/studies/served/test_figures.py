@@ -7,7 +7,7 @@ import pytest
 from studies.served.figures import figures_of
 from studies.served.outcomes import ParameterOutcome, ServedOutcome
 
-RIGHT = ParameterOutcome(moved=0.0, error=0.0, sd=0.5, identifiable=True)
+RIGHT = ParameterOutcome(moved=0.0, error=0.0, sd=0.5, identifiable=True, covered=True)
 
 
 def outcome(
@@ -28,9 +28,9 @@ def outcome(
 
 
 def test_errors_and_coverage_are_of_identifiable_parameters():
-    off = replace(RIGHT, error=-1.0)  # 2 sd: outside of 1.645
+    off = replace(RIGHT, error=-1.0, covered=False)
     untold = replace(RIGHT, error=9.0, sd=3.0, identifiable=False)
-    far = replace(RIGHT, error=2.6)  # 5.2 sd
+    far = replace(RIGHT, error=2.6, covered=False)  # 5.2 sd
     said = figures_of(
         [
             outcome(RIGHT, off, untold, RIGHT, rotation_deg=1.0),

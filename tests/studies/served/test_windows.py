@@ -117,7 +117,7 @@ def test_a_replay_tells_before_from_after_a_move():
         ),
     )
     limits = DriftLimits(
-        sigmas=5.0, floor_rad=math.radians(1), floor_m=0.3, people=12, clear_ratio=0.7
+        certainty=0.99, floor_rad=math.radians(1), floor_m=0.3, people=12, clear_ratio=0.7
     )
     plan = ReplayPlan(window=Window(batch=30), limits=limits, alarms_a_year=1.0)
     still = replay(scene, None, 0, 120, plan)

@@ -20,12 +20,17 @@ from studies.served.tables import BETWEEN, all_tables
 from studies.served.tasks import CaseId, CaseResult, Table, tasks_of
 from tests.studies.test_partings import scene_of
 
-NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True)
+NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True, covered=True)
 SERVED = ServedOutcome(
     reference_tracks=100,
     seen_tracks=50,
     used_tracks=45,
-    parameters=(NUMBER, replace(NUMBER, error=1.0), replace(NUMBER, error=0.01, sd=0.02), NUMBER),
+    parameters=(
+        NUMBER,
+        replace(NUMBER, error=1.0, covered=False),
+        replace(NUMBER, error=0.01, sd=0.02),
+        NUMBER,
+    ),
     rotation_deg=0.75,
     height_error=0.0123,
     cuts=1,

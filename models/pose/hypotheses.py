@@ -1,0 +1,226 @@
+"""The posterior over what moved: the camera stands, or moved in some of its four parameters.
+
+A camera on a wall moves seldom, and mostly in one or two of tilt, roll, height and heading. To
+estimate all four anew of every window makes a still camera jitter with the hour's people, and lets
+the height take what the tilt should have.
+
+Ours: each subset M of the parameters is a hypothesis, p(M | d) ~ p(M) t(d; 0, C + P_M, dof), with d
+the estimate less the prior pose, C its covariance and P_M what a move in M comes to, near or far.
+Source: Raftery 1995, the average over models; Lange, Little and Taylor 1989, Student's t.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.special import gammaln, log_ndtr, logsumexp
+
+from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.rotation import Array
+from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
+from models.pose import config
+from models.pose.pose_fit import FusedEstimate
+from models.walking.config import FEWEST_GROUPS
+
+_SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
+# Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
+_MOVED_IN = np.concatenate([_SUBSETS[:1], _SUBSETS[1:], _SUBSETS[1:]])
+_FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PosePosterior:
+    """A mixture over hypotheses: weights (K,), means (K, 4) and covariances (K, 4, 4).
+
+    Means are offsets of tilt, roll, log height and heading from the prior pose. `moved_in` (K, 4)
+    says which parameters moved by each hypothesis; by the first, none did. Of those that are not
+    `seen` (4,), the tracks say nothing.
+    """
+
+    prior: CameraPose
+    weights: Array
+    means: Array
+    covariances: Array
+    moved_in: Array
+    seen: Array
+
+    @property
+    def moved(self) -> float:
+        """The probability that the camera moved."""
+        return float(self.weights[1:].sum())
+
+    @property
+    def move(self) -> MoveProbabilities:
+        """How likely a move is, and of what."""
+        shares = (self.weights @ self.moved_in).tolist()
+        return MoveProbabilities(
+            moved=self.moved, parameters=dict(zip(PARAMETERS, shares, strict=True))
+        )
+
+    @property
+    def turned(self) -> float:
+        """The probability that an angle which the tracks tell changed, if the camera moved."""
+        angles = self.seen & [name != "height" for name in PARAMETERS]
+        turned = float(self.weights @ self.moved_in[:, angles].any(axis=1))
+        return turned / max(self.moved, 1e-300)
+
+    @property
+    def offset(self) -> Array:
+        """The mean offset (4,)."""
+        return np.asarray(self.weights @ self.means)
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance (4, 4) of the mixture."""
+        apart = self.means - self.offset
+        between = np.einsum("k,ki,kj->ij", self.weights, apart, apart)
+        return np.asarray(np.einsum("k,kij->ij", self.weights, self.covariances) + between)
+
+    @property
+    def parameters(self) -> PoseParameters:
+        """The pose, named."""
+        return PoseParameters.of_array(array_of(self.prior) + self.offset)
+
+    @property
+    def sd(self) -> PoseParameters:
+        """The standard deviations, named."""
+        return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
+
+    def interval(self, name: str, level: float) -> tuple[float, float]:
+        """The central interval of a parameter's offset that holds it with a probability.
+
+        Of a mixture: where the camera surely stands it is as narrow as that is known.
+        """
+        at = PARAMETERS.index(name)
+        means, sds = self.means[:, at], np.sqrt(self.covariances[:, at, at])
+        tails = ((1 - level) / 2, (1 + level) / 2)
+        low, high = (_quantile(self.weights, means, sds, tail) for tail in tails)
+        return low, high
+
+
+def pose_posterior(
+    fused: FusedEstimate,
+    walking_groups: int,
+    prior: CameraPose,
+    moved_prior: float = config.MOVED_PRIOR,
+) -> PosePosterior:
+    """The posterior over what moved, by an estimate of a window.
+
+    Args:
+        fused: of the window. Of one whose heading the paths do not hold, the heading says nothing.
+        walking_groups: that it is of: few tell less surely what their covariance is, and too few
+            nothing.
+        prior: the prior pose.
+        moved_prior: how likely it is, before any track, that the camera has moved.
+    """
+    enough = walking_groups >= FEWEST_GROUPS
+    seen = np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
+    offset = fused.values - array_of(prior)
+    offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
+    noise = fused.covariance[np.ix_(seen, seen)]
+    degrees = config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
+    spreads = (
+        np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
+    )
+    log_weights = _log_prior(moved_prior)
+    means, covariances = np.zeros((len(_MOVED_IN), 4)), np.zeros((len(_MOVED_IN), 4, 4))
+    for number, spread in enumerate(spreads):
+        move = np.diag(spread**2)
+        marginal = noise + move[np.ix_(seen, seen)]
+        gain = np.linalg.solve(marginal, move[seen]).T
+        squared = float(offset[seen] @ np.linalg.solve(marginal, offset[seen]))
+        log_weights[number] += _log_student(squared, marginal, degrees)
+        means[number] = gain @ offset[seen]
+        heavy = (degrees + squared) / (degrees + seen.sum())
+        covariances[number] = (move - gain @ move[seen]) * heavy + np.diag(config.REST_SD**2)
+    log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
+    if fused.paths_changed:
+        away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]
+        log_weights += np.log(np.where(away, config.LEAVES_PATHS, config.PATHS_CHANGE))
+    return PosePosterior(
+        prior=prior,
+        weights=np.exp(log_weights - logsumexp(log_weights)),
+        means=means,
+        covariances=covariances,
+        moved_in=_MOVED_IN,
+        seen=seen,
+    )
+
+
+def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
+    """The drift from the prior pose, by the posterior of an estimate.
+
+    A heading that certainly changed is told, however unsure it is how far.
+    """
+    move = posterior.move
+    told = [
+        name
+        for name in PARAMETERS
+        if name in fused.identifiable
+        or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
+    ]
+    return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
+
+
+def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:
+    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made.
+
+    Of a site that is `mapped`, in heading too; without a map nobody can tell that.
+    """
+    angles = [name for name in ANGLES if mapped or name != "heading"]
+    sds = np.sqrt(np.diag(fused.covariance))
+    if (mapped and not fused.registered) or fused.paths_changed:
+        return False
+    noticed = all(sds[PARAMETERS.index(name)] < config.NOTICED_SD for name in angles)
+    ends = [abs(end) for name in angles for end in posterior.interval(name, 0.9)]
+    return noticed and max(ends) < config.NOTICED_RAD
+
+
+def _log_prior(moved_prior: float) -> Array:
+    """Log prior weights (K,): parameters move each by itself, some far."""
+    shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - np.asarray(config.MOVES_IN)).prod(axis=1)
+    some = shares / (1 - float(np.prod(1 - np.asarray(config.MOVES_IN))))
+    weights = moved_prior * some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
+    weights[0] = 1 - moved_prior
+    return np.asarray(np.log(weights))
+
+
+def _by_paths(
+    fused: FusedEstimate, walking_groups: int, log_weights: Array, moved_prior: float
+) -> float:
+    """The most that the log weight of a standing camera may be, by how people fit its paths.
+
+    The covariance is of a Gaussian around the best pose; the prior pose can be far outside of what
+    that is good for. There, each walking group says how much worse it fits: a t test, whose mean
+    differs from hour to hour, too.
+    """
+    if fused.prior_loss <= 0:
+        return float(log_weights[0])
+    groups = max(walking_groups, 2)
+    loss = min(fused.prior_loss, config.MOST_LOSS) / math.sqrt(1 + groups * config.HABIT_LOSS**2)
+    ratio = groups / 2 * math.log1p(loss**2 / (groups - 1)) - config.OCCAM
+    return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
+
+
+def _log_student(squared: float, scale: Array, degrees: float) -> float:
+    """The log density of a t of so many degrees of freedom at a squared Mahalanobis distance."""
+    size = len(scale)
+    _, log_determinant = np.linalg.slogdet(scale)
+    return float(
+        gammaln((degrees + size) / 2)
+        - gammaln(degrees / 2)
+        - 0.5 * (size * math.log(degrees * math.pi) + log_determinant)
+        - (degrees + size) / 2 * math.log1p(squared / degrees)
+    )
+
+
+def _quantile(weights: Array, means: Array, sds: Array, share: float) -> float:
+    """The quantile of a mixture of normal distributions, by bisection."""
+    wide = np.maximum(sds, 1e-12)
+    low, high = float((means - 9 * wide).min()), float((means + 9 * wide).max())
+    for _ in range(60):
+        middle = (low + high) / 2
+        below = float(weights @ np.exp(log_ndtr((middle - means) / wide)))
+        low, high = (middle, high) if below < share else (low, middle)
+    return (low + high) / 2

@@ -1,0 +1,155 @@
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_t, norm
+
+from models.geometry.pose import PARAMETERS, CameraPose, array_of
+from models.pose import config, drift_of, is_noticed, pose_posterior
+from models.pose.pose_fit import FusedEstimate
+from models.reasons import Reason, TracksCode
+
+PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=0.02, heading_rad=2.0)
+SD = np.array([math.radians(0.3), math.radians(0.5), 0.03, math.radians(0.8)])
+
+
+def estimate(tilt=0.0, roll=0.0, log_height=0.0, heading=0.0, *, sd=SD, correlation=None, **other):
+    """An estimate that is so far from the prior pose, angles in degrees."""
+    offset = np.array([math.radians(tilt), math.radians(roll), log_height, math.radians(heading)])
+    values = array_of(PRIOR) + offset
+    covariance = np.outer(sd, sd) * (np.eye(4) if correlation is None else correlation)
+    own = {"identifiable": PARAMETERS, "reason": None, "raw": values, **other}
+    return FusedEstimate(values=values, covariance=covariance, **own)
+
+
+def test_the_weights_are_those_of_a_student_t_for_each_subset():
+    fused, groups = estimate(1.0, -0.4, 0.02, 0.9), 30
+    offset, degrees = fused.values - array_of(PRIOR), 4 + 30 / 4
+    weights = []
+    shares = dict(zip(range(4), config.MOVES_IN, strict=True))
+    for moved in product((False, True), repeat=4):
+        odds = math.prod(shares[n] if own else 1 - shares[n] for n, own in enumerate(moved))
+        some = 1 - math.prod(1 - share for share in shares.values())
+        for far, share in ((1.0, 0.85), (5.0, 0.15)):
+            spread = np.where(moved, config.MOVE_SD, 0) * far
+            scale = fused.covariance + np.diag(spread**2)
+            likely = multivariate_t(np.zeros(4), scale, degrees).pdf(offset)
+            prior = share * (0.2 * odds / some if any(moved) else 0.8)
+            weights.append((moved, prior * likely))
+    whole = sum(weight for _, weight in weights)
+    found = pose_posterior(fused, groups, PRIOR)
+    assert found.moved == pytest.approx(sum(w for m, w in weights if any(m)) / whole)
+    for number, name in enumerate(PARAMETERS):
+        share = sum(weight for moved, weight in weights if moved[number]) / whole
+        assert found.move.parameters[name] == pytest.approx(share)
+
+
+def test_a_camera_that_stands_is_served_where_it_stands():
+    found = pose_posterior(estimate(0.2, -0.3, 0.01, 0.4), 40, PRIOR)
+    assert found.moved < 0.05
+    assert np.abs(np.degrees(found.offset)).max() < 0.05
+    # A camera that stands is known to 0.1 deg: 1.645 sd to either side, a little more for the rest.
+    low, high = (math.degrees(end) for end in found.interval("tilt", 0.9))
+    assert (low, high) == (pytest.approx(-0.165, abs=0.01), pytest.approx(0.165, abs=0.01))
+
+
+@pytest.mark.parametrize(
+    ("name", "by"), [("tilt", 4.0), ("roll", -5.0), ("log_height", 0.3), ("heading", 8.0)]
+)
+def test_what_moved_is_named_and_the_rest_stands(name, by):
+    found = pose_posterior(estimate(**{name: by}), 40, PRIOR)
+    parameter = name.removeprefix("log_")
+    assert found.moved > 0.99
+    for other, share in found.move.parameters.items():
+        assert share > 0.99 if other == parameter else share < 0.2
+    true = by if name == "log_height" else math.radians(by)
+    assert found.offset[PARAMETERS.index(parameter)] == pytest.approx(true, rel=0.05)
+    low, high = found.interval(parameter, 0.9)
+    assert low < true < high
+    assert found.turned == pytest.approx(1.0 if parameter != "height" else 0.2, abs=0.2)
+
+
+def test_a_height_does_not_take_what_the_tilt_should_have():
+    together = np.eye(4)
+    together[0, 2] = together[2, 0] = 0.9
+    # As people's chance would have it: 1.5 sd too high, and the tilt 1.5 sd too large by that.
+    found = pose_posterior(estimate(4.45, log_height=0.045, correlation=together), 40, PRIOR)
+    assert math.degrees(found.offset[0]) == pytest.approx(4.05, abs=0.15)
+    assert abs(found.offset[2]) < 0.02
+
+
+def test_few_groups_say_less():
+    shares = [pose_posterior(estimate(1.5), groups, PRIOR).moved for groups in (5, 20, 100)]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.9 < shares[-1]
+
+
+def test_who_fits_far_worse_at_the_prior_pose_is_not_before_a_camera_that_stands():
+    wide = SD * np.array([1, 1, 1, 8])
+    alone = pose_posterior(estimate(heading=12, sd=wide), 40, PRIOR)
+    assert alone.moved < 0.9
+    beside = pose_posterior(estimate(heading=12, sd=wide, prior_loss=6.0), 40, PRIOR)
+    # Of 36, 40 groups' own scatter and the hours' leave 36 / (1 + 40 * 0.04) = 13.85; a t test of
+    # them: 20 log(1 + 13.85 / 39) = 6.08, less 3 for a pose that is free to fit.
+    assert beside.moved == pytest.approx(1 / (1 + 4 * math.exp(-3.08)), abs=1e-3)
+    for harmless in (-3.0, 0.0, 1.0):
+        found = pose_posterior(estimate(heading=12, sd=wide, prior_loss=harmless), 40, PRIOR)
+        assert found.moved == pytest.approx(alone.moved)
+
+
+def test_a_heading_that_paths_do_not_hold_says_nothing():
+    found = pose_posterior(estimate(0.1, raw=None), 40, PRIOR)
+    standing = pose_posterior(estimate(0.1), 40, PRIOR)
+    assert found.move.parameters["heading"] > 3 * standing.move.parameters["heading"]
+    away = pose_posterior(estimate(0.1, heading=40, raw=None), 40, PRIOR)
+    assert away.moved == pytest.approx(found.moved)
+
+
+def test_paths_that_are_gone_leave_it_open_whether_the_camera_turned_away():
+    gone = Reason(code=TracksCode.PATHS_CHANGED)
+    found = pose_posterior(estimate(raw=None, reason=gone), 40, PRIOR)
+    assert 0.1 < found.moved < 0.6
+    assert found.move.parameters["heading"] > 0.5 * found.moved
+
+
+def test_an_interval_is_of_the_whole_mixture():
+    found = pose_posterior(estimate(heading=3.8, sd=SD * 1.5), 20, PRIOR)
+    assert 0.2 < found.moved < 0.9
+    low, high = found.interval("heading", 0.9)
+    means, sds = found.means[:, 3], np.sqrt(found.covariances[:, 3, 3])
+    for end, share in ((low, 0.05), (high, 0.95)):
+        assert (
+            found.weights @ norm.cdf((end + 1e-9 - means) / np.maximum(sds, 1e-12)) >= share - 1e-6
+        )
+        assert (
+            found.weights @ norm.cdf((end - 1e-9 - means) / np.maximum(sds, 1e-12)) <= share + 1e-6
+        )
+
+
+def noticed(fused, *, mapped=True):
+    return is_noticed(pose_posterior(fused, 40, PRIOR), fused, mapped=mapped)
+
+
+def test_steady_is_said_only_where_a_turn_would_have_been_noticed():
+    gone = Reason(code=TracksCode.PATHS_CHANGED)
+    assert noticed(estimate())
+    assert not noticed(estimate(sd=SD * [1, 1, 1, 4]))
+    assert not noticed(estimate(sd=SD * [11, 1, 1, 1]))
+    assert not noticed(estimate(raw=None))
+    assert noticed(estimate(raw=None), mapped=False)
+    assert not noticed(estimate(raw=None, reason=gone), mapped=False)
+    assert not noticed(estimate(heading=8))
+
+
+def drift(fused):
+    return drift_of(pose_posterior(fused, 40, PRIOR), fused)
+
+
+def test_a_heading_that_surely_moved_is_told_however_unsure_it_is_how_far():
+    three = PARAMETERS[:3]
+    wide = SD * np.array([1, 1, 1, 4])
+    told = drift(estimate(heading=30, sd=wide, identifiable=three))
+    assert told.identifiable == PARAMETERS
+    assert math.degrees(told.by.heading_rad) == pytest.approx(30, abs=3)
+    assert drift(estimate(heading=3, sd=wide, identifiable=three)).identifiable == three
