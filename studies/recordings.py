@@ -3,7 +3,6 @@
 import csv
 import gzip
 import json
-import math
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,8 +13,7 @@ import numpy.typing as npt
 
 from models.errors import CalibrationError, ShapeError
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import CameraPose
-from models.tracks.scenes import Scene, SceneTrack, load_scene
+from models.tracks.scenes import Scene, SceneTrack, load_scene, pose_of_json
 from models.tracks.trajectory import Trajectory
 from studies.virtual_cameras import draw_cameras, seen_by
 
@@ -54,7 +52,7 @@ def load_recording(folder: Path) -> list[Scene]:
 
 def _virtual_cameras(folder: Path) -> list[Scene]:
     camera = json.loads((folder / "camera.json").read_text())
-    lens, pose = _lens(camera["intrinsics"]), _pose(camera["true_pose"])
+    lens, pose = _lens(camera["intrinsics"]), pose_of_json(camera["true_pose"])
     aligned, raw = (folder / name for name in _ON_GROUND)
     path = aligned if aligned.exists() else raw
     rows = _numbers(path)
@@ -97,7 +95,7 @@ def _real_camera(path: Path, name: str, cameras: Mapping[str, Any]) -> Scene:
     return Scene(
         scene_id=f"{path.parent.name}-{name}",
         intrinsics=_lens(cameras[usual]["intrinsics"]),
-        true_pose=_pose(cameras[usual]["true_pose"]),
+        true_pose=pose_of_json(cameras[usual]["true_pose"]),
         frame_rate_hz=10.0,
         tracks=tuple(sorted(tracks, key=lambda track: float(track.trajectory.time_s[0]))),
     )
@@ -114,14 +112,3 @@ def _numbers(path: Path) -> npt.NDArray[np.float64]:
 
 def _lens(values: Mapping[str, Any]) -> Intrinsics:
     return Intrinsics(**{**values, "distortion": tuple(values["distortion"])})
-
-
-def _pose(values: Mapping[str, float]) -> CameraPose:
-    return CameraPose(
-        height_m=values["height_m"],
-        tilt_rad=math.radians(values["tilt_deg"]),
-        roll_rad=math.radians(values["roll_deg"]),
-        heading_rad=math.radians(values["heading_deg"]),
-        x_m=values["x_m"],
-        y_m=values["y_m"],
-    )

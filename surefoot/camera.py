@@ -47,14 +47,7 @@ class Pose:
         Raises:
             ShapeError: a number is not finite, the height is not above 0, the tilt beyond +-90 deg.
         """
-        return CameraPose(
-            height_m=self.height_m,
-            tilt_rad=math.radians(self.tilt_deg),
-            roll_rad=math.radians(self.roll_deg),
-            heading_rad=math.radians(self.heading_deg),
-            x_m=self.x_m,
-            y_m=self.y_m,
-        )
+        return CameraPose.of_degrees(**asdict(self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

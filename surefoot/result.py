@@ -7,8 +7,15 @@ from dataclasses import dataclass, field
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import AlarmRate, PosePosterior, alarm_chart_result, estimate_pose, observe
+from models.monitoring.verdict import Drift, DriftLimits, judge, pose_after
+from models.pose import (
+    AlarmRate,
+    PosePosterior,
+    alarm_chart_result,
+    drift_of,
+    estimate_pose,
+    observe,
+)
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
@@ -72,17 +79,19 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     observed = observe(ordered, model.intrinsics, model.prior)
     found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
-    verdict = judge(found.drift, _LIMITS, (), chart)
-    known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
+    posterior = found.posterior
+    offset = drift_of(posterior, found.fused)
+    verdict = judge(offset, _LIMITS, (), chart)
+    known = {name: _in_unit(name, offset) for name in offset.identifiable}
     return Result(
         moved=verdict.drifting,
-        probability=found.drift.move.moved,
-        why=_why(found.drift, chart),
-        pose=Pose.of(found.pose),
+        probability=posterior.moved,
+        why=_why(offset, chart),
+        pose=Pose.of(pose_after(offset, model.prior)),
         estimated=tuple(_field(name) for name in known),
         sd={_field(name): sd for name, (_, sd) in known.items()},
         drift={_field(name): by for name, (by, _) in known.items()},
-        posterior=found.posterior,
+        posterior=posterior,
     )
 
 

@@ -44,6 +44,31 @@ class CameraPose:
         if abs(self.tilt_rad) > math.pi / 2 + 1e-9:
             raise ShapeError(f"tilt_rad: must be within +-pi/2, got {self.tilt_rad}")
 
+    @classmethod
+    def of_degrees(
+        cls,
+        *,
+        height_m: float,
+        tilt_deg: float,
+        roll_deg: float = 0.0,
+        heading_deg: float = 0.0,
+        x_m: float = 0.0,
+        y_m: float = 0.0,
+    ) -> Self:
+        """The pose of angles in degrees, as HTTP, files and pages have them.
+
+        Raises:
+            ShapeError: as of the pose itself.
+        """
+        return cls(
+            height_m=height_m,
+            tilt_rad=math.radians(tilt_deg),
+            roll_rad=math.radians(roll_deg),
+            heading_rad=math.radians(heading_deg),
+            x_m=x_m,
+            y_m=y_m,
+        )
+
     @property
     def rotation(self) -> Array:
         """Rotation `camera_from_world` (3, 3)."""

@@ -67,7 +67,7 @@ NO_TURN_RAD = np.radians(0.02)
 # What moved. Shares and sizes are guesses by what brackets do: a screw slips in tilt, a hand turns
 # the pan, nearly nothing changes a pole's height. Chosen once on seven scenes by time.
 MOVED_PRIOR = 0.2  # that a window is of a camera that has moved: lower, and small moves are missed
-MOVES_IN = (0.5, 0.4, 0.4, 0.5)  # of moves change tilt, roll, height, heading
+MOVES_IN = np.array([0.5, 0.4, 0.4, 0.5])  # of moves change tilt, roll, height, heading
 MOVE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.10, math.radians(6.0)])
 # How far a camera that stands may be from its prior pose: brackets sway, and poses are rounded.
 REST_SD = np.array([math.radians(0.1), math.radians(0.1), 0.003, math.radians(0.1)])

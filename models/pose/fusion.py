@@ -67,11 +67,10 @@ def fused_estimate(
         belief=belief_of(joint, prior),
         variance_inflation=paths.variance_inflation_for(walkers.people),
     )
-    modes = find_modes(posterior, tracks, site, joint, warm_start)
-    fitting = _fitting(modes, paths)
+    fitting = _fitting(find_modes(posterior, tracks, site, joint, warm_start), paths)
     if warm_start is None and (not fitting or paths.fit.is_doubtful(fitting[0][1])):
-        modes += find_modes(posterior, tracks, site, joint, headings=config.FAR_HEADINGS)
-        fitting = _fitting(sorted(modes, key=lambda mode: -mode.peak.value), paths)
+        far = find_modes(posterior, tracks, site, joint, headings=config.FAR_HEADINGS)
+        fitting = sorted(fitting + _fitting(far, paths), key=lambda each: -each[0].peak.value)
     changed = partial(_changed_paths, posterior, paths, joint, prior)
     if not fitting:
         return by_speeds_alone(joint, prior, changed())

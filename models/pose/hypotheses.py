@@ -25,7 +25,7 @@ from models.walking.config import FEWEST_GROUPS
 
 _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 # Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
-_MOVED_IN = np.concatenate([_SUBSETS[:1], _SUBSETS[1:], _SUBSETS[1:]])
+_MOVED_IN = np.concatenate([_SUBSETS, _SUBSETS[1:]])
 _FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
 
 
@@ -33,16 +33,14 @@ _FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
 class PosePosterior:
     """A mixture over hypotheses: weights (K,), means (K, 4) and covariances (K, 4, 4).
 
-    Means are offsets of tilt, roll, log height and heading from the prior pose. `moved_in` (K, 4)
-    says which parameters moved by each hypothesis; by the first, none did. Of those that are not
-    `seen` (4,), the tracks say nothing.
+    Means are offsets of tilt, roll, log height and heading from the prior pose. By the first
+    hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing.
     """
 
     prior: CameraPose
     weights: Array
     means: Array
     covariances: Array
-    moved_in: Array
     seen: Array
 
     @property
@@ -53,7 +51,7 @@ class PosePosterior:
     @property
     def move(self) -> MoveProbabilities:
         """How likely a move is, and of what."""
-        shares = (self.weights @ self.moved_in).tolist()
+        shares = (self.weights @ _MOVED_IN).tolist()
         return MoveProbabilities(
             moved=self.moved, parameters=dict(zip(PARAMETERS, shares, strict=True))
         )
@@ -62,7 +60,7 @@ class PosePosterior:
     def turned(self) -> float:
         """The probability that an angle which the tracks tell changed, if the camera moved."""
         angles = self.seen & [name != "height" for name in PARAMETERS]
-        turned = float(self.weights @ self.moved_in[:, angles].any(axis=1))
+        turned = float(self.weights @ _MOVED_IN[:, angles].any(axis=1))
         return turned / max(self.moved, 1e-300)
 
     @property
@@ -143,7 +141,6 @@ def pose_posterior(
         weights=np.exp(log_weights - logsumexp(log_weights)),
         means=means,
         covariances=covariances,
-        moved_in=_MOVED_IN,
         seen=seen,
     )
 
@@ -179,8 +176,8 @@ def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) 
 
 def _log_prior(moved_prior: float) -> Array:
     """Log prior weights (K,): parameters move each by itself, some far."""
-    shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - np.asarray(config.MOVES_IN)).prod(axis=1)
-    some = shares / (1 - float(np.prod(1 - np.asarray(config.MOVES_IN))))
+    shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - config.MOVES_IN).prod(axis=1)
+    some = shares / (1 - shares[0])
     weights = moved_prior * some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
     weights[0] = 1 - moved_prior
     return np.asarray(np.log(weights))

@@ -2,8 +2,7 @@
 
 import csv
 import json
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from models.geometry.upright import tops_of_boxes
 from models.tracks.trajectory import Trajectory
 
 # How WILDTRACK's notes say that a track's number is a person's and a running one.
+_POSE_FIELDS = ("height_m", "tilt_deg", "roll_deg", "heading_deg", "x_m", "y_m")
 _PERSON_IN_HUNDREDS = "track_id//100 = personID"
 
 
@@ -74,14 +74,7 @@ def load_scene(folder: Path) -> Scene:
         return Scene(
             scene_id=camera["id"],
             intrinsics=intrinsics,
-            true_pose=CameraPose(
-                height_m=pose["height_m"],
-                tilt_rad=math.radians(pose["tilt_deg"]),
-                roll_rad=math.radians(pose["roll_deg"]),
-                heading_rad=math.radians(pose["heading_deg"]),
-                x_m=pose["x_m"],
-                y_m=pose["y_m"],
-            ),
+            true_pose=pose_of_json(pose),
             frame_rate_hz=camera["frame_rate_hz"],
             tracks=_tracks(rows, has_boxes=bool(tops), person_in_hundreds=persons),
         )
@@ -89,6 +82,15 @@ def load_scene(folder: Path) -> Scene:
         raise
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise ShapeError(f"scene {folder}: camera.json or tracks.csv: {error!r}") from error
+
+
+def pose_of_json(values: Mapping[str, float]) -> CameraPose:
+    """The pose of a recording's `true_pose`, which has all six numbers.
+
+    Raises:
+        KeyError: one is missing.
+    """
+    return CameraPose.of_degrees(**{name: values[name] for name in _POSE_FIELDS})
 
 
 def _tops(path: Path, intrinsics: Intrinsics) -> dict[tuple[str, str], float]:

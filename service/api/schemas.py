@@ -1,6 +1,5 @@
 """Fields, lenses and poses in their forms on the wire, and the classes that bodies are of."""
 
-import math
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Annotated, Any, Self
@@ -164,11 +163,11 @@ class PriorPoseBody(Body):
             return pose_from_centre(rotation, np.array(self.position_m))
         assert self.height_m is not None
         assert self.tilt_deg is not None
-        return CameraPose(
+        return CameraPose.of_degrees(
             height_m=self.height_m,
-            tilt_rad=math.radians(self.tilt_deg),
-            roll_rad=math.radians(self.roll_deg),
-            heading_rad=math.radians(self.heading_deg),
+            tilt_deg=self.tilt_deg,
+            roll_deg=self.roll_deg,
+            heading_deg=self.heading_deg,
             x_m=self.x_m,
             y_m=self.y_m,
         )

@@ -38,6 +38,7 @@ from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
+from service.wording.times import from_seconds
 
 _UNJUDGED = DriftVerdict(streak=0, excess=0.0, drifted=())
 
@@ -263,7 +264,7 @@ def _between(stood_s: float | None, moved_s: float) -> tuple[datetime | None, da
 
 
 def _at(time_s: float | None) -> datetime | None:
-    return None if time_s is None else datetime.fromtimestamp(time_s, UTC)
+    return None if time_s is None else from_seconds(time_s)
 
 
 def _update_alerts(

@@ -172,12 +172,13 @@ def drift_history(
         .scalar_subquery()
     )
     e = EstimateRecord
-    ratios = [
-        _ratio("tilt", e.drift_tilt_rad, limits.floor_rad),
-        _ratio("roll", e.drift_roll_rad, limits.floor_rad),
-        _ratio("heading", e.drift_heading_rad, limits.floor_rad),
-        _ratio("height", e.drift_height_m, limits.floor_m),
-    ]
+    drifts = {
+        "tilt": e.drift_tilt_rad,
+        "roll": e.drift_roll_rad,
+        "heading": e.drift_heading_rad,
+        "height": e.drift_height_m,
+    }
+    ratios = [_ratio(name, drift, limits.floor(name)) for name, drift in drifts.items()]
     query = (
         select(CameraRecord.id, e.id, func.nullif(largest(*ratios), -1.0))
         # Outer: cameras come first, and of each only its newest estimates are looked at.
