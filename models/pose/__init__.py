@@ -21,6 +21,8 @@ from models.pose.alarms import (
     alarm_chart_result,
     begin_creep_log,
     log_creep,
+    raised_by_creep,
+    since_alarm,
     without_creep,
 )
 from models.pose.config import FEWEST_BESIDE
@@ -89,6 +91,8 @@ __all__ = [
     "log_creep",
     "observe",
     "pose_posterior",
+    "raised_by_creep",
+    "since_alarm",
     "observe_walks",
     "alarm_chart_result",
     "creep_result",

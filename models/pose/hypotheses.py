@@ -27,6 +27,10 @@ _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 # Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
 _MOVED_IN = np.concatenate([_SUBSETS, _SUBSETS[1:]])
 _FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
+_ALL = _MOVED_IN.all(axis=1)
+_SCALE, _PAN = (
+    np.equal(_MOVED_IN, np.isin(PARAMETERS, alone)).all(axis=1) for alone in ("height", "heading")
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +39,9 @@ class PosePosterior:
 
     Means are offsets of tilt, roll, log height and heading from the prior pose. By the first
     hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing.
+
+    The offset leans on how seldom cameras move; how far off it may be does not. It is asked of the
+    hypotheses by which all may have moved: a turn that is too small to be noticed is in there.
     """
 
     prior: CameraPose
@@ -70,10 +77,11 @@ class PosePosterior:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (4, 4) of the mixture."""
-        apart = self.means - self.offset
-        between = np.einsum("k,ki,kj->ij", self.weights, apart, apart)
-        return np.asarray(np.einsum("k,kij->ij", self.weights, self.covariances) + between)
+        """The covariance (4, 4) around the mean offset, whatever moved."""
+        weights = self._free_weights
+        apart = self.means[_ALL] - self.offset
+        between = np.einsum("k,ki,kj->ij", weights, apart, apart)
+        return np.asarray(np.einsum("k,kij->ij", weights, self.covariances[_ALL]) + between)
 
     @property
     def parameters(self) -> PoseParameters:
@@ -88,13 +96,21 @@ class PosePosterior:
     def interval(self, name: str, level: float) -> tuple[float, float]:
         """The central interval of a parameter's offset that holds it with a probability.
 
-        Of a mixture: where the camera surely stands it is as narrow as that is known.
+        Whatever moved; the mean offset is in it.
         """
         at = PARAMETERS.index(name)
-        means, sds = self.means[:, at], np.sqrt(self.covariances[:, at, at])
+        means, sds = self.means[_ALL, at], np.sqrt(self.covariances[_ALL, at, at])
         tails = ((1 - level) / 2, (1 + level) / 2)
-        low, high = (_quantile(self.weights, means, sds, tail) for tail in tails)
-        return low, high
+        low, high = (_quantile(self._free_weights, means, sds, tail) for tail in tails)
+        offset = float(self.offset[at])
+        return min(low, offset), max(high, offset)
+
+    @property
+    def _free_weights(self) -> Array:
+        """The weights (2,) of all having moved, near and far, by themselves."""
+        weights = self.weights[_ALL]
+        whole = weights.sum()
+        return weights / whole if whole > 0 else np.array([1.0, 0.0])
 
 
 def pose_posterior(
@@ -121,17 +137,16 @@ def pose_posterior(
     spreads = (
         np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
     )
-    log_weights = _log_prior(moved_prior)
-    means, covariances = np.zeros((len(_MOVED_IN), 4)), np.zeros((len(_MOVED_IN), 4, 4))
-    for number, spread in enumerate(spreads):
-        move = np.diag(spread**2)
-        marginal = noise + move[np.ix_(seen, seen)]
-        gain = np.linalg.solve(marginal, move[seen]).T
-        squared = float(offset[seen] @ np.linalg.solve(marginal, offset[seen]))
-        log_weights[number] += _log_student(squared, marginal, degrees)
-        means[number] = gain @ offset[seen]
-        heavy = (degrees + squared) / (degrees + seen.sum())
-        covariances[number] = (move - gain @ move[seen]) * heavy + np.diag(config.REST_SD**2)
+    moves = np.einsum("ki,ij->kij", spreads**2, np.eye(len(PARAMETERS)))
+    marginals = noise + moves[:, seen][:, :, seen]
+    gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
+    squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
+    log_weights = _log_prior(moved_prior) + _log_student(squared, marginals, degrees)
+    means = gains @ offset[seen]
+    # The variance of a t: of few groups it is wider than that of a normal distribution.
+    heavy = (degrees + squared) / (degrees + seen.sum() - 2)
+    covariances = (moves - gains @ moves[:, seen]) * heavy[:, None, None]
+    covariances = covariances + np.diag(config.REST_SD**2)
     log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
     if fused.paths_changed:
         away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]
@@ -175,10 +190,12 @@ def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) 
 
 
 def _log_prior(moved_prior: float) -> Array:
-    """Log prior weights (K,): parameters move each by itself, some far."""
+    """Log prior weights (K,): each parameter moves by itself, or all, one turn, or the scale."""
     shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - config.MOVES_IN).prod(axis=1)
-    some = shares / (1 - shares[0])
-    weights = moved_prior * some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
+    rest = 1 - config.ALL_SHARE - config.SCALE_SHARE - config.TURNED_SHARE
+    some = rest * shares / (1 - shares[0]) + config.ALL_SHARE * _ALL + config.SCALE_SHARE * _SCALE
+    some = some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
+    weights = moved_prior * (some + config.TURNED_SHARE * (_PAN & _FAR))
     weights[0] = 1 - moved_prior
     return np.asarray(np.log(weights))
 
@@ -200,15 +217,15 @@ def _by_paths(
     return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
 
 
-def _log_student(squared: float, scale: Array, degrees: float) -> float:
-    """The log density of a t of so many degrees of freedom at a squared Mahalanobis distance."""
-    size = len(scale)
-    _, log_determinant = np.linalg.slogdet(scale)
-    return float(
+def _log_student(squared: Array, scales: Array, degrees: float) -> Array:
+    """Log densities (K,) of t's of so many degrees of freedom at squared Mahalanobis distances."""
+    size = scales.shape[-1]
+    _, log_determinants = np.linalg.slogdet(scales)
+    return np.asarray(
         gammaln((degrees + size) / 2)
         - gammaln(degrees / 2)
-        - 0.5 * (size * math.log(degrees * math.pi) + log_determinant)
-        - (degrees + size) / 2 * math.log1p(squared / degrees)
+        - 0.5 * (size * math.log(degrees * math.pi) + log_determinants)
+        - (degrees + size) / 2 * np.log1p(squared / degrees)
     )
 
 

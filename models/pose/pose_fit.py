@@ -79,6 +79,12 @@ class FusedEstimate:
         return self.reason is not None and self.reason.code == TracksCode.PATHS_CHANGED
 
     @property
+    def paths_differ(self) -> bool:
+        """True if people fit the site's paths nowhere, or walk them another way."""
+        differ = (TracksCode.PATHS_CHANGED, TracksCode.WAYS_CHANGED)
+        return self.reason is not None and self.reason.code in differ
+
+    @property
     def parameters(self) -> PoseParameters:
         """The estimate, named."""
         return PoseParameters.of_array(self.values)

@@ -12,6 +12,7 @@ from models.monitoring.verdict import (
     LIKELY,
     Drift,
     DriftVerdict,
+    charted_clock,
     clock_fault,
     judge,
     may_be_clock,
@@ -20,7 +21,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import CLOCK, drift_of, is_noticed
+from models.pose import drift_of, is_noticed
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
@@ -61,7 +62,7 @@ class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
     `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
-    frame rate looks wrong; `charted` says that the chart or the creep is beyond its level.
+    frame rate looks wrong.
     """
 
     state: PoseState
@@ -70,7 +71,6 @@ class Judgement:
     after: datetime | None = None
     since: datetime | None = None
     clock: Reason | None = None
-    charted: bool = False
 
 
 def save_estimate(
@@ -157,9 +157,8 @@ def _judge(
 ) -> Judgement:
     """The judgement of an estimate after its reference."""
     clock = clock_fault(drift, finding.posterior.turned, evidence.prior, frame_rate_hz)
-    # What people do who are not where the reference's were says nothing of which parameter moved.
     gone = finding.fused.paths_changed
-    reading, creep = None if gone else finding.reading, finding.creep
+    reading, creep = finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
         reading = None
     verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=finding.enough)
@@ -175,10 +174,8 @@ def _judge(
         finding.pieces,
         *finding.failures,
     )
-    charted = reading if reading is not None and reading.moved else None
-    if charted is not None and clock is None and charted.parameter == CLOCK:
-        clock = reason_of_chart(charted)
-    alarmed = charted is not None or (creep is not None and creep.moved)
+    if clock is None and reading is not None and verdict.alarmed:
+        clock = charted_clock(reading, finding.posterior.turned)
     state = _state(reference, history, verdict, evidence, finding)
     after, since = _since(reference, history, verdict, evidence, finding, state)
     return Judgement(
@@ -188,7 +185,6 @@ def _judge(
         after=after,
         since=since,
         clock=clock,
-        charted=alarmed,
     )
 
 
@@ -294,7 +290,7 @@ def _update_alerts(
     kind = AlertKind.CLOCK if clock else AlertKind.DRIFT
     for before in firing - {kind}:
         end_alert(session, camera_id, before, Outcome.CLEARED, note=fired_as(kind))
-    if drift.identifiable or judgement.charted:
+    if drift.identifiable or verdict.alarmed:
         open_alert(
             session,
             settings,

@@ -3,16 +3,14 @@
 import hashlib
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from models.durations import DAY_S
 from models.errors import CheckpointError
 from models.pose import (
-    CLOCK,
     CREEP_SHARE,
     AlarmRate,
     CameraSite,
@@ -31,8 +29,9 @@ from models.pose import (
     estimate_pose,
     observe_walks,
     paths_from_bytes,
-    pose_posterior,
+    raised_by_creep,
     reference_from_bytes,
+    since_alarm,
     unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -52,8 +51,6 @@ from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord
 
 log = logging.getLogger("surefoot.recalibration")
-
-_LEAST_FALSE = 1e-4  # of windows alarm though the camera stands, whatever their length
 
 _Made = TypeVar("_Made")
 
@@ -98,11 +95,11 @@ class Finding:
 
     `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
     said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
-    the change, or of all where these are too few, long before a pose can say how far; None where
-    there is no chart. `creep` is what the anchor says of weeks; once the camera has crept, all else
-    is by its first map, too.
-    `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
-    names what should be there beside the served pose. `last` is where the next one may begin.
+    the change, or of all where these are too few; None where there is no chart. Where it alarms and
+    the pose does not rule it out, the `tracks` are those that it is of. `creep` is what the anchor
+    says of weeks; once the camera has crept, all else is by its first map, too. `pieces` says
+    how many of the tracks are of others' walks, where these are many. `failures` names what should
+    be there beside the served pose. `last` is where the next one may begin.
     """
 
     joint: JointEstimate
@@ -157,17 +154,17 @@ def compute_finding(
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
+    found = replace(found, moved_prior=evidence.moved_prior)
+    if creep is not None and creep.moved:
+        raised = raised_by_creep(evidence.moved_prior, observed, evidence.alarms_a_year)
+        found = replace(found, moved_prior=raised)
+    found = since_alarm(found, observed, site, reading)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     return Finding(
         joint=found.joint,
         fused=found.fused,
-        posterior=pose_posterior(
-            found.fused,
-            found.joint.walking_groups,
-            evidence.prior,
-            _moved_prior(evidence, found.fused, reading, creep),
-        ),
+        posterior=found.posterior,
         enough=asked_enough(evidence),
         averaged=averaged,
         reading=reading,
@@ -178,24 +175,6 @@ def compute_finding(
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
     )
-
-
-def _moved_prior(
-    evidence: Evidence, fused: FusedEstimate, reading: ChartResult | None, creep: Creep | None
-) -> float:
-    """The probability that the camera moved, before the pose says more.
-
-    Where the chart or the creep alarms, by how seldom that of a still camera does in so long a
-    window. Of people on none of the paths, and of times, the chart says nothing about the pose.
-    """
-    charted = reading is not None and reading.moved and reading.parameter != CLOCK
-    crept = creep is not None and creep.moved
-    prior = evidence.moved_prior
-    if not crept and (not charted or fused.paths_changed):
-        return prior
-    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
-    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
-    return prior / (prior + (1 - prior) * max(false, _LEAST_FALSE))
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
@@ -274,13 +253,13 @@ def _read(
     """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
+    unanswered = np.array([track.unanswered for track in evidence.tracks])
     rate = AlarmRate(
         alarms_a_year=(1 - CREEP_SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
         calm_groups=evidence.limits.people,
     )
-    unanswered = np.array([track.unanswered for track in evidence.tracks])
     read = partial(alarm_chart_result, observed, site, rate, counted=unanswered, first=first)
     return failures.unless_failed("chart", read)
 
