@@ -32,7 +32,7 @@ from models.pose.estimating import (
     estimate_pose,
     unless_failed,
 )
-from models.pose.hypotheses import PosePosterior, drift_of, is_noticed, pose_posterior
+from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
     WarmStart,
@@ -40,6 +40,7 @@ from models.pose.pose_fit import (
     warm_start_to_bytes,
 )
 from models.pose.site import CameraSite, assume_site, learn_site
+from models.pose.states import WindowState, is_noticed, state_of
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -93,6 +94,8 @@ __all__ = [
     "pose_posterior",
     "raised_by_creep",
     "since_alarm",
+    "state_of",
+    "WindowState",
     "observe_walks",
     "alarm_chart_result",
     "creep_result",

@@ -6,6 +6,7 @@ crept by is taken out of the tracks that it grows by. What is left in it by mist
 of the first, and so the creep is found (`models.monitoring.creep`).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -94,18 +95,31 @@ def since_alarm(
     """The finding of the tracks that a chart alarms about, where these are of a camera that moved.
 
     Else it is as it was: the chart knows how people's habits differ within its reference, and no
-    more. Of people who walk on none of the paths, it says nothing about the pose.
+    more. So of what it says beyond its level, a tenth counts as evidence beside the pose.
     """
-    if chart is None or not chart.moved or chart.track_idx <= found.first:
+    if chart is None or not chart.moved or found.posterior.moved >= BORNE_OUT:
         return found
-    if found.fused.paths_differ or found.posterior.moved >= BORNE_OUT:
+    if found.fused.paths_changed:  # who walks on none of the paths says nothing of the pose
         return found
-    later = of_tracks(tracks, np.arange(chart.track_idx, tracks.tracks))
+    later = of_tracks(tracks, np.arange(max(chart.track_idx, found.first), tracks.tracks))
     if later.walkers < FEWEST_WALKERS:
         return found
     fit = pose_fit_of(later, site)
-    since = replace(found, joint=fit.joint, fused=fit.fused, first=chart.track_idx)
-    return since if since.posterior.moved >= LIKELY else found
+    odds = math.exp(config.CHART_EVIDENCE * (chart.statistic - chart.level))
+    since = replace(
+        found,
+        joint=fit.joint,
+        fused=fit.fused,
+        first=max(chart.track_idx, found.first),
+        moved_prior=raised(found.moved_prior, odds),
+    )
+    borne_out = since.posterior.moved >= LIKELY and not fit.fused.paths_differ
+    return since if borne_out else found
+
+
+def raised(probability: float, odds: float) -> float:
+    """A probability after evidence of so many to one."""
+    return probability * odds / (probability * odds + 1 - probability)
 
 
 def raised_by_creep(moved_prior: float, tracks: Observations, alarms_a_year: float) -> float:
@@ -115,7 +129,7 @@ def raised_by_creep(moved_prior: float, tracks: Observations, alarms_a_year: flo
     """
     span_s = float(tracks.ended_s[-1] - tracks.ended_s[0]) if tracks.tracks else 0.0
     false = min(max(alarms_a_year * span_s / (365.25 * DAY_S), config.LEAST_FALSE), 1.0)
-    return moved_prior / (moved_prior + (1 - moved_prior) * false)
+    return raised(moved_prior, 1 / false)
 
 
 def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:

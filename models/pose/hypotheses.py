@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
-from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
@@ -173,20 +173,6 @@ def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
         or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
     ]
     return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
-
-
-def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:
-    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made.
-
-    Of a site that is `mapped`, in heading too; without a map nobody can tell that.
-    """
-    angles = [name for name in ANGLES if mapped or name != "heading"]
-    sds = np.sqrt(np.diag(fused.covariance))
-    if (mapped and not fused.registered) or fused.paths_changed:
-        return False
-    noticed = all(sds[PARAMETERS.index(name)] < config.NOTICED_SD for name in angles)
-    ends = [abs(end) for name in angles for end in posterior.interval(name, 0.9)]
-    return noticed and max(ends) < config.NOTICED_RAD
 
 
 def _log_prior(moved_prior: float) -> Array:

@@ -9,7 +9,6 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import (
-    LIKELY,
     Drift,
     DriftVerdict,
     charted_clock,
@@ -21,7 +20,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import drift_of, is_noticed
+from models.pose import drift_of, state_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
@@ -195,23 +194,21 @@ def _state(
     evidence: Evidence,
     finding: Finding,
 ) -> PoseState:
-    """The state of a camera; that it stands is said where a turn would have been noticed.
+    """The state of a camera.
 
     Of fewer people than `enough`, nothing is said against what somebody said. That people walk on
     none of the paths is so until some are found to walk there again.
     """
-    if verdict.drifting:
-        return PoseState.DRIFTING
     mapped = evidence.flow is not None
+    state = PoseState(
+        state_of(finding.posterior, finding.fused, drifting=verdict.drifting, mapped=mapped)
+    )
     fits = finding.enough and (finding.fused.registered or not mapped)
-    if finding.enough and finding.fused.paths_changed or (history.unsure and not fits):
+    if history.unsure and not fits and state != PoseState.DRIFTING:
         return PoseState.UNSURE
-    if finding.posterior.moved >= LIKELY and finding.enough:
-        return PoseState.SUSPECTED
-    if not finding.enough and reference.answer == Answer.FALSE_ALARM:
-        return PoseState.OK
-    noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
-    return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
+    if finding.enough or state in (PoseState.DRIFTING, PoseState.OK):
+        return state
+    return PoseState.OK if reference.answer == Answer.FALSE_ALARM else PoseState.LEARNING
 
 
 def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:

@@ -157,6 +157,14 @@ def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
     assert judge(unknown, LIMITS, (), charted(10.5)).drifting
 
 
+def test_an_alarm_of_the_chart_counts_where_the_pose_bears_it_out():
+    for moved, alarmed in ((0.89, False), (0.91, True)):
+        verdict = judge(drift(move=likely(moved)), LIMITS, (), charted(10.5))
+        assert (verdict.alarmed, verdict.drifting) == (alarmed, alarmed)
+    # A drift that was told before lasts while the chart alarms, whatever bears it out.
+    assert judge(drift(move=likely(0.1)), LIMITS, ("heading",), charted(10.5)).drifting
+
+
 def test_what_drifted_has_to_be_told_to_end():
     assert drifting(drift(unidentifiable=("tilt",)), ("tilt",))
     assert not drifting(drift(unidentifiable=("roll",)), ("tilt",))
