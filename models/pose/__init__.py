@@ -32,13 +32,15 @@ from models.pose.estimating import (
     estimate_pose,
     unless_failed,
 )
-from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
+from models.pose.hypotheses import Hypothesis, PosePosterior, drift_of, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
+    Rival,
     WarmStart,
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
+from models.pose.power import PEOPLE, smallest_told
 from models.pose.site import CameraSite, assume_site, learn_site
 from models.pose.states import WindowState, is_noticed, state_of
 from models.simulation.walkers import WalkConfig
@@ -93,7 +95,11 @@ __all__ = [
     "observe",
     "pose_posterior",
     "raised_by_creep",
+    "Hypothesis",
+    "PEOPLE",
+    "Rival",
     "since_alarm",
+    "smallest_told",
     "state_of",
     "WindowState",
     "observe_walks",

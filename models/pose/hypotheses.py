@@ -12,12 +12,13 @@ Source: Raftery 1995, the average over models; Lange, Little and Taylor 1989, St
 import math
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
 from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
-from models.geometry.rotation import Array
+from models.geometry.rotation import Array, Mask
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
@@ -31,6 +32,16 @@ _ALL = _MOVED_IN.all(axis=1)
 _SCALE, _PAN = (
     np.equal(_MOVED_IN, np.isin(PARAMETERS, alone)).all(axis=1) for alone in ("height", "heading")
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """Which parameters moved, `far` or not, how likely that is, and the offset (4,) if so."""
+
+    moved: tuple[str, ...]
+    far: bool
+    weight: float
+    offset: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +59,7 @@ class PosePosterior:
     weights: Array
     means: Array
     covariances: Array
-    seen: Array
+    seen: Mask
 
     @property
     def moved(self) -> float:
@@ -93,6 +104,18 @@ class PosePosterior:
         """The standard deviations, named."""
         return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
 
+    def likeliest(self, most: int) -> list[Hypothesis]:
+        """The likeliest hypotheses, the likeliest first."""
+        return [
+            Hypothesis(
+                moved=tuple(n for n, own in zip(PARAMETERS, _MOVED_IN[k], strict=True) if own),
+                far=bool(_FAR[k]),
+                weight=float(self.weights[k]),
+                offset=self.means[k],
+            )
+            for k in np.argsort(-self.weights, kind="stable")[:most].tolist()
+        ]
+
     def interval(self, name: str, level: float) -> tuple[float, float]:
         """The central interval of a parameter's offset that holds it with a probability.
 
@@ -128,12 +151,11 @@ def pose_posterior(
         prior: the prior pose.
         moved_prior: how likely it is, before any track, that the camera has moved.
     """
-    enough = walking_groups >= FEWEST_GROUPS
-    seen = np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
+    seen = seen_parameters(fused, walking_groups)
     offset = fused.values - array_of(prior)
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]
-    degrees = config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
+    degrees = _degrees(walking_groups)
     spreads = (
         np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
     )
@@ -141,6 +163,8 @@ def pose_posterior(
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
     squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
+    # A mode may be far from a Gaussian: the prior pose is never less likely than people say of it.
+    squared[0] = min(squared[0], max(fused.prior_gap, 0.0))
     log_weights = _log_prior(moved_prior) + _log_student(squared, marginals, degrees)
     means = gains @ offset[seen]
     # The variance of a t: of few groups it is wider than that of a normal distribution.
@@ -160,6 +184,33 @@ def pose_posterior(
     )
 
 
+def seen_parameters(fused: FusedEstimate, walking_groups: int) -> Mask:
+    """Of which parameters (4,) tracks say something."""
+    enough = walking_groups >= FEWEST_GROUPS
+    return np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
+
+
+def alone_odds(
+    off_sd: Array, variances: Array, seen: Mask, walking_groups: Array, moved_prior: float
+) -> Array:
+    """Log odds (S, N) of a near move in one parameter, by estimates that are so far off the prior.
+
+    Args:
+        off_sd: in standard deviations (S, N) of one that is off in nothing else.
+        variances: of them (S, N).
+        seen: of which parameters (4,) tracks say something: S of them.
+        walking_groups: of the windows (N,).
+        moved_prior: how likely it is, before any track, that the camera has moved.
+    """
+    priors = _log_prior(moved_prior)[: len(_SUBSETS)]
+    alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
+    degrees, size = _degrees(walking_groups), int(seen.sum())
+    wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
+    fits = np.log1p(off_sd**2 / degrees) - np.log1p(off_sd**2 / wider / degrees)
+    evidence = (degrees + size) / 2 * fits - np.log(wider) / 2
+    return np.asarray(alone[seen, None] - priors[0] + evidence)
+
+
 def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
     """The drift from the prior pose, by the posterior of an estimate.
 
@@ -173,6 +224,11 @@ def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
         or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
     ]
     return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
+
+
+def _degrees(walking_groups: float | Array) -> Any:
+    """Degrees of freedom of an estimate: few groups tell less surely what their covariance is."""
+    return config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
 
 
 def _log_prior(moved_prior: float) -> Array:

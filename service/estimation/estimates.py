@@ -25,6 +25,7 @@ from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, Answer, EventType, Outcome, PoseState, Severity
+from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.finding import Finding
 from service.job_queue import JobQueue
@@ -100,7 +101,8 @@ def save_estimate(
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
-        _update_alerts(session, settings, camera.id, drift, judgement)
+        kept = alert_evidence(finding, evidence.prior)
+        _update_alerts(session, settings, camera.id, drift, judgement, kept)
     session.add(record)
     if finding.last is not None:
         session.merge(finding.last)
@@ -261,7 +263,12 @@ def _at(time_s: float | None) -> datetime | None:
 
 
 def _update_alerts(
-    session: Session, settings: Settings, camera_id: str, drift: Drift, judgement: Judgement
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    drift: Drift,
+    judgement: Judgement,
+    evidence: dict[str, Any],
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
@@ -279,6 +286,7 @@ def _update_alerts(
                 identifiable_drift(drift),
                 None,
                 reasons=judgement.reasons,
+                evidence=evidence,
             )
         return
     # What was named a clock fault stays one until an angle has drifted too.
@@ -298,6 +306,7 @@ def _update_alerts(
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
             changed_after=judgement.after,
+            evidence=evidence,
         )
 
 
@@ -325,6 +334,8 @@ def _record(
         drifted=list(judgement.verdict.drifted),
         moved=drift.move.moved,
         moved_parameters=dict(drift.move.parameters),
+        rivals=rivals_of(finding),
+        would_notice=would_notice(finding.power, evidence.prior),
         drift_after=judgement.after,
         drift_since=judgement.since,
         raw=_raw(finding),

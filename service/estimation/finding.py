@@ -2,6 +2,7 @@
 
 import hashlib
 import logging
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from models.errors import CheckpointError
+from models.geometry.rotation import Array
 from models.pose import (
     CREEP_SHARE,
     AlarmRate,
@@ -20,6 +22,7 @@ from models.pose import (
     JointEstimate,
     Observations,
     PartialFailure,
+    PoseFinding,
     PosePosterior,
     WarmStart,
     alarm_chart_result,
@@ -32,6 +35,7 @@ from models.pose import (
     raised_by_creep,
     reference_from_bytes,
     since_alarm,
+    smallest_told,
     unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -93,18 +97,20 @@ class PartialFailures:
 class Finding:
     """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
-    `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
-    said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
-    the change, or of all where these are too few; None where there is no chart. Where it alarms and
-    the pose does not rule it out, the `tracks` are those that it is of. `creep` is what the anchor
-    says of weeks; once the camera has crept, all else is by its first map, too. `pieces` says
-    how many of the tracks are of others' walks, where these are many. `failures` names what should
-    be there beside the served pose. `last` is where the next one may begin.
+    `posterior` is over what moved, by the `fused` estimate; `power` (4, 3) the smallest moves that
+    would be told of 60, 250 and 800 people, None before the site is known; `enough` people came
+    since a person said how the camera stands, or not. `reading` is what the drift chart says of the
+    tracks after the change, or of all where these are too few; None where there is no chart. Where
+    it alarms and the pose does not rule it out, the `tracks` are those that it is of. `creep` is
+    what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
+    `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
+    names what should be there beside the served pose. `last` is where the next one may begin.
     """
 
     joint: JointEstimate
     fused: FusedEstimate
     posterior: PosePosterior
+    power: Array | None
     enough: bool
     averaged: PoseEstimate | None
     reading: ChartResult | None
@@ -165,6 +171,7 @@ def compute_finding(
         joint=found.joint,
         fused=found.fused,
         posterior=found.posterior,
+        power=_power(found, site) if site.learned else None,
         enough=asked_enough(evidence),
         averaged=averaged,
         reading=reading,
@@ -174,6 +181,17 @@ def compute_finding(
         pieces=walks.reason,
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
+    )
+
+
+def _power(found: PoseFinding, site: CameraSite) -> Array:
+    """The smallest moves (4, 3) that would be told at a site by its people."""
+    return smallest_told(
+        found.fused,
+        found.joint.walking_groups,
+        found.joint.walkers,
+        math.inf if site.paths is None else site.paths.people,
+        found.moved_prior,
     )
 
 

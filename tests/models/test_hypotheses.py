@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -110,6 +111,17 @@ def test_who_fits_far_worse_at_the_prior_pose_is_not_before_a_camera_that_stands
     for harmless in (-3.0, 0.0, 1.0):
         found = pose_posterior(estimate(heading=12, sd=wide, prior_loss=harmless), 40, PRIOR)
         assert found.moved == pytest.approx(alone.moved)
+
+
+def test_a_mode_that_is_no_gaussian_says_no_more_against_the_prior_pose_than_people_do():
+    far = estimate(4.0, sd=SD * 3)  # 4.4 sd
+    assert pose_posterior(far, 40, PRIOR).moved > 0.9
+    # People are as likely at the prior pose: as if the estimate were there, seen from standing.
+    flat = replace(far, prior_gap=0.0)
+    assert pose_posterior(flat, 40, PRIOR).moved < 0.1
+    # A gap beyond what the Gaussian says changes nothing.
+    steep = replace(far, prior_gap=100.0)
+    assert pose_posterior(steep, 40, PRIOR).moved == pose_posterior(far, 40, PRIOR).moved
 
 
 def test_a_heading_that_paths_do_not_hold_says_nothing():
