@@ -172,9 +172,9 @@ def judge(
             pose neither begins nor ends a drift.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
-    if not drift.identifiable and chart is None and not crept:
-        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     beyond = _beyond(drift, limits) if enough else {}
+    if not drift.identifiable and chart is None and not crept and not beyond:
+        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     borne_out = chart is not None and chart.moved and drift.move.moved >= config.BORNE_OUT
     alarmed = (_CHARTED[chart.parameter],) if chart is not None and borne_out else crept
     calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
@@ -196,13 +196,20 @@ def judge(
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
-    """The parameters that certainly moved beyond their floors, in units of these."""
-    if drift.move.moved < limits.certainty:
+    """The parameters that certainly moved beyond their floors, in units of these.
+
+    A heading may have changed for certain though nobody can tell how far.
+    """
+    moved = drift.move
+    if moved.moved < limits.certainty:
         return {}
     ratios = {name: drift.ratio(name, limits) for name in drift.identifiable}
-    return {
-        n: ratio for n, ratio in ratios.items() if ratio >= 1 and drift.move.parameters[n] >= LIKELY
+    beyond = {
+        n: ratio for n, ratio in ratios.items() if ratio >= 1 and moved.parameters[n] >= LIKELY
     }
+    if "heading" not in ratios and moved.parameters.get("heading", 0.0) >= limits.certainty:
+        beyond["heading"] = 1.0
+    return beyond
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:

@@ -86,4 +86,3 @@ LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
 NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
 CHART_EVIDENCE = 0.1  # of a chart's log likelihood ratio beyond its level: days differ by the rest
 LEAST_FALSE = 0.02  # of windows of a camera that stands are told to creep, at least
-CERTAIN = 0.99  # that a heading moved: then it is told, however unsure

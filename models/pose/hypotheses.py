@@ -212,18 +212,10 @@ def alone_odds(
 
 
 def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
-    """The drift from the prior pose, by the posterior of an estimate.
-
-    A heading that certainly changed is told, however unsure it is how far.
-    """
-    move = posterior.move
-    told = [
-        name
-        for name in PARAMETERS
-        if name in fused.identifiable
-        or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
-    ]
-    return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
+    """The drift from the prior pose, by the posterior of an estimate."""
+    return drift_between(
+        posterior.parameters, posterior.sd, fused.identifiable, posterior.prior, posterior.move
+    )
 
 
 def _degrees(walking_groups: float | Array) -> Any:

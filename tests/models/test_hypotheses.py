@@ -168,10 +168,9 @@ def drift(fused):
     return drift_of(pose_posterior(fused, 40, PRIOR), fused)
 
 
-def test_a_heading_that_surely_moved_is_told_however_unsure_it_is_how_far():
+def test_a_heading_that_surely_moved_is_not_told_where_nobody_can_tell_how_far():
     three = PARAMETERS[:3]
     wide = SD * np.array([1, 1, 1, 4])
-    told = drift(estimate(heading=30, sd=wide, identifiable=three))
-    assert told.identifiable == PARAMETERS
-    assert math.degrees(told.by.heading_rad) == pytest.approx(30, abs=3)
-    assert drift(estimate(heading=3, sd=wide, identifiable=three)).identifiable == three
+    found = drift(estimate(heading=30, sd=wide, identifiable=three))
+    assert found.identifiable == three
+    assert found.move.parameters["heading"] > 0.99  # the verdict says so
