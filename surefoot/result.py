@@ -15,6 +15,7 @@ from models.pose import (
     drift_of,
     estimate_pose,
     observe,
+    since_alarm,
 )
 from surefoot.camera import Pose
 from surefoot.site import Site
@@ -79,6 +80,7 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     observed = observe(ordered, model.intrinsics, model.prior)
     found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
+    found = since_alarm(found, observed, model, chart)
     posterior = found.posterior
     offset = drift_of(posterior, found.fused)
     verdict = judge(offset, _LIMITS, (), chart)

@@ -44,7 +44,7 @@ CALLED = {
                "config": "{}", "metrics": "{}", "step_s": 0.4},
     "predictions": {"model_id": "m" * 32, "track_pk": 1, "windows": 0},
     "estimates": {"id": 1, "model_id": "m" * 32, "state": "ok", "raw": "{}", "told": '["tilt"]',
-                  "moved_parameters": "{}",
+                  "moved_parameters": "{}", "rivals": "[]", "would_notice": "{}",
                   "suspected": 0, "reference_id": 1, "newest_track_pk": 1, "tracks": 1,
                   "from_s": NOW_S, "to_s": NOW_S + 8, **NUMBERS},
     "alerts": {"id": "a" * 32, "kind": "drift", "state": "firing", "severity": "critical",

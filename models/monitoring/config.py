@@ -43,6 +43,8 @@ BOOTSTRAP_RUNS = 100  # of a still camera, that the level is learned of
 BLOCK = 24
 LEAST_BLOCKS = 12  # of a reference: short ones have shorter blocks
 
+BORNE_OUT = 0.9  # probability by the pose from which a chart's alarm counts
+
 # A clock that is wrong: the scale of a pose has jumped, its angles have not
 CLOCK_LEAST_LOG = math.log(1.08)  # that the height has changed by, at least
 CLOCK_TURNED = 0.25  # at the most, how likely an angle changed, too

@@ -81,12 +81,13 @@ class DriftVerdict:
 
     `excess` is the largest identifiable drift in units of its limit: 1 and more is beyond.
     `drifted` names the parameters that have been beyond since the drift began; empty where there is
-    none.
+    none. `alarmed` says that the chart, which the pose bears out, or the creep is beyond its level.
     """
 
     streak: int
     excess: float
     drifted: tuple[str, ...]
+    alarmed: bool = False
 
     @property
     def drifting(self) -> bool:
@@ -154,13 +155,12 @@ def judge(
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
-    Drifting begins at once where the chart or the creep is beyond its level, and where it is
-    certain that the camera moved, and by more than the floor. The chart's level is of a rate of
-    false alarms already, and far moves, which the chart is not made for, are seen in the pose. It
-    ends where a move is unlikely, or all are below `clear_ratio`, and the chart and the creep are
-    calm. A parameter that is not identifiable is never beyond, and its drift does not end until it
-    is identifiable again or the chart, which asks for all four, is calm. Where nothing is
-    identifiable, nothing changes.
+    Drifting begins at once where the creep is beyond its level, or the chart is and the pose of
+    the tracks that it is of bears it out, and where it is certain that the camera moved, and by
+    more than the floor. It ends where a move is unlikely, or all are below `clear_ratio`, and the
+    chart and the creep are calm. A parameter that is not identifiable is never beyond, and its
+    drift does not end until it is identifiable again or the chart, which asks for all four, is
+    calm. Where nothing is identifiable, nothing changes.
 
     Args:
         drift: of the window.
@@ -172,31 +172,44 @@ def judge(
             pose neither begins nor ends a drift.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
-    if not drift.identifiable and chart is None and not crept:
-        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
     beyond = _beyond(drift, limits) if enough else {}
-    charted = (_CHARTED[chart.parameter],) if chart is not None and chart.moved else crept
+    if not drift.identifiable and chart is None and not crept and not beyond:
+        return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
+    borne_out = chart is not None and chart.moved and drift.move.moved >= config.BORNE_OUT
+    alarmed = (_CHARTED[chart.parameter],) if chart is not None and borne_out else crept
     calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
     known = set(drift.identifiable) if chart is None else set(PARAMETERS)
     well = enough and calm and set(drifted) <= known and _is_well(drift, limits)
-    streak = 1 if beyond or charted else -1 if well else 0
+    streak = 1 if beyond or alarmed else -1 if well else 0
     if not drifted:
-        drifted = tuple(beyond) or charted
+        drifted = tuple(beyond) or alarmed
     elif streak < 0:
         drifted = ()
     else:
         drifted = tuple(name for name in PARAMETERS if name in drifted or name in beyond)
-    return DriftVerdict(streak=streak, excess=max(beyond.values(), default=0.0), drifted=drifted)
+    return DriftVerdict(
+        streak=streak,
+        excess=max(beyond.values(), default=0.0),
+        drifted=drifted,
+        alarmed=bool(alarmed),
+    )
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
-    """The parameters that certainly moved beyond their floors, in units of these."""
-    if drift.move.moved < limits.certainty:
+    """The parameters that certainly moved beyond their floors, in units of these.
+
+    A heading may have changed for certain though nobody can tell how far.
+    """
+    moved = drift.move
+    if moved.moved < limits.certainty:
         return {}
     ratios = {name: drift.ratio(name, limits) for name in drift.identifiable}
-    return {
-        n: ratio for n, ratio in ratios.items() if ratio >= 1 and drift.move.parameters[n] >= LIKELY
+    beyond = {
+        n: ratio for n, ratio in ratios.items() if ratio >= 1 and moved.parameters[n] >= LIKELY
     }
+    if "heading" not in ratios and moved.parameters.get("heading", 0.0) >= limits.certainty:
+        beyond["heading"] = 1.0
+    return beyond
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:
@@ -272,6 +285,16 @@ def may_be_clock(chart: ChartResult) -> bool:
         chart.parameter in (PARAMETERS.index("height"), CLOCK)
         and chart.walking_groups < config.GROUPS_FOR_POSE
     )
+
+
+def charted_clock(chart: ChartResult, turned: float) -> Reason | None:
+    """Reason of an alarm about times; None of one about the pose, or where an angle changed.
+
+    `turned` is the probability that one did, given that the camera moved.
+    """
+    if chart.parameter != CLOCK or turned > config.CLOCK_TURNED:
+        return None
+    return reason_of_chart(chart)
 
 
 def clock_fault(

@@ -21,6 +21,8 @@ from models.pose.alarms import (
     alarm_chart_result,
     begin_creep_log,
     log_creep,
+    raised_by_creep,
+    since_alarm,
     without_creep,
 )
 from models.pose.config import FEWEST_BESIDE
@@ -30,14 +32,17 @@ from models.pose.estimating import (
     estimate_pose,
     unless_failed,
 )
-from models.pose.hypotheses import PosePosterior, drift_of, is_noticed, pose_posterior
+from models.pose.hypotheses import Hypothesis, PosePosterior, drift_of, pose_posterior
 from models.pose.pose_fit import (
     FusedEstimate,
+    Rival,
     WarmStart,
     warm_start_from_bytes,
     warm_start_to_bytes,
 )
+from models.pose.power import PEOPLE, smallest_told
 from models.pose.site import CameraSite, assume_site, learn_site
+from models.pose.states import WindowState, is_noticed, state_of
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -89,6 +94,14 @@ __all__ = [
     "log_creep",
     "observe",
     "pose_posterior",
+    "raised_by_creep",
+    "Hypothesis",
+    "PEOPLE",
+    "Rival",
+    "since_alarm",
+    "smallest_told",
+    "state_of",
+    "WindowState",
     "observe_walks",
     "alarm_chart_result",
     "creep_result",

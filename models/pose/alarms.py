@@ -6,6 +6,7 @@ crept by is taken out of the tracks that it grows by. What is left in it by mist
 of the first, and so the creep is found (`models.monitoring.creep`).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,14 +17,17 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Mask
 from models.monitoring.chart import ChartResult, chart_result
-from models.monitoring.config import RUN
+from models.monitoring.config import BORNE_OUT, RUN
 from models.monitoring.creep import CreepLog, add_day, begin_log, posterior_mean_turns
 from models.monitoring.group_scores import score_groups
+from models.monitoring.verdict import LIKELY
 from models.pose import config
+from models.pose.estimating import PoseFinding, pose_fit_of
 from models.pose.site import CameraSite
 from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
+from models.walking.config import FEWEST_WALKERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +87,49 @@ def alarm_chart_result(
         if reading is not None:
             return replace(reading, track_idx=int(chosen[reading.track_idx]))
     return None
+
+
+def since_alarm(
+    found: PoseFinding, tracks: Observations, site: CameraSite, chart: ChartResult | None
+) -> PoseFinding:
+    """The finding of the tracks that a chart alarms about, where these are of a camera that moved.
+
+    Else it is as it was: the chart knows how people's habits differ within its reference, and no
+    more. So of what it says beyond its level, a tenth counts as evidence beside the pose.
+    """
+    if chart is None or not chart.moved or found.posterior.moved >= BORNE_OUT:
+        return found
+    if found.fused.paths_changed:  # who walks on none of the paths says nothing of the pose
+        return found
+    later = of_tracks(tracks, np.arange(max(chart.track_idx, found.first), tracks.tracks))
+    if later.walkers < FEWEST_WALKERS:
+        return found
+    fit = pose_fit_of(later, site)
+    odds = math.exp(config.CHART_EVIDENCE * (chart.statistic - chart.level))
+    since = replace(
+        found,
+        joint=fit.joint,
+        fused=fit.fused,
+        first=max(chart.track_idx, found.first),
+        moved_prior=raised(found.moved_prior, odds),
+    )
+    borne_out = since.posterior.moved >= LIKELY and not fit.fused.paths_differ
+    return since if borne_out else found
+
+
+def raised(probability: float, odds: float) -> float:
+    """A probability after evidence of so many to one."""
+    return probability * odds / (probability * odds + 1 - probability)
+
+
+def raised_by_creep(moved_prior: float, tracks: Observations, alarms_a_year: float) -> float:
+    """The probability that a camera moved, after its creep was told and before its pose says more.
+
+    By how often a still camera is told to creep in so long a window.
+    """
+    span_s = float(tracks.ended_s[-1] - tracks.ended_s[0]) if tracks.tracks else 0.0
+    false = min(max(alarms_a_year * span_s / (365.25 * DAY_S), config.LEAST_FALSE), 1.0)
+    return raised(moved_prior, 1 / false)
 
 
 def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:

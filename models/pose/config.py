@@ -68,6 +68,9 @@ NO_TURN_RAD = np.radians(0.02)
 # the pan, nearly nothing changes a pole's height. Chosen once on seven scenes by time.
 MOVED_PRIOR = 0.2  # that a window is of a camera that has moved: lower, and small moves are missed
 MOVES_IN = np.array([0.5, 0.4, 0.4, 0.5])  # of moves change tilt, roll, height, heading
+ALL_SHARE = 0.3  # of moves change all four: a bracket that is hit, a camera that is hung anew
+TURNED_SHARE = 0.1  # of moves are a pan by hand, far, and nothing else
+SCALE_SHARE = 0.1  # of changes are of the scale alone: a wrong clock looks like a height
 MOVE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.10, math.radians(6.0)])
 # How far a camera that stands may be from its prior pose: brackets sway, and poses are rounded.
 REST_SD = np.array([math.radians(0.1), math.radians(0.1), 0.003, math.radians(0.1)])
@@ -81,4 +84,5 @@ MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
 LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
 # A still camera is told to stand where a turn would have been noticed: at four sd, 12 deg would.
 NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
-CERTAIN = 0.99  # that a heading moved: then it is told, however unsure
+CHART_EVIDENCE = 0.1  # of a chart's log likelihood ratio beyond its level: days differ by the rest
+LEAST_FALSE = 0.02  # of windows of a camera that stands are told to creep, at least

@@ -5,7 +5,7 @@ Since when: whether a camera moved within a window is searched for by how people
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -41,14 +41,14 @@ class PartialFailure:
     error: Exception
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class PoseFinding:
     """The pose of a window, from the newest change on.
 
     `joint` is by speeds alone and `fused` by places too. `change_idx` is the first track after the
     change, None where there was none, and `first` the first that counts. `failures` are of what is
     beside. `warm_start` is where the next estimate may begin; None where it has to search all
-    poses.
+    poses. `moved_prior` is how likely it was, before any track, that the camera has moved.
     """
 
     prior: CameraPose
@@ -58,11 +58,12 @@ class PoseFinding:
     first: int = 0
     failures: tuple[PartialFailure, ...] = ()
     warm_start: WarmStart | None = None
+    moved_prior: float = config.MOVED_PRIOR
 
-    @property
+    @cached_property
     def posterior(self) -> PosePosterior:
         """The posterior over what moved."""
-        return pose_posterior(self.fused, self.joint.walking_groups, self.prior)
+        return pose_posterior(self.fused, self.joint.walking_groups, self.prior, self.moved_prior)
 
     @property
     def drift(self) -> Drift:

@@ -3,6 +3,7 @@
 Ours: log p(pose) = log N(pose; joint estimate) + log likelihood of the paths / variance inflation.
 """
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -29,7 +30,13 @@ from models.pose.modes import (
     find_modes,
     odds_of,
 )
-from models.pose.pose_fit import FusedEstimate, PathNeighbourhood, WarmStart, by_speeds_alone
+from models.pose.pose_fit import (
+    FusedEstimate,
+    PathNeighbourhood,
+    Rival,
+    WarmStart,
+    by_speeds_alone,
+)
 from models.pose.site import CameraSite
 from models.quantiles import chi_squared_above
 from models.reasons import Reason, TracksCode
@@ -82,7 +89,9 @@ def fused_estimate(
         return by_speeds_alone(joint, prior, changed() or _unidentifiable(config.HEADING_SD))
     odds = odds_of(modes)
     extra = _extra_covariance(modes, odds, values, covariance, warm_start)
-    return _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
+    found = _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
+    at_prior = float(posterior.values(array_of(prior)[None])[0])
+    return replace(found, prior_gap=2 * (modes[0].peak.value - at_prior))
 
 
 def _fitting(modes: list[Mode], paths: PathReference) -> list[tuple[Mode, Array]]:
@@ -187,7 +196,9 @@ def _estimate_of(
     """The estimate of a pose and its covariance, with what else explains the tracks."""
     best, sd = modes[0], np.sqrt(np.diag(covariance))
     others = list(zip(modes[1:], odds[1:], strict=True))
-    rivals = tuple(float(mode.candidate[3]) for mode, own in others if own > config.RIVAL)
+    rivals = tuple(
+        Rival(values=mode.candidate, odds=float(own)) for mode, own in others if own > config.RIVAL
+    )
     near = [mode.candidate for mode, own in others if own > config.NO_RIVAL]
     # What speeds leave open, places alone do not determine: crowds that all cross the picture fit
     # a map at a tilt that is ten degrees off, and it seems sharp there.
@@ -209,11 +220,14 @@ def _estimate_of(
 
 
 def _reason(
-    heading: float, rivals: tuple[float, ...], sd: float, prior: CameraPose
+    heading: float, rivals: tuple[Rival, ...], sd: float, prior: CameraPose
 ) -> Reason | None:
     """The reason of a heading that is ambiguous or unsure; None of others."""
     if rivals:
-        turns = sorted(turn - prior.heading_rad for turn in (heading, *rivals))
+        turns = sorted(
+            turn - prior.heading_rad
+            for turn in (heading, *(float(rival.values[3]) for rival in rivals))
+        )
         return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
     return _unidentifiable(sd) if sd > IDENTIFIABLE_SD[3] else None
 

@@ -12,12 +12,13 @@ Source: Raftery 1995, the average over models; Lange, Little and Taylor 1989, St
 import math
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
-from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
-from models.geometry.rotation import Array
+from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.rotation import Array, Mask
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
@@ -27,6 +28,20 @@ _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 # Of each hypothesis (K,): which parameters moved, and how far: the first is that none has.
 _MOVED_IN = np.concatenate([_SUBSETS, _SUBSETS[1:]])
 _FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
+_ALL = _MOVED_IN.all(axis=1)
+_SCALE, _PAN = (
+    np.equal(_MOVED_IN, np.isin(PARAMETERS, alone)).all(axis=1) for alone in ("height", "heading")
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """Which parameters moved, `far` or not, how likely that is, and the offset (4,) if so."""
+
+    moved: tuple[str, ...]
+    far: bool
+    weight: float
+    offset: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,13 +50,16 @@ class PosePosterior:
 
     Means are offsets of tilt, roll, log height and heading from the prior pose. By the first
     hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing.
+
+    The offset leans on how seldom cameras move; how far off it may be does not. It is asked of the
+    hypotheses by which all may have moved: a turn that is too small to be noticed is in there.
     """
 
     prior: CameraPose
     weights: Array
     means: Array
     covariances: Array
-    seen: Array
+    seen: Mask
 
     @property
     def moved(self) -> float:
@@ -70,10 +88,11 @@ class PosePosterior:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (4, 4) of the mixture."""
-        apart = self.means - self.offset
-        between = np.einsum("k,ki,kj->ij", self.weights, apart, apart)
-        return np.asarray(np.einsum("k,kij->ij", self.weights, self.covariances) + between)
+        """The covariance (4, 4) around the mean offset, whatever moved."""
+        weights = self._free_weights
+        apart = self.means[_ALL] - self.offset
+        between = np.einsum("k,ki,kj->ij", weights, apart, apart)
+        return np.asarray(np.einsum("k,kij->ij", weights, self.covariances[_ALL]) + between)
 
     @property
     def parameters(self) -> PoseParameters:
@@ -85,16 +104,36 @@ class PosePosterior:
         """The standard deviations, named."""
         return PoseParameters.sd_of_array(self.covariance, self.parameters.height_m)
 
+    def likeliest(self, most: int) -> list[Hypothesis]:
+        """The likeliest hypotheses, the likeliest first."""
+        return [
+            Hypothesis(
+                moved=tuple(n for n, own in zip(PARAMETERS, _MOVED_IN[k], strict=True) if own),
+                far=bool(_FAR[k]),
+                weight=float(self.weights[k]),
+                offset=self.means[k],
+            )
+            for k in np.argsort(-self.weights, kind="stable")[:most].tolist()
+        ]
+
     def interval(self, name: str, level: float) -> tuple[float, float]:
         """The central interval of a parameter's offset that holds it with a probability.
 
-        Of a mixture: where the camera surely stands it is as narrow as that is known.
+        Whatever moved; the mean offset is in it.
         """
         at = PARAMETERS.index(name)
-        means, sds = self.means[:, at], np.sqrt(self.covariances[:, at, at])
+        means, sds = self.means[_ALL, at], np.sqrt(self.covariances[_ALL, at, at])
         tails = ((1 - level) / 2, (1 + level) / 2)
-        low, high = (_quantile(self.weights, means, sds, tail) for tail in tails)
-        return low, high
+        low, high = (_quantile(self._free_weights, means, sds, tail) for tail in tails)
+        offset = float(self.offset[at])
+        return min(low, offset), max(high, offset)
+
+    @property
+    def _free_weights(self) -> Array:
+        """The weights (2,) of all having moved, near and far, by themselves."""
+        weights = self.weights[_ALL]
+        whole = weights.sum()
+        return weights / whole if whole > 0 else np.array([1.0, 0.0])
 
 
 def pose_posterior(
@@ -112,26 +151,26 @@ def pose_posterior(
         prior: the prior pose.
         moved_prior: how likely it is, before any track, that the camera has moved.
     """
-    enough = walking_groups >= FEWEST_GROUPS
-    seen = np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
+    seen = seen_parameters(fused, walking_groups)
     offset = fused.values - array_of(prior)
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]
-    degrees = config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
+    degrees = _degrees(walking_groups)
     spreads = (
         np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
     )
-    log_weights = _log_prior(moved_prior)
-    means, covariances = np.zeros((len(_MOVED_IN), 4)), np.zeros((len(_MOVED_IN), 4, 4))
-    for number, spread in enumerate(spreads):
-        move = np.diag(spread**2)
-        marginal = noise + move[np.ix_(seen, seen)]
-        gain = np.linalg.solve(marginal, move[seen]).T
-        squared = float(offset[seen] @ np.linalg.solve(marginal, offset[seen]))
-        log_weights[number] += _log_student(squared, marginal, degrees)
-        means[number] = gain @ offset[seen]
-        heavy = (degrees + squared) / (degrees + seen.sum())
-        covariances[number] = (move - gain @ move[seen]) * heavy + np.diag(config.REST_SD**2)
+    moves = np.einsum("ki,ij->kij", spreads**2, np.eye(len(PARAMETERS)))
+    marginals = noise + moves[:, seen][:, :, seen]
+    gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
+    squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
+    # A mode may be far from a Gaussian: the prior pose is never less likely than people say of it.
+    squared[0] = min(squared[0], max(fused.prior_gap, 0.0))
+    log_weights = _log_prior(moved_prior) + _log_student(squared, marginals, degrees)
+    means = gains @ offset[seen]
+    # The variance of a t: of few groups it is wider than that of a normal distribution.
+    heavy = (degrees + squared) / (degrees + seen.sum() - 2)
+    covariances = (moves - gains @ moves[:, seen]) * heavy[:, None, None]
+    covariances = covariances + np.diag(config.REST_SD**2)
     log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
     if fused.paths_changed:
         away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]
@@ -145,40 +184,52 @@ def pose_posterior(
     )
 
 
+def seen_parameters(fused: FusedEstimate, walking_groups: int) -> Mask:
+    """Of which parameters (4,) tracks say something."""
+    enough = walking_groups >= FEWEST_GROUPS
+    return np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
+
+
+def alone_odds(
+    off_sd: Array, variances: Array, seen: Mask, walking_groups: Array, moved_prior: float
+) -> Array:
+    """Log odds (S, N) of a near move in one parameter, by estimates that are so far off the prior.
+
+    Args:
+        off_sd: in standard deviations (S, N) of one that is off in nothing else.
+        variances: of them (S, N).
+        seen: of which parameters (4,) tracks say something: S of them.
+        walking_groups: of the windows (N,).
+        moved_prior: how likely it is, before any track, that the camera has moved.
+    """
+    priors = _log_prior(moved_prior)[: len(_SUBSETS)]
+    alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
+    degrees, size = _degrees(walking_groups), int(seen.sum())
+    wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
+    fits = np.log1p(off_sd**2 / degrees) - np.log1p(off_sd**2 / wider / degrees)
+    evidence = (degrees + size) / 2 * fits - np.log(wider) / 2
+    return np.asarray(alone[seen, None] - priors[0] + evidence)
+
+
 def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
-    """The drift from the prior pose, by the posterior of an estimate.
-
-    A heading that certainly changed is told, however unsure it is how far.
-    """
-    move = posterior.move
-    told = [
-        name
-        for name in PARAMETERS
-        if name in fused.identifiable
-        or (name == "heading" and fused.registered and move.parameters[name] >= config.CERTAIN)
-    ]
-    return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, move)
+    """The drift from the prior pose, by the posterior of an estimate."""
+    return drift_between(
+        posterior.parameters, posterior.sd, fused.identifiable, posterior.prior, posterior.move
+    )
 
 
-def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:
-    """True where a turn of 12 deg would have been noticed, and none of 5 deg may have been made.
-
-    Of a site that is `mapped`, in heading too; without a map nobody can tell that.
-    """
-    angles = [name for name in ANGLES if mapped or name != "heading"]
-    sds = np.sqrt(np.diag(fused.covariance))
-    if (mapped and not fused.registered) or fused.paths_changed:
-        return False
-    noticed = all(sds[PARAMETERS.index(name)] < config.NOTICED_SD for name in angles)
-    ends = [abs(end) for name in angles for end in posterior.interval(name, 0.9)]
-    return noticed and max(ends) < config.NOTICED_RAD
+def _degrees(walking_groups: float | Array) -> Any:
+    """Degrees of freedom of an estimate: few groups tell less surely what their covariance is."""
+    return config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
 
 
 def _log_prior(moved_prior: float) -> Array:
-    """Log prior weights (K,): parameters move each by itself, some far."""
+    """Log prior weights (K,): each parameter moves by itself, or all, one turn, or the scale."""
     shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - config.MOVES_IN).prod(axis=1)
-    some = shares / (1 - shares[0])
-    weights = moved_prior * some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
+    rest = 1 - config.ALL_SHARE - config.SCALE_SHARE - config.TURNED_SHARE
+    some = rest * shares / (1 - shares[0]) + config.ALL_SHARE * _ALL + config.SCALE_SHARE * _SCALE
+    some = some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
+    weights = moved_prior * (some + config.TURNED_SHARE * (_PAN & _FAR))
     weights[0] = 1 - moved_prior
     return np.asarray(np.log(weights))
 
@@ -200,15 +251,15 @@ def _by_paths(
     return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
 
 
-def _log_student(squared: float, scale: Array, degrees: float) -> float:
-    """The log density of a t of so many degrees of freedom at a squared Mahalanobis distance."""
-    size = len(scale)
-    _, log_determinant = np.linalg.slogdet(scale)
-    return float(
+def _log_student(squared: Array, scales: Array, degrees: float) -> Array:
+    """Log densities (K,) of t's of so many degrees of freedom at squared Mahalanobis distances."""
+    size = scales.shape[-1]
+    _, log_determinants = np.linalg.slogdet(scales)
+    return np.asarray(
         gammaln((degrees + size) / 2)
         - gammaln(degrees / 2)
-        - 0.5 * (size * math.log(degrees * math.pi) + log_determinant)
-        - (degrees + size) / 2 * math.log1p(squared / degrees)
+        - 0.5 * (size * math.log(degrees * math.pi) + log_determinants)
+        - (degrees + size) / 2 * np.log1p(squared / degrees)
     )
 
 

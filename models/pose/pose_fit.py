@@ -7,6 +7,7 @@ whether one pose explains all tracks: any sign of that, and a share of the windo
 all poses were searched, leads to the full search.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,16 +46,25 @@ class PathNeighbourhood:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """Another pose (4,) that explains the tracks, with its odds against the best."""
+
+    values: Array
+    odds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FusedEstimate:
     """Tilt, roll, log height, heading (4,) with their covariance (4, 4).
 
     `identifiable` names those of tilt, roll, height, heading that the tracks determine; `reason`
     says what is wrong with the paths, if anything. `raw` (4,) is before their bias is taken off;
     None where they had no part: then all is the joint estimate's and the heading the prior pose's.
-    `rivals` are headings (radians) of other poses that explain the tracks about as well. `modes`
+    `rivals` are other poses that explain the tracks about as well. `modes`
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `path_fit` is the sum over walking groups of how well they fit the paths at `raw`,
-    in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors.
+    in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors;
+    `prior_gap` is twice what the log posterior is lower there.
     """
 
     values: Array
@@ -62,10 +72,11 @@ class FusedEstimate:
     identifiable: tuple[str, ...]
     reason: Reason | None
     raw: Array | None = None
-    rivals: tuple[float, ...] = ()
+    rivals: tuple[Rival, ...] = ()
     modes: tuple[Array, ...] = ()
     path_fit: float = 0.0
     prior_loss: float = 0.0
+    prior_gap: float = math.inf
     neighbourhood: PathNeighbourhood | None = None
 
     @property
@@ -77,6 +88,12 @@ class FusedEstimate:
     def paths_changed(self) -> bool:
         """True if people walk on none of the site's paths, wherever the camera looks."""
         return self.reason is not None and self.reason.code == TracksCode.PATHS_CHANGED
+
+    @property
+    def paths_differ(self) -> bool:
+        """True if people fit the site's paths nowhere, or walk them another way."""
+        differ = (TracksCode.PATHS_CHANGED, TracksCode.WAYS_CHANGED)
+        return self.reason is not None and self.reason.code in differ
 
     @property
     def parameters(self) -> PoseParameters:

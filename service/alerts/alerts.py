@@ -56,6 +56,7 @@ def open_alert(
     *,
     reasons: Reasons,
     changed_after: datetime | None = None,
+    evidence: dict[str, Any] | None = None,
     source: AlertSource = AlertSource.ESTIMATE,
 ) -> AlertRecord | None:
     """Open an alert, or bring the open one up to date; None where somebody is at the camera.
@@ -91,6 +92,7 @@ def open_alert(
         )
     record.severity, record.source = severity, source
     record.drift, record.reasons, record.updated_at = drift, reasons, now
+    record.evidence = evidence
     if change == MessageType.ALERT_OPENED:
         session.add(record)
         session.flush()
@@ -171,6 +173,20 @@ def show_alert(session: Session, alert_id: str) -> AlertRecord:
     if record is None:
         raise NotFoundError(f"alert_id: there is no alert {alert_id!r}")
     return record
+
+
+def evidence_of_alert(session: Session, alert_id: str) -> dict[str, Any]:
+    """What an estimate was by that stands behind an alert; angles in radians.
+
+    Raises:
+        NotFoundError: there is no such alert, or no estimate stands behind it.
+    """
+    record = show_alert(session, alert_id)
+    if record.evidence is None:
+        raise NotFoundError(
+            f"alert_id: {record.kind} is not told by an estimate, it has no evidence"
+        )
+    return record.evidence
 
 
 def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecord]:

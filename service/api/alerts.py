@@ -1,7 +1,8 @@
 """`/alerts`: list, show, acknowledge, silence, resolve."""
 
+from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from fastapi import APIRouter, Query
 from pydantic import BaseModel, BeforeValidator, Field
@@ -9,12 +10,24 @@ from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
-from service.api.schemas import Body, Moment, Out, ReasonCode, ReasonValues, SinceOut, Text, Who
+from service.api.schemas import (
+    Body,
+    Moment,
+    Out,
+    ReasonCode,
+    ReasonValues,
+    RivalOut,
+    SinceOut,
+    Text,
+    Who,
+)
 from service.cameras import decisions
+from service.degrees import in_degrees
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
 from service.notifications.outbox import alert_body
 from service.store.access import name_in
 from service.store.alerts import AlertFilter, AlertRecord
+from service.wording.times import from_seconds
 
 
 class AcknowledgeBody(Body):
@@ -101,6 +114,76 @@ class AlertList(BaseModel):
     items: list[AlertOut]
 
 
+class OffsetOut(BaseModel):
+    """A pose less the prior pose, or standard deviations of that."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+    heading_deg: float
+
+
+class HypothesisOut(BaseModel):
+    """What may have moved, near or far: how likely that is, and the offset if it is so."""
+
+    moved: list[str]
+    far: bool
+    weight: float
+    offset: OffsetOut
+
+
+class StatisticOut(BaseModel):
+    """A test's statistic and the level that it alarms beyond."""
+
+    statistic: float
+    level: float
+
+
+class ChartOut(StatisticOut):
+    """Of the drift chart: it is of so many walking groups."""
+
+    walking_groups: int
+
+
+class EvidenceOut(BaseModel):
+    """What the newest estimate behind an alert was by: statistics, and nothing about a person.
+
+    `offset` is the estimate before any hypothesis is weighed; `prior_loss_sd` how much worse people
+    fit the learned paths at the prior pose than there, in standard errors.
+    """
+
+    tracks: int
+    walking_groups: int
+    from_: datetime = Field(serialization_alias="from")
+    to: datetime
+    moved: float
+    hypotheses: list[HypothesisOut]
+    offset: OffsetOut
+    offset_sd: OffsetOut
+    registered: bool
+    prior_loss_sd: float
+    rivals: list[RivalOut]
+    chart: ChartOut | None
+    creep: StatisticOut | None
+
+    @classmethod
+    def from_value(cls, evidence: Mapping[str, Any]) -> Self:
+        """The body of stored evidence."""
+        body = in_degrees(evidence)
+        hypotheses = [in_degrees(each) for each in evidence["hypotheses"]]
+        for each in hypotheses:
+            each["moved"] = [name.replace("_rad", "_deg") for name in each["moved"]]
+        return cls.model_validate(
+            {
+                **body,
+                "from_": from_seconds(body["from_s"]),
+                "to": from_seconds(body["to_s"]),
+                "hypotheses": hypotheses,
+                "rivals": [in_degrees(each) for each in evidence["rivals"]],
+            }
+        )
+
+
 router = APIRouter(prefix="/alerts", tags=["alerts"])
 
 
@@ -130,6 +213,12 @@ def list_all(
 def show(alert_id: str, session: ReadDep) -> AlertDetail:
     """An alert, and what was done with it."""
     return _with_acts(session, alerts.show_alert(session, alert_id))
+
+
+@router.get("/{alert_id}/evidence")
+def evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
+    """What the newest estimate behind an alert was by."""
+    return EvidenceOut.from_value(alerts.evidence_of_alert(session, alert_id))
 
 
 @router.post("/{alert_id}/acknowledge")

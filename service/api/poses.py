@@ -17,7 +17,17 @@ from service.api.middleware.dependencies import (
     StateDep,
     WriteDep,
 )
-from service.api.schemas import Body, Moment, Out, PoseOut, ReasonCode, ReasonValues, SinceOut, Who
+from service.api.schemas import (
+    Body,
+    Moment,
+    Out,
+    PoseOut,
+    ReasonCode,
+    ReasonValues,
+    RivalOut,
+    SinceOut,
+    Who,
+)
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
 from service.degrees import in_degrees
@@ -101,6 +111,8 @@ class ServedPoseOut(BaseModel):
     drift: DriftOut | None
     moved: float | None
     moved_parameters: dict[str, float | None]
+    rivals: list[RivalOut]
+    would_notice: dict[str, dict[int, float] | None]
     since: SinceOut
     estimates: dict[str, Any]
     reference: ReferenceOut
@@ -127,6 +139,10 @@ class ServedPoseOut(BaseModel):
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             moved=None if estimate is None else estimate.moved,
             moved_parameters=_moved_parameters(estimate),
+            rivals=[]
+            if estimate is None
+            else [RivalOut.model_validate(in_degrees(each)) for each in estimate.rivals],
+            would_notice=_would_notice(estimate),
             since=SinceOut(
                 after=None if estimate is None else estimate.drift_after,
                 before=None if estimate is None else estimate.drift_since,
@@ -182,6 +198,17 @@ def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None
     """The probability that each number of a pose changed; None where nothing is known."""
     shares = {} if estimate is None else estimate.moved_parameters
     return {field: shares.get(name) for name, field in _FIELDS.items()}
+
+
+def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
+    """The smallest move of each number that so many people would tell; None where none is."""
+    known = {} if estimate is None else in_degrees(estimate.would_notice)
+    return {
+        field: None
+        if known.get(field) is None
+        else dict(zip(known["people"], known[field], strict=True))
+        for field in _FIELDS.values()
+    }
 
 
 router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])

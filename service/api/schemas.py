@@ -173,6 +173,16 @@ class PriorPoseBody(Body):
         )
 
 
+class RivalOut(BaseModel):
+    """Another pose that explains the tracks, with its odds against the served one."""
+
+    height_m: float
+    tilt_deg: float
+    roll_deg: float
+    heading_deg: float
+    odds: float
+
+
 class SinceOut(BaseModel):
     """The times between which a camera moved: it stood at `after` and had moved by `before`."""
 

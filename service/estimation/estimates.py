@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import (
-    LIKELY,
     Drift,
     DriftVerdict,
+    charted_clock,
     clock_fault,
     judge,
     may_be_clock,
@@ -20,11 +20,12 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import CLOCK, drift_of, is_noticed
+from models.pose import drift_of, state_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, Answer, EventType, Outcome, PoseState, Severity
+from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.finding import Finding
 from service.job_queue import JobQueue
@@ -61,7 +62,7 @@ class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
     `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
-    frame rate looks wrong; `charted` says that the chart or the creep is beyond its level.
+    frame rate looks wrong.
     """
 
     state: PoseState
@@ -70,7 +71,6 @@ class Judgement:
     after: datetime | None = None
     since: datetime | None = None
     clock: Reason | None = None
-    charted: bool = False
 
 
 def save_estimate(
@@ -101,7 +101,8 @@ def save_estimate(
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
-        _update_alerts(session, settings, camera.id, drift, judgement)
+        kept = alert_evidence(finding, evidence.prior)
+        _update_alerts(session, settings, camera.id, drift, judgement, kept)
     session.add(record)
     if finding.last is not None:
         session.merge(finding.last)
@@ -157,9 +158,8 @@ def _judge(
 ) -> Judgement:
     """The judgement of an estimate after its reference."""
     clock = clock_fault(drift, finding.posterior.turned, evidence.prior, frame_rate_hz)
-    # What people do who are not where the reference's were says nothing of which parameter moved.
     gone = finding.fused.paths_changed
-    reading, creep = None if gone else finding.reading, finding.creep
+    reading, creep = finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
         reading = None
     verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=finding.enough)
@@ -175,10 +175,8 @@ def _judge(
         finding.pieces,
         *finding.failures,
     )
-    charted = reading if reading is not None and reading.moved else None
-    if charted is not None and clock is None and charted.parameter == CLOCK:
-        clock = reason_of_chart(charted)
-    alarmed = charted is not None or (creep is not None and creep.moved)
+    if clock is None and reading is not None and verdict.alarmed:
+        clock = charted_clock(reading, finding.posterior.turned)
     state = _state(reference, history, verdict, evidence, finding)
     after, since = _since(reference, history, verdict, evidence, finding, state)
     return Judgement(
@@ -188,7 +186,6 @@ def _judge(
         after=after,
         since=since,
         clock=clock,
-        charted=alarmed,
     )
 
 
@@ -199,23 +196,21 @@ def _state(
     evidence: Evidence,
     finding: Finding,
 ) -> PoseState:
-    """The state of a camera; that it stands is said where a turn would have been noticed.
+    """The state of a camera.
 
     Of fewer people than `enough`, nothing is said against what somebody said. That people walk on
     none of the paths is so until some are found to walk there again.
     """
-    if verdict.drifting:
-        return PoseState.DRIFTING
     mapped = evidence.flow is not None
+    state = PoseState(
+        state_of(finding.posterior, finding.fused, drifting=verdict.drifting, mapped=mapped)
+    )
     fits = finding.enough and (finding.fused.registered or not mapped)
-    if finding.enough and finding.fused.paths_changed or (history.unsure and not fits):
+    if history.unsure and not fits and state != PoseState.DRIFTING:
         return PoseState.UNSURE
-    if finding.posterior.moved >= LIKELY and finding.enough:
-        return PoseState.SUSPECTED
-    if not finding.enough and reference.answer == Answer.FALSE_ALARM:
-        return PoseState.OK
-    noticed = is_noticed(finding.posterior, finding.fused, mapped=mapped)
-    return PoseState.OK if noticed and finding.fused.identifiable else PoseState.LEARNING
+    if finding.enough or state in (PoseState.DRIFTING, PoseState.OK):
+        return state
+    return PoseState.OK if reference.answer == Answer.FALSE_ALARM else PoseState.LEARNING
 
 
 def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:
@@ -268,7 +263,12 @@ def _at(time_s: float | None) -> datetime | None:
 
 
 def _update_alerts(
-    session: Session, settings: Settings, camera_id: str, drift: Drift, judgement: Judgement
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    drift: Drift,
+    judgement: Judgement,
+    evidence: dict[str, Any],
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
@@ -286,6 +286,7 @@ def _update_alerts(
                 identifiable_drift(drift),
                 None,
                 reasons=judgement.reasons,
+                evidence=evidence,
             )
         return
     # What was named a clock fault stays one until an angle has drifted too.
@@ -294,7 +295,7 @@ def _update_alerts(
     kind = AlertKind.CLOCK if clock else AlertKind.DRIFT
     for before in firing - {kind}:
         end_alert(session, camera_id, before, Outcome.CLEARED, note=fired_as(kind))
-    if drift.identifiable or judgement.charted:
+    if drift.identifiable or verdict.alarmed:
         open_alert(
             session,
             settings,
@@ -305,6 +306,7 @@ def _update_alerts(
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
             changed_after=judgement.after,
+            evidence=evidence,
         )
 
 
@@ -332,6 +334,8 @@ def _record(
         drifted=list(judgement.verdict.drifted),
         moved=drift.move.moved,
         moved_parameters=dict(drift.move.parameters),
+        rivals=rivals_of(finding),
+        would_notice=would_notice(finding.power, evidence.prior),
         drift_after=judgement.after,
         drift_since=judgement.since,
         raw=_raw(finding),

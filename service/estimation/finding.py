@@ -2,17 +2,17 @@
 
 import hashlib
 import logging
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from models.durations import DAY_S
 from models.errors import CheckpointError
+from models.geometry.rotation import Array
 from models.pose import (
-    CLOCK,
     CREEP_SHARE,
     AlarmRate,
     CameraSite,
@@ -22,6 +22,7 @@ from models.pose import (
     JointEstimate,
     Observations,
     PartialFailure,
+    PoseFinding,
     PosePosterior,
     WarmStart,
     alarm_chart_result,
@@ -31,8 +32,10 @@ from models.pose import (
     estimate_pose,
     observe_walks,
     paths_from_bytes,
-    pose_posterior,
+    raised_by_creep,
     reference_from_bytes,
+    since_alarm,
+    smallest_told,
     unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -52,8 +55,6 @@ from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord
 
 log = logging.getLogger("surefoot.recalibration")
-
-_LEAST_FALSE = 1e-4  # of windows alarm though the camera stands, whatever their length
 
 _Made = TypeVar("_Made")
 
@@ -96,11 +97,12 @@ class PartialFailures:
 class Finding:
     """The result of the evidence. `tracks` are those after the `change`, where one was found.
 
-    `posterior` is over what moved, by the `fused` estimate; `enough` people came since a person
-    said how the camera stands, or not. `reading` is what the drift chart says of the tracks after
-    the change, or of all where these are too few, long before a pose can say how far; None where
-    there is no chart. `creep` is what the anchor says of weeks; once the camera has crept, all else
-    is by its first map, too.
+    `posterior` is over what moved, by the `fused` estimate; `power` (4, 3) the smallest moves that
+    would be told of 60, 250 and 800 people, None before the site is known; `enough` people came
+    since a person said how the camera stands, or not. `reading` is what the drift chart says of the
+    tracks after the change, or of all where these are too few; None where there is no chart. Where
+    it alarms and the pose does not rule it out, the `tracks` are those that it is of. `creep` is
+    what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """
@@ -108,6 +110,7 @@ class Finding:
     joint: JointEstimate
     fused: FusedEstimate
     posterior: PosePosterior
+    power: Array | None
     enough: bool
     averaged: PoseEstimate | None
     reading: ChartResult | None
@@ -157,17 +160,18 @@ def compute_finding(
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
+    found = replace(found, moved_prior=evidence.moved_prior)
+    if creep is not None and creep.moved:
+        raised = raised_by_creep(evidence.moved_prior, observed, evidence.alarms_a_year)
+        found = replace(found, moved_prior=raised)
+    found = since_alarm(found, observed, site, reading)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     return Finding(
         joint=found.joint,
         fused=found.fused,
-        posterior=pose_posterior(
-            found.fused,
-            found.joint.walking_groups,
-            evidence.prior,
-            _moved_prior(evidence, found.fused, reading, creep),
-        ),
+        posterior=found.posterior,
+        power=_power(found, site) if site.learned else None,
         enough=asked_enough(evidence),
         averaged=averaged,
         reading=reading,
@@ -180,22 +184,15 @@ def compute_finding(
     )
 
 
-def _moved_prior(
-    evidence: Evidence, fused: FusedEstimate, reading: ChartResult | None, creep: Creep | None
-) -> float:
-    """The probability that the camera moved, before the pose says more.
-
-    Where the chart or the creep alarms, by how seldom that of a still camera does in so long a
-    window. Of people on none of the paths, and of times, the chart says nothing about the pose.
-    """
-    charted = reading is not None and reading.moved and reading.parameter != CLOCK
-    crept = creep is not None and creep.moved
-    prior = evidence.moved_prior
-    if not crept and (not charted or fused.paths_changed):
-        return prior
-    span_s = evidence.tracks[-1].ended_s - evidence.tracks[0].started_s
-    false = min(evidence.alarms_a_year * span_s / (365.25 * DAY_S), 1.0)
-    return prior / (prior + (1 - prior) * max(false, _LEAST_FALSE))
+def _power(found: PoseFinding, site: CameraSite) -> Array:
+    """The smallest moves (4, 3) that would be told at a site by its people."""
+    return smallest_told(
+        found.fused,
+        found.joint.walking_groups,
+        found.joint.walkers,
+        math.inf if site.paths is None else site.paths.people,
+        found.moved_prior,
+    )
 
 
 def basis_of(evidence: Evidence, *, crept: bool, suspicious: bool) -> bytes:
@@ -274,13 +271,13 @@ def _read(
     """The chart's result; once a person has said how the camera stands, it begins anew."""
     if site.chart is None:
         return None
+    unanswered = np.array([track.unanswered for track in evidence.tracks])
     rate = AlarmRate(
         alarms_a_year=(1 - CREEP_SHARE) * evidence.alarms_a_year,
         tracks_a_year=evidence.tracks_a_year,
         calm_ratio=evidence.limits.clear_ratio,
         calm_groups=evidence.limits.people,
     )
-    unanswered = np.array([track.unanswered for track in evidence.tracks])
     read = partial(alarm_chart_result, observed, site, rate, counted=unanswered, first=first)
     return failures.unless_failed("chart", read)
 

@@ -193,6 +193,8 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate
         ),
+        deaf=moves.deaf_words(page.pose.status.estimate),
+        told_by=moves.TOLD_BY,
         misplaced=moves.misplaced_words(page.misplaced),
         flags=_flags(page, clock),
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],

@@ -30,6 +30,7 @@ _IS_FIRING = f"state = '{AlertState.FIRING}'"
 class AlertRecord(Record):
     """An alert; at most one of a camera and kind is firing.
 
+    `evidence` is what an estimate was by that fired it or kept it so: statistics, and no people.
     `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
     rhythm, the upkeep, or a group. A group's alert has no camera but `camera_ids`, and its members
     have its id as `group_id`; at most one of a `track_source` and kind is firing. `notified` says
@@ -50,6 +51,7 @@ class AlertRecord(Record):
     severity: Mapped[Severity]
     reasons: Mapped[Reasons]
     drift: Mapped[dict[str, Any]]
+    evidence: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     opened_at: Mapped[datetime]
     changed_after: Mapped[datetime | None]
     changed_at: Mapped[datetime | None]

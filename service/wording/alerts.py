@@ -1,9 +1,12 @@
 """Alerts in words, as pages and an Alertmanager show them, and entries of the log as sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from service.enums import Activity, AlertKind, Outcome
 from service.store.journal import ActivityRecord
+from service.wording.moves import NAMES
 from service.wording.times import Clock
 
 KINDS = {
@@ -59,12 +62,48 @@ _HAPPENED = {
     Activity.TRAINING_FAILED: "A training failed",
     Activity.TRAINING_CANCELLED: "A training was cancelled",
 }
+_LEAST_WEIGHT = 0.01  # of a hypothesis that is worth a line
 _UNASKED = (Outcome.CLEARED, Outcome.CAMERA_REMOVED)
 _BY_ITSELF = {
     Activity.ALERT_RESOLVED: "The alert “{kind}” ended: {outcome}",
     Activity.ALERT_SILENCE_ENDED: "The silence of {alert} ended",
     Activity.SOURCE_USED: "Another source's tracks count; the reference is learned anew",
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvidenceRow:
+    """A part of an alert's evidence: what it is, a share of 1 to be drawn, and in words."""
+
+    label: str
+    share: float
+    words: str
+
+
+def evidence_rows(evidence: Mapping[str, Any]) -> list[EvidenceRow]:
+    """What may have moved, as likely as it is, and how far tests are beyond their levels."""
+    rows = []
+    for each in evidence["hypotheses"]:
+        if each["weight"] >= _LEAST_WEIGHT:
+            named = [NAMES[name.rpartition("_")[0]] for name in each["moved"]]
+            what = f"{', '.join(named)} moved" if named else "it stands"
+            rows.append(
+                EvidenceRow(
+                    label=what[0].upper() + what[1:] + (", far" if each["far"] else ""),
+                    share=each["weight"],
+                    words=f"{100 * each['weight']:.0f} %",
+                )
+            )
+    for name, label in (("chart", "Drift chart"), ("creep", "Slow turn")):
+        test = evidence[name]
+        if test is not None:
+            ratio = test["statistic"] / test["level"]
+            rows.append(
+                EvidenceRow(
+                    label=label, share=min(ratio / 2, 1.0), words=f"{ratio:.1f} of its alarm level"
+                )
+            )
+    return rows
 
 
 def source_change(name: str, last: str | None) -> str:

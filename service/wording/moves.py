@@ -12,18 +12,23 @@ from service.store.estimates import EstimateRecord
 
 # Operators say pan. Height is told apart.
 NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
+TOLD_BY = 250  # people
 _SAYS_DEG, _SAYS_M = 0.1, 0.05  # less is not worth a word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterRow:
-    """One pose parameter as text; `served`, `drift`, `sure` are empty if not identifiable."""
+    """One pose parameter as text; `served`, `drift`, `sure` are empty if not identifiable.
+
+    `told` is the smallest move that so many people would tell; empty where none would be.
+    """
 
     name: str
     prior: str
     served: str = ""
     drift: str = ""
     sure: str = ""
+    told: str = ""
 
 
 def parameter_rows(
@@ -43,8 +48,21 @@ def parameter_rows(
                 "drift": f"{signed(drift, digits)}{unit}",
                 "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
             }
+        if estimate is not None and (least := _least_told(estimate, name)) is not None:
+            row["told"] = f"{least:.{digits}f}{unit}"
         rows.append(ParameterRow(**row))
     return tuple(rows)
+
+
+def deaf_words(estimate: EstimateRecord | None) -> str:
+    """What no number of people would tell of a camera, and what would help; empty where nothing."""
+    notice = {} if estimate is None else estimate.would_notice
+    if not notice or notice["heading_rad"] is not None:
+        return ""
+    return (
+        "A pan would not be told: where people walk does not tell the heading. It would with more "
+        "people in the reference, or with people who go more than one way."
+    )
 
 
 def moved_words(estimate: EstimateRecord, since: str = "") -> str:
@@ -149,6 +167,15 @@ def _height_words(estimate: EstimateRecord) -> str:
     if "height" not in estimate.identifiable or abs(by_m) < _least_height_m(estimate):
         return ""
     return f"{abs(by_m):.2f} m {'higher' if by_m > 0 else 'lower'}"
+
+
+def _least_told(estimate: EstimateRecord, name: str) -> float | None:
+    """The smallest move of a number that `TOLD_BY` people would tell, as it is shown."""
+    notice = estimate.would_notice
+    smallest = notice.get(f"{name}_{'m' if name == 'height' else 'rad'}")
+    if smallest is None:
+        return None
+    return _shown(smallest[notice["people"].index(TOLD_BY)], name)
 
 
 def _least_angle_deg(estimate: EstimateRecord, name: str) -> float:

@@ -125,6 +125,7 @@ def draw_case(
     offset_range: OffsetRange,
     parting: Parting = HALVES_OF_PEOPLE,
     fault: Fault | None = None,
+    heading_rad: float | None = None,
 ) -> ProtocolCase:
     """Part a scene's people in two and offset the camera before the second.
 
@@ -137,6 +138,7 @@ def draw_case(
         offset_range: how far the offset may go.
         parting: who is the reference, and who comes after the offset.
         fault: what is wrong with the tracks, before the offset too unless it sets in later.
+        heading_rad: the offset of the heading; else it is drawn, too.
     """
     rng = np.random.default_rng(seed)
     parts = part_people(scene, parting, rng)
@@ -147,6 +149,8 @@ def draw_case(
         log_height=rng.uniform(-1, 1) * offset_range.log_height,
         heading_rad=rng.uniform(-1, 1) * offset_range.heading_rad,
     )
+    if heading_rad is not None:
+        offset = replace(offset, heading_rad=heading_rad)
     still, moved = scene.true_pose, offset.apply(scene.true_pose)
     begin = rng.uniform() if parting.seen_tracks is not None else 0.0
     reference: Sequence[SceneTrack] = first_seen(

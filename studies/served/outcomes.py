@@ -8,7 +8,8 @@ import numpy as np
 
 from models.errors import CalibrationError
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
-from models.pose import CameraSite, PoseFinding
+from models.monitoring.verdict import judge
+from models.pose import CameraSite, DriftLimits, PoseFinding, state_of
 from studies.protocol.cases import ProtocolCase, angle_deg
 from studies.served.windows import Window, looks
 
@@ -41,7 +42,8 @@ class ServedOutcome:
     `parameters` are tilt, roll, height, heading; none where nothing could be learned or estimated,
     and `failure` says why. `rotation_deg` is the whole rotation between the served and the true
     pose, `height_error` a share of the height. `cuts` windows were cut at a change, where there
-    was none. `mapped` says whether the flow map had a part, `reason` what was said of it.
+    was none. `mapped` says whether the flow map had a part, `reason` what was said of it. `state`
+    is by the last look alone, without a chart, and `moved` the probability that it moved.
     """
 
     reference_tracks: int
@@ -55,6 +57,8 @@ class ServedOutcome:
     reason: str
     seconds: float
     failure: str = ""
+    state: str = ""
+    moved: float | None = None
 
 
 def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> ServedOutcome:
@@ -71,18 +75,26 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
         failure = f"{type(error).__name__}: {error}"
     if last is None or failure:
         return _unserved(case, failure, time.monotonic() - started)
-    served = last.finding.pose
+    found, served = last.finding, last.finding.pose
+    verdict = judge(found.drift, DriftLimits(), ())
     return ServedOutcome(
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
-        used_tracks=last.finding.joint.walkers,
-        parameters=parameters_beside(last.finding, case.prior_pose, case.true_pose),
+        used_tracks=found.joint.walkers,
+        parameters=parameters_beside(found, case.prior_pose, case.true_pose),
         rotation_deg=angle_deg(served, case.true_pose),
         height_error=abs(served.height_m / case.true_pose.height_m - 1),
         cuts=cuts,
-        mapped=last.finding.fused.registered,
-        reason=reason_of(last.finding),
+        mapped=found.fused.registered,
+        reason=reason_of(found),
         seconds=time.monotonic() - started,
+        state=state_of(
+            found.posterior,
+            found.fused,
+            drifting=verdict.drifting,
+            mapped=site is not None and site.paths is not None,
+        ),
+        moved=found.posterior.moved,
     )
 
 

@@ -5,7 +5,7 @@ As the service would see it with a map that never grows: what is served, what al
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from models.pose import (
     alarm_chart_result,
     learn_site,
     observe,
+    since_alarm,
 )
 from models.reasons import TracksCode
 from models.simulation.poses import PoseOffset
@@ -143,9 +144,10 @@ def _watch(
     for look in looks(tracks, site, plan.window):
         finding = look.finding
         result = alarm_chart_result(look.seen, site, rate, first=finding.first)
+        finding = since_alarm(finding, look.seen, site, result)
         verdict = judge(finding.drift, plan.limits, drifted, result)
         drifted = verdict.drifted
-        found.append(_Watched(look=look, alarm=verdict.drifting))
+        found.append(_Watched(look=replace(look, finding=finding), alarm=verdict.drifting))
     return found
 
 

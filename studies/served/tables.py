@@ -2,13 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from models.pose import WindowState
+from models.pose.config import MOVED_PRIOR
 from studies.faults.catalogue import FAULTS
 from studies.lines_file import Heading
 from studies.pages import markers
 from studies.served.figures import Figures, ParameterFigures, figures_of
 from studies.served.outcomes import ServedOutcome
 from studies.served.replays import ReplayOutcome
-from studies.served.tasks import ALONE, MOVES, CaseId, CaseResult, Table
+from studies.served.tasks import ALONE, FAR_DEG, FEW, MOVES, CaseId, CaseResult, Table
 
 BETWEEN = markers("protocol", "python -m studies protocol --write")
 _KNOCKS = {
@@ -50,6 +54,15 @@ def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
         tables.append(_fault_table(cases))
     if replays:
         tables.append(_replay_table(replays))
+    few = [(a, o) for a, o in cases if a.table == Table.FEW]
+    if few:
+        tables.append(_few_table(few))
+    far = [(a, o) for a, o in cases if a.table == Table.FAR]
+    if far:
+        tables.append(_far_table(far))
+    judged = [(a, o) for a, o in cases if a.table != Table.FAULTS and o.moved is not None]
+    if judged:
+        tables.append(_reliability_table(judged))
     return "\n".join(f"{each.rstrip()}\n" for each in tables)
 
 
@@ -159,6 +172,78 @@ def _replay_table(replays: Sequence[tuple[CaseId, ReplayOutcome]]) -> str:
             )
         lines.append(_row(*cells))
     return "**Long recordings in their order**, a map that never grows:\n\n" + "\n".join(lines)
+
+
+def _few_table(cases: _Cases) -> str:
+    """Windows of few tracks: what is served, and what is said."""
+    lines = _head("tracks", "moved", "n", *_SHOWN[:4], "worst, sd", *_STATES)
+    for size in FEW:
+        for knock in dict.fromkeys(a.knock for a, _ in cases):
+            own = [o for a, o in cases if (a.seen, a.knock) == (size, knock)]
+            if own:
+                figures = figures_of(own)
+                worst = max(each.worst_sd or 0.0 for each in figures.parameters)
+                lines.append(
+                    _row(
+                        size,
+                        _KNOCKS[knock],
+                        figures.cases,
+                        *_cells(figures)[:4],
+                        f"{worst:.1f}",
+                        *_states(own),
+                    )
+                )
+    return "**Few tracks**, later people:\n\n" + "\n".join(lines)
+
+
+def _far_table(cases: _Cases) -> str:
+    """Far pans after which 30 people came: what is said, and how far off the heading is."""
+    lines = _head("pan, deg", "n", *_STATES, "told: heading off, deg, median (p90, worst)")
+    enough = [(a, o) for a, o in cases if o.used_tracks >= _ENOUGH]
+    for size in FAR_DEG:
+        own = [o for a, o in enough if abs(int(a.knock.removeprefix("pan"))) == size]
+        if own:
+            told = [o for o in own if o.state == "drifting" and o.parameters[3].identifiable]
+            off = np.abs([o.parameters[3].error for o in told])
+            cell = f"{np.median(off):.1f} ({np.quantile(off, 0.9):.1f}, {off.max():.0f})"
+            lines.append(_row(f"±{size}", len(own), *_states(own), cell if told else "-"))
+    return f"**Far pans**, by {_ENOUGH} people and more:\n\n" + "\n".join(lines)
+
+
+def _reliability_table(cases: _Cases) -> str:
+    """How many had moved, by how likely that was said to be; shares as if 2 of 10 had moved."""
+    lines = _head("moved", "cases that had", "cases that had not", "share, weighed", "said")
+    said = np.array([o.moved for _, o in cases], dtype=np.float64)
+    moved = np.array([a.knock != "still" for a, _ in cases])
+    weights = np.where(
+        moved, MOVED_PRIOR / max(moved.sum(), 1), (1 - MOVED_PRIOR) / max((~moved).sum(), 1)
+    )
+    for tenth in range(10):
+        own = np.minimum((10 * said).astype(int), 9) == tenth
+        if own.any():
+            whole = weights[own].sum()
+            share = f"{(weights * moved)[own].sum() / whole:.2f}"
+            mean = f"{(weights * said)[own].sum() / whole:.2f}"
+            lines.append(
+                _row(
+                    f"{tenth / 10:.1f} to {(tenth + 1) / 10:.1f}",
+                    int((own & moved).sum()),
+                    int((own & ~moved).sum()),
+                    share,
+                    mean,
+                )
+            )
+    return "**Reliability** of `moved`, by the pose alone:\n\n" + "\n".join(lines)
+
+
+_STATES = tuple(WindowState)
+_ENOUGH = 30  # people
+
+
+def _states(outcomes: Sequence[ServedOutcome]) -> list[int]:
+    """How many are in each state; what could not be estimated is still `learning`."""
+    said = [outcome.state or WindowState.LEARNING for outcome in outcomes]
+    return [said.count(state) for state in _STATES]
 
 
 def _cells(figures: Figures) -> list[str]:

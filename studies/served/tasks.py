@@ -1,5 +1,6 @@
 """Tasks of `protocol`: cases and replays of recordings, each with a name of its own."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -27,6 +28,8 @@ class Table(StrEnum):
     PEOPLE = "people"
     FAULTS = "faults"
     REPLAYS = "replays"
+    FEW = "few"
+    FAR = "far"
 
 
 ALONE = ("tilt-alone", "roll-alone", "height-alone", "pan-alone")
@@ -34,7 +37,10 @@ _KNOCKS = {
     Table.TIME: ("still", "pan", "knock", *ALONE),
     Table.PEOPLE: ("still", "pan", "knock", "pan-alone"),
     Table.FAULTS: ("still", "pan"),
+    Table.FEW: ("still", "tilt-alone", "pan-alone", "pan"),
 }
+FEW = (8, 15, 20, 40)  # tracks
+FAR_DEG = (12, 20, 30, 45, 60, 90, 120, 150, 180)  # pans, both ways
 MOVES = ("still", "pan-2", "pan")
 _LONG = 1500  # tracks; of longer recordings parts are taken
 _SIZES = ((200, 100), (1000, 400))
@@ -144,7 +150,12 @@ def _case_ids(
                 )
                 yield (case_id,)
         return
+    if table == Table.FAR:
+        yield from _far_ids(scene, long, seeds, batch)
+        return
     sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
+    if table == Table.FEW:
+        sizes = [(_SIZES[0][0] if long else None, few) for few in FEW]
     names = [""] if table != Table.FAULTS else ["", *faults]
     for seed in seeds:
         for reference, seen in sizes if table != Table.FAULTS else sizes[-1:]:
@@ -161,6 +172,27 @@ def _case_ids(
                 )  # fmt: skip
 
 
+def _far_ids(
+    scene: str, long: bool, seeds: Sequence[int], batch: int
+) -> Iterator[tuple[CaseId, ...]]:
+    """Far pans of a camera: of short recordings all later people come, of long ones 40 and 200."""
+    for seed in seeds if long else seeds[:1]:
+        for seen in (40, 200) if long else (_WINDOW,):
+            yield tuple(
+                CaseId(
+                    table=Table.FAR,
+                    scene=scene,
+                    seed=seed,
+                    knock=f"pan{turn:+d}",
+                    batch=batch,
+                    reference=_SIZES[0][0] if long else None,
+                    seen=seen,
+                )
+                for size in FAR_DEG
+                for turn in ((size, -size) if size < 180 else (size,))
+            )
+
+
 def _served(
     scene: Scene, case_id: CaseId, plan: ReplayPlan, sites: dict[int, CameraSite | None]
 ) -> ServedOutcome:
@@ -170,7 +202,10 @@ def _served(
         seen_tracks=case_id.seen,
     )
     fault = FAULTS[case_id.fault] if case_id.fault else None
-    case = draw_case(scene, case_id.seed, RANGES[case_id.knock], parting, fault)
+    far = case_id.table == Table.FAR
+    heading = math.radians(float(case_id.knock.removeprefix("pan"))) if far else None
+    drawn = RANGES["still" if far else case_id.knock]
+    case = draw_case(scene, case_id.seed, drawn, parting, fault, heading)
     if 0 not in sites:  # the tracks before the knock are the same whatever the knock
         known = observe(case.reference, case.intrinsics, case.prior_pose)
         try:

@@ -1,5 +1,6 @@
 """The calls that the service and the studies share: learn a site, estimate, read the chart."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +10,23 @@ from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
 from models.monitoring.group_scores import score_groups
+from models.monitoring.verdict import judge
 from models.paths.folds import fold_maps
 from models.pose import (
     AlarmRate,
+    DriftLimits,
+    PoseFinding,
     alarm_chart_result,
     assume_site,
     estimate_pose,
     learn_site,
     observe,
+    since_alarm,
 )
 from models.pose.change_point import find_change
+from models.pose.estimating import pose_fit_of
 from models.pose.pose_fit import by_speeds_alone
+from models.reasons import Reason, TracksCode
 from models.tracks.observations import of_tracks
 from models.tracks.trajectory import by_end
 from models.walking.estimate import joint_estimate
@@ -83,6 +90,45 @@ def test_the_chart_alarms_at_the_rate_that_is_allowed(site, window):
     assert result.track_idx == pytest.approx(60, abs=12)
     often = alarm_chart_result(window, site, replace(ONE_A_YEAR, alarms_a_year=100.0))
     assert often.level < result.level
+
+
+def test_an_alarm_of_the_chart_is_judged_by_the_pose_of_the_tracks_that_it_is_of(
+    site, window, tracks
+):
+    # Twenty people after the knock: too few beside sixty for the window's own pose.
+    early = of_tracks(window, np.arange(80))
+    chart = alarm_chart_result(early, site, ONE_A_YEAR)
+    whole = pose_fit_of(early, site)
+    found = PoseFinding(prior=PRIOR, joint=whole.joint, fused=whole.fused, moved_prior=0.01)
+    since = since_alarm(found, early, site, chart)
+    assert since.first == chart.track_idx >= 50
+    assert since.posterior.moved > 0.9 > found.posterior.moved
+    assert abs(since.drift.by.tilt_rad) > 2 * abs(found.drift.by.tilt_rad)
+
+
+def test_an_alarm_that_the_pose_does_not_bear_out_is_none(site, tracks):
+    still = seen(tracks[1])
+    found = estimate_pose(still, site)
+    calm = alarm_chart_result(still, site, ONE_A_YEAR)
+    assert since_alarm(found, still, site, calm) is found
+    loud = replace(calm, statistic=calm.level + 1, track_idx=20)
+    assert since_alarm(found, still, site, loud) is found
+    assert not judge(found.drift, DriftLimits(), (), loud).drifting
+    # A tenth of what is beyond the level counts: 60 of it are odds of 400 to 1.
+    deafening = replace(loud, statistic=calm.level + 60)
+    since = since_alarm(found, still, site, deafening)
+    assert since.first == 20
+    assert since.moved_prior == pytest.approx(1 / (1 + 4 * math.exp(-6)))
+
+
+def test_people_on_no_path_bear_no_alarm_out(site, window):
+    gone = Reason(code=TracksCode.PATHS_CHANGED)
+    whole = pose_fit_of(window, site)
+    fused = replace(whole.fused, reason=gone)
+    found = PoseFinding(prior=PRIOR, joint=whole.joint, fused=fused, moved_prior=1e-6)
+    chart = alarm_chart_result(window, site, ONE_A_YEAR)
+    assert chart.moved
+    assert since_alarm(found, window, site, chart) is found
 
 
 def test_the_chart_asks_those_after_the_change_who_count_or_else_all_who_do(site, window):

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
-from models.pose import pose_posterior
+from models.pose import pose_posterior, smallest_told
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
@@ -137,6 +137,7 @@ def made_up(
         joint=joint,
         fused=fused,
         posterior=pose_posterior(fused, joint.walking_groups, evidence.prior),
+        power=smallest_told(fused, joint.walking_groups, joint.walkers, 200.0),
         enough=asked_enough(evidence),
         averaged=None,
         reading=None,

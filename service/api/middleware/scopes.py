@@ -25,6 +25,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /activity",
         "GET /alerts",
         "GET /alerts/{alert_id}",
+        "GET /alerts/{alert_id}/evidence",
         "GET /cameras",
         "GET /cameras/{camera_id}",
         "GET /cameras/{camera_id}/maintenance",

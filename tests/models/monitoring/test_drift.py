@@ -20,7 +20,8 @@ PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), headi
 LIMITS = DriftLimits(
     certainty=0.99, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7
 )
-SURE = MoveProbabilities(moved=1.0, parameters=dict.fromkeys(PARAMETERS, 1.0))
+# A heading that is not told may not be said to have changed for certain.
+SURE = MoveProbabilities(moved=1.0, parameters={**dict.fromkeys(PARAMETERS, 1.0), "heading": 0.9})
 
 
 THREE = ("tilt", "roll", "height")
@@ -155,6 +156,26 @@ def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
     assert judge(drift(1.5), LIMITS, alarmed.drifted, charted(6.5)).drifting
     unknown = drift(unidentifiable=THREE)
     assert judge(unknown, LIMITS, (), charted(10.5)).drifting
+
+
+def test_a_heading_that_certainly_changed_is_a_drift_though_nobody_can_tell_how_far():
+    untold = drift(unidentifiable=("heading",), move=likely(1.0, heading=0.995))
+    verdict = judge(untold, LIMITS, ())
+    assert (verdict.drifted, verdict.excess) == (("heading",), 1.0)
+    assert not judge(
+        drift(unidentifiable=("heading",), move=likely(1.0, heading=0.9)), LIMITS, ()
+    ).drifting
+    # Of people who tell nothing else, too.
+    nothing = drift(unidentifiable=PARAMETERS, move=likely(1.0, heading=0.995))
+    assert judge(nothing, LIMITS, ()).drifted == ("heading",)
+
+
+def test_an_alarm_of_the_chart_counts_where_the_pose_bears_it_out():
+    for moved, alarmed in ((0.89, False), (0.91, True)):
+        verdict = judge(drift(move=likely(moved)), LIMITS, (), charted(10.5))
+        assert (verdict.alarmed, verdict.drifting) == (alarmed, alarmed)
+    # A drift that was told before lasts while the chart alarms, whatever bears it out.
+    assert judge(drift(move=likely(0.1)), LIMITS, ("heading",), charted(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():

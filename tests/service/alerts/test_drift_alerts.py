@@ -82,7 +82,7 @@ def test_a_pan_alone_fires_and_clears_as_any_drift(bench):
     assert (alert["kind"], alert["severity"]) == ("drift", "critical")
     assert alert["drift"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
     assert alert["drift"]["angle_deg"] == pytest.approx(5.0, abs=0.5)
-    assert "heading -4.99 deg" in alert["reason"]
+    assert "heading -5.00 deg" in alert["reason"]
     assert alert["reason_code"] == "beyond_limits"
     assert alert["reason_values"]["heading_deg"] == pytest.approx(-5.0, abs=0.05)
     assert alert["reason_values"]["floor_deg"] == pytest.approx(1.0)

@@ -43,7 +43,7 @@ def test_a_new_camera_says_how_much_is_missing(corner):
 def test_a_still_camera_says_so_and_by_whom(bench):
     bench.see(PRIOR, paths=True)
     assert headline(bench.http) == (
-        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.2°."
+        "Standing where it should, as 20 people of the last 27 seconds show; sure to ±0.3°."
     )
 
 
@@ -53,7 +53,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
         bench.see(moved(tilt_deg=5.0, heading_deg=-3.0), paths=True)
     said = headline(bench.http)
     assert re.fullmatch(
-        r"The camera turned 5\.8° \(pan −3\.0°, tilt \+5\.0°\) about \d\d:\d\d.*; sure to ±0\.3°\.",
+        r"The camera turned 5\.8° \(pan −3\.0°, tilt \+5\.0°\) about \d\d:\d\d.*; sure to ±0\.4°\.",
         said,
     ), said
     text = page(bench.http)
@@ -66,7 +66,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
 def test_it_may_have_moved_before_an_alert_says_so(bench):
     bench.see(moved(tilt_deg=5.0), sd_deg=1.1)
     assert headline(bench.http) == (
-        "It may have moved (89 %): it turned 4.1° (tilt +4.1°). The next people will tell."
+        "It may have moved (81 %): it turned 3.7° (tilt +3.7°). The next people will tell."
     )
 
 

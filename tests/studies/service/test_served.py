@@ -111,6 +111,29 @@ def test_tables_say_what_outcomes_come_to(tmp_path):
     )
 
 
+def test_few_tracks_far_pans_and_how_reliable_moved_was(tmp_path):
+    kept = OutcomeFile(tmp_path / "p.jsonl")
+    few = replace(CASE, table=Table.FEW, seen=15)
+    far = replace(CASE, table=Table.FAR, knock="pan-45")
+    told = replace(SERVED, state="drifting", moved=0.95)
+    unsure = replace(SERVED, state="unsure", moved=0.93)
+    steady = replace(SERVED, state="ok", moved=0.91)
+    rows = [
+        CaseResult(case_id=few, outcome=steady),
+        CaseResult(case_id=far, outcome=told),
+        CaseResult(case_id=replace(far, knock="pan+45"), outcome=unsure),
+        CaseResult(case_id=replace(far, seed=1), outcome=replace(told, used_tracks=29)),
+    ]
+    said = all_tables(kept.heading, rows)
+    assert "| 15 | still | 1 | 0.75 (0.8) | 1.2 % (1) | 0.25, 1.00, 0.25 |" in said
+    assert "| 2.0 | 0 | 1 | 0 | 0 | 0 |" in said  # worst sd; learning, ok, ...
+    # Of 45 people each; a window of 29 is not counted.
+    assert "| ±45 | 2 | 0 | 0 | 0 | 1 | 1 | 0.2 (0.2, 0) |" in said
+    # Three had moved, one had not: 0.2 of the weight is the three's.
+    mean = (0.2 * (0.95 + 0.93 + 0.95) / 3) + 0.8 * 0.91
+    assert f"| 0.9 to 1.0 | 3 | 1 | 0.20 | {mean:.2f} |" in said
+
+
 def test_tables_are_put_between_the_markers_of_a_page(tmp_path):
     page = tmp_path / "README.md"
     begin, end = BETWEEN
@@ -160,6 +183,11 @@ def test_tasks_share_their_reference_and_name_what_is_unknown(tmp_path):
     assert {each.seed for each in tasks[1].case_ids} == {1}
     assert len({each for task in tasks for each in task.case_ids}) == 13
     assert tasks_of([folder], **{**ask, "tables": [Table.REPLAYS]}) == []  # too short
+    few = tasks_of([folder], **{**ask, "tables": [Table.FEW]})
+    assert [task.case_ids[0].seen for task in few] == [8, 15, 20, 40] * 2
+    (far,) = tasks_of([folder], **{**ask, "tables": [Table.FAR]})
+    assert [c.knock for c in far.case_ids][:3] == ["pan+12", "pan-12", "pan+20"]
+    assert len(far.case_ids) == 17  # half a turn is the same both ways
     with pytest.raises(ShapeError, match="got 'rain'"):
         tasks_of([folder], **{**ask, "faults": ["rain"]})
 

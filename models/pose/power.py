@@ -1,0 +1,53 @@
+"""The power of a site's tracks: the smallest moves that would be told of so many people."""
+
+import numpy as np
+from scipy.stats import norm
+
+from models.geometry.pose import PARAMETERS
+from models.geometry.rotation import Array
+from models.monitoring.config import BORNE_OUT
+from models.pose import config
+from models.pose.hypotheses import alone_odds, seen_parameters
+from models.pose.pose_fit import FusedEstimate
+
+PEOPLE = np.array([60, 250, 800])
+_SHORT = float(norm.ppf(0.9))  # sd that nine of ten estimates fall short of a move by at the most
+_MOST_SD = 60.0
+
+
+def smallest_told(
+    fused: FusedEstimate,
+    walking_groups: int,
+    people: int,
+    reference_people: float,
+    moved_prior: float = config.MOVED_PRIOR,
+) -> Array:
+    """The smallest moves (4, 3) in each parameter alone that nine of ten windows would tell.
+
+    Of 60, 250 and 800 people, by `hypotheses`: radians, and the log of the height; nan where the
+    tracks say nothing. An estimate's variance falls with its people, but for what it has of the
+    reference's.
+
+    Args:
+        fused: the estimate of a window.
+        walking_groups: that it is of.
+        people: who walk in it.
+        reference_people: who made the site's map.
+        moved_prior: how likely it is, before any track, that the camera has moved.
+    """
+    found = np.full((len(PARAMETERS), PEOPLE.size), np.nan)
+    seen = seen_parameters(fused, walking_groups)
+    if not seen.any() or not people:
+        return found
+    shrunk = (1 / PEOPLE + 1 / reference_people) / (1 / people + 1 / reference_people)
+    groups = PEOPLE * walking_groups / people
+    precision = np.diag(np.linalg.inv(fused.covariance[np.ix_(seen, seen)]))
+    variances = shrunk / precision[:, None]
+    low, high = np.zeros(variances.shape), np.full(variances.shape, _MOST_SD)
+    for _ in range(40):
+        middle = (low + high) / 2
+        odds = alone_odds(middle, variances, seen, groups, moved_prior)
+        told = odds >= np.log(BORNE_OUT / (1 - BORNE_OUT))
+        low, high = np.where(told, low, middle), np.where(told, middle, high)
+    found[seen] = np.where(high < _MOST_SD, (high + _SHORT) * np.sqrt(variances), np.nan)
+    return found
