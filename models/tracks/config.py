@@ -7,6 +7,8 @@ Where no source is named, a number is ours, chosen on the recorded scenes.
 STEP_S = 1.5  # from node to node: longer than a stride, shorter than a change of mind
 KERNEL_S = 0.7  # half the width of the smoothing around a node (Cleveland 1979), at least
 LONGEST_GAP_S, USUAL_GAPS = 1.1, 2.5  # seconds, and usual intervals: what is longer ends a run
+SPARSEST_GAP_S = 10.0  # however far apart points usually are: a minute's straight line is no walk
+MOST_NODES = 2_400  # of a track, an hour: what is longer is of a wrong clock; recorded are 1,849
 RUN_POINTS = 3  # of a run, at least
 LINE_POINTS = 2  # that make a line
 DIRECTION_NODES = 2  # on both sides of a step that its direction is of: 4.5 s
