@@ -41,6 +41,7 @@ FOOT_NOISE_PX, FOOT_NOISE_M = 1.0, 0.035  # sd, the latter across the line of si
 
 # Pieces of one walk (after Huang, Wu and Nevatia 2008)
 PIECE_GAP_S = 3.5  # between two, at most: walkers of other recordings come back later as others
+MOST_FOLLOWERS = 64  # of a piece that are looked at, the first to come: recorded are 13 at most
 WANDER = 0.18  # of the pace: how much of it is not predicted, along and aside
 SLOWEST_MPS, LEAST_PACE = 0.3, 0.3  # a usual pace where most stand; of it: who stands shifts, too
 PACE_SD, TALL_SD = 0.3, 0.08  # of logs, between two looks at one walk

@@ -58,6 +58,7 @@ class Unpacked:
 
 
 _SPARE = 40
+_EXACT_ROUNDS, _LARGE_ROUND = 12, 0.25  # then by a quarter of the people wanted, at least
 MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked for an estimate
 
 
@@ -85,7 +86,8 @@ def until_so_many(
     """The fewest tracks that are of so many people; all that there are where these are too few.
 
     One track more is never two people more, so that asking for as many more as are missing ends at
-    the same tracks whenever it is asked. Five times as many tracks as people do in any case.
+    the same tracks whenever it is asked. Five times as many tracks as people do in any case, and
+    of tracks that are nearly all pieces some more than the fewest: each time all are linked anew.
 
     Args:
         load: the first so many tracks, or the newest.
@@ -98,7 +100,9 @@ def until_so_many(
     limit, most = wanted, MOST_PIECES * wanted
     loaded = limit + max(limit // _SPARE, 1)  # most trackers cut few walks: once is enough
     every = load(loaded)
+    rounds = 0
     while True:
+        rounds += 1
         if limit > loaded:
             loaded = limit
             every = load(loaded)
@@ -111,7 +115,10 @@ def until_so_many(
         walks = int((before < 0).sum())
         if walks >= wanted or limit == most:
             return Gathered(records=records, enough=True, before=before)
-        limit = min(limit + wanted - walks, most)
+        missing = wanted - walks
+        if rounds >= _EXACT_ROUNDS:
+            missing = max(missing, round(_LARGE_ROUND * wanted))
+        limit = min(limit + missing, most)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
