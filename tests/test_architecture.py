@@ -29,6 +29,7 @@ SERVICE_ROOMS = [
 ]
 MODEL_ROOMS = [
     {"errors", "reasons"},
+    {"code_files"},
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},
