@@ -22,6 +22,7 @@ from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
 from models.code_files import CodeFiles
+from models.effort import check_effort
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -44,6 +45,7 @@ class _Compiled:
         self._made: Any = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        check_effort()  # all that takes long comes by here, again and again
         return (self._made or self.made())(*args, **kwargs)
 
     @property

@@ -19,6 +19,7 @@ from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
+from service.store.look_budget import LookBudget
 from service.store.references import (
     AnchorRecord,
     FlowMapRecord,
@@ -29,32 +30,37 @@ from service.store.tracks import StoredTrack, seen_of, trajectory_of
 from service.store.trainings import ModelRecord
 from service.store.windows import PredictionRecord, WindowBounds
 
-# The store may give a deleted track's number to a new one.
-_Track = tuple[int, datetime]
+# The store may give a deleted track's number to a new one; a budget may leave one point of it.
+_Track = tuple[int, datetime, int]
 
 
 class Unpacked:
-    """A cache of unpacked tracks; to be forgotten with the refresh."""
+    """A cache of unpacked tracks, and the budget by which they are read; of one look."""
 
-    def __init__(self) -> None:
+    def __init__(self, budget: LookBudget | None = None) -> None:
+        self.budget = budget or LookBudget()
         self._feet: dict[_Track, Trajectory] = {}
         self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
 
     def feet(self, record: StoredTrack) -> Trajectory:
         """The foot points of a stored track."""
-        track = (record.id, record.received_at)
+        track = _named(record)
         if track not in self._feet:
             self._feet[track] = trajectory_of(record)
         return self._feet[track]
 
     def seen(self, record: StoredTrack, intrinsics: Intrinsics) -> Trajectory:
         """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
-        track = (record.id, record.received_at)
+        track = _named(record)
         lens, seen = self._seen.get(track, (None, None))
         if seen is None or (lens is not intrinsics and lens != intrinsics):
             seen = seen_of(record, self.feet(record), intrinsics)
             self._seen[track] = (intrinsics, seen)
         return seen
+
+
+def _named(record: StoredTrack) -> _Track:
+    return record.id, record.received_at, len(record.points)
 
 
 _SPARE = 40
@@ -202,7 +208,7 @@ def load_evidence(
     prior = cameras.prior_pose(session, camera_id).pose
     bounds = window_of(session, reference, settings)
     gathered = until_so_many(
-        lambda limit: windows.window(session, replace(bounds, tracks=limit)),
+        lambda limit: windows.window(session, replace(bounds, tracks=limit), unpacked.budget),
         bounds.tracks,
         intrinsics,
         prior,

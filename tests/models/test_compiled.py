@@ -46,7 +46,7 @@ print(stats.cache_path)
 def ask(tmp_path):
     package = tmp_path / "models"
     package.mkdir()
-    for name in ("__init__.py", "compiled.py", "code_files.py"):
+    for name in ("__init__.py", "compiled.py", "code_files.py", "effort.py"):
         shutil.copy(Path(models.__path__[0]) / name, package)
     (package / "outer.py").write_text(OUTER)
 

@@ -1,0 +1,53 @@
+"""What one look at a camera may read: of more, the largest tracks count and are not looked at.
+
+CPU and memory of a look grow with the nodes and points of its tracks, which is known before any is
+read: 100,000 nodes are some 5 CPU-s of an estimate and 10 of a map, and 150 MB.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from models.tracks.trajectory import most_nodes
+
+_MOST_NODES = 100_000  # recorded are 54,000, of the longest 400 of 8,809 tracks
+_MOST_BYTES = 96e6  # of points, boxes and heads: of 2,000 people 35 s at 25 Hz, with boxes
+
+
+class TrackSize(NamedTuple):
+    """The size of a stored track."""
+
+    id: int
+    track_id: str
+    duration_s: float
+    points: int
+    stored_bytes: int
+
+
+class LookBudget:
+    """The budget of one look, or a `share` of it; `left_out` are the names of tracks by number.
+
+    Each reading of tracks may spend all of it.
+    """
+
+    def __init__(self, share: float = 1.0) -> None:
+        self.share = share
+        self.left_out: dict[int, str] = {}
+
+    def leave_out(self, sizes: Sequence[TrackSize]) -> list[int]:
+        """The fewest tracks to be left out, the largest first, for the others to be in budget."""
+        costs = [(_cost(size), size) for size in sizes]
+        total = sum(cost for cost, _ in costs)
+        found: list[int] = []
+        for cost, size in sorted(costs, key=lambda pair: (-pair[0], pair[1].id)):
+            if total <= self.share:
+                break
+            total -= cost
+            found.append(size.id)
+            self.left_out[size.id] = size.track_id
+        return found
+
+
+def _cost(size: TrackSize) -> float:
+    """The share of a budget that a track takes."""
+    nodes = most_nodes(size.points, size.duration_s) / _MOST_NODES
+    return max(nodes, size.stored_bytes / _MOST_BYTES)
