@@ -1,7 +1,8 @@
 """What one look at a camera may read: of more, the largest tracks count and are not looked at.
 
-CPU and memory of a look grow with the nodes and points of its tracks, which is known before any is
-read: 100,000 nodes are some 5 CPU-s of an estimate and 10 of a map, and 150 MB.
+CPU and memory of a look grow with the rows that are made of its tracks, one for each node and
+another for its box or head, and with their points, which is known before any is read: 100,000 rows
+are some 5 CPU-s of an estimate and 10 of a map, and 150 MB.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,8 @@ from typing import NamedTuple
 
 from models.tracks.trajectory import most_nodes
 
-_MOST_NODES = 100_000  # recorded are 54,000, of the longest 400 of 8,809 tracks
+_MOST_ROWS = 100_000  # recorded are 54,000, of the longest 400 of 8,809 tracks
+_POINT_BYTES = 24  # of which a track with neither boxes nor heads is
 _MOST_BYTES = 96e6  # of points, boxes and heads: of 2,000 people 35 s at 25 Hz, with boxes
 
 
@@ -49,5 +51,7 @@ class LookBudget:
 
 def _cost(size: TrackSize) -> float:
     """The share of a budget that a track takes."""
-    nodes = most_nodes(size.points, size.duration_s) / _MOST_NODES
-    return max(nodes, size.stored_bytes / _MOST_BYTES)
+    rows = most_nodes(size.points, size.duration_s)
+    if size.stored_bytes > _POINT_BYTES * size.points:
+        rows *= 2
+    return max(rows / _MOST_ROWS, size.stored_bytes / _MOST_BYTES)

@@ -42,6 +42,8 @@ def main() -> int:
             costs.append(cost)
             target(cost.peak_mb, label="MB")
             target(cost.cpu_s, label="CPU seconds")
+            if _is_beyond(cost):
+                _say(f"beyond: {_words(cost)}")
             if len(costs) % 50 == 0:
                 _say(f"{len(costs)} windows, {_most(costs)}")
 

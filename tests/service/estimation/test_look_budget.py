@@ -63,7 +63,7 @@ def spoil(street, **values):
 
 
 def test_the_largest_are_left_out_and_no_more_of_them_than_need_be():
-    def size(number, duration_s, points=1_000, stored=2_400):
+    def size(number, duration_s, points=500, stored=12_000):
         return TrackSize(number, f"t{number}", duration_s, points, stored)
 
     honest = [size(n, 30.0) for n in range(400)]
@@ -76,7 +76,7 @@ def test_the_largest_are_left_out_and_no_more_of_them_than_need_be():
     assert LookBudget().leave_out(large) == [1]
     assert LookBudget(0.25).leave_out(large) == [1, 2]
     # Six points over a month are 34 nodes, however they got there.
-    assert LookBudget().leave_out([size(n, 30 * 86_400.0, points=6) for n in range(2_000)]) == []
+    assert LookBudget().leave_out([size(n, 30 * 86_400.0, 6, 144) for n in range(2_000)]) == []
 
 
 def test_of_what_is_left_out_the_last_point_is_read_and_it_counts(street):
@@ -95,7 +95,7 @@ def test_of_what_is_left_out_the_last_point_is_read_and_it_counts(street):
 
 
 def test_a_camera_beside_whom_people_linger_sees_a_knock_and_names_them(street, monkeypatch):
-    monkeypatch.setattr(look_budget, "_MOST_NODES", 6_000)
+    monkeypatch.setattr(look_budget, "_MOST_ROWS", 6_000)
     linger(street, 9)
     street.keep_to_lanes(KNOCKED, 40)
     body = street.look()
