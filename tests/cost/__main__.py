@@ -1,9 +1,10 @@
 """Fuzzing of cost: `python -m tests.cost --windows 2000` draws windows and prints the worst ten.
 
-Exits with 1 where one is beyond the budget of a look.
+Exits with 1 where one is beyond the budget of a look; Ctrl-C ends it early, with what it has.
 """
 
 import argparse
+import contextlib
 import sys
 import tempfile
 from collections.abc import Callable
@@ -47,7 +48,8 @@ def main() -> int:
             if len(costs) % 50 == 0:
                 _say(f"{len(costs)} windows, {_most(costs)}")
 
-        look()
+        with contextlib.suppress(KeyboardInterrupt):
+            look()
     for title, key in (("CPU seconds", _cpu), ("memory", _memory), ("CPU a point", _cpu_a_point)):
         _say(f"\nThe worst by {title}:")
         for cost in sorted(costs, key=key, reverse=True)[:_WORST]:
