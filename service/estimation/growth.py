@@ -40,7 +40,7 @@ from service.references import (
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, windows
 from service.store.cameras import CameraRecord
-from service.store.look_budget import LookBudget
+from service.store.look_budget import MAP_BUDGETS, LookBudget
 from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
 from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
@@ -87,7 +87,15 @@ def load_growth(
     spoilt = kept is not None and _is_spoilt(kept, reference.to_s, moves, attended)
     unpacked = unpacked or Unpacked()
     found = _still_tracks(
-        session, settings, reference, kept, moves, attended, judged, spoilt, unpacked.budget
+        session,
+        settings,
+        reference,
+        kept,
+        moves,
+        attended,
+        judged,
+        spoilt,
+        LookBudget(MAP_BUDGETS * unpacked.budget.share),
     )
     if found is None:
         return None
