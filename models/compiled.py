@@ -2,14 +2,15 @@
 
 The code is kept in a folder of NUMBA_CACHE_DIR, of the virtual environment, or of the user's cache,
 one for each state of these sources: a process that finds it there does not wait for the compiler.
-Where nothing can be written, each process compiles for itself. Beside its source, where numba would
-put it, it would outlive an uninstallation, and the folders that are left of a package are a package
-to Python.
+Where nothing can be written, or anybody may write, each process compiles for itself. Beside its
+source, where numba would put it, it would outlive an uninstallation, and the folders that are left
+of a package are a package to Python.
 """
 
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import tempfile
 import threading
@@ -19,6 +20,9 @@ from functools import cache, update_wrapper
 from pathlib import Path
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
+
+from models.code_files import CodeFiles
+from models.effort import check_effort
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -41,6 +45,7 @@ class _Compiled:
         self._made: Any = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        check_effort()  # all that takes long comes by here, again and again
         return (self._made or self.made())(*args, **kwargs)
 
     @property
@@ -87,7 +92,13 @@ def _machine_code(function: FunctionType) -> Any:
     folder = _folder()
     if folder is not None:
         setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - it has no type
-    return numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
+    made: Any = numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
+    if folder is not None:
+        kept = made._cache  # private; pinned, and tests/models/test_compiled.py cuts files off
+        source = kept._impl.locator.get_source_stamp()
+        stamp = (numba.__version__, source)
+        kept._cache_file = CodeFiles(Path(kept.cache_path), kept._impl.filename_base, stamp)
+    return made
 
 
 @cache
@@ -104,8 +115,11 @@ def _folder() -> Path | None:
         folder = root / f"{_NAME}{digest.hexdigest()[:16]}"
         try:
             if not folder.is_dir():
-                folder.mkdir(parents=True, exist_ok=True)
+                root.mkdir(parents=True, exist_ok=True)
+                folder.mkdir(mode=0o700, exist_ok=True)
                 _remove_old(root)
+            if not _is_ours(folder):
+                continue
             tempfile.TemporaryFile(dir=folder).close()
         except OSError:
             continue
@@ -120,6 +134,12 @@ def _roots() -> Iterator[Path]:
         yield Path(sys.prefix, "var", "cache", "surefoot")
     users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     yield Path(users, "surefoot")
+
+
+def _is_ours(folder: Path) -> bool:
+    """True where nobody else may put code into a folder, in a shared one such as /tmp, say."""
+    about = folder.stat()
+    return not about.st_mode & stat.S_IWOTH and about.st_uid in (0, os.geteuid())
 
 
 def _remove_old(root: Path) -> None:

@@ -4,15 +4,22 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from models.reasons import Reason, Value
 from service.job_queue import JobQueue
-from service.reasons import Reasons
+from service.reasons import Reasons, ServiceCode
 from service.store import estimates, tracks
 from service.store.cameras import CameraRecord
+from service.store.look_budget import LookBudget
 
 LONGEST_COOLDOWN_S = 600.0
 _FIRST_COOLDOWN_S = 5.0
 _DIED = "the worker died while it looked at this camera"
 _LONGEST_ERROR = 500
+# How looks end that had more to do than a worker can; the next one has a share of their tracks.
+_TOO_MUCH = (_DIED, "EffortExceededError", "MemoryError")
+_NEXT_SHARE, _LEAST_SHARE = 0.25, 1e-3
+_NAMED = 5  # tracks in a reason
+_LEFT_OUT = ServiceCode.TRACKS_LEFT_OUT
 
 
 def request_estimate(
@@ -87,6 +94,34 @@ def begin_look(session: Session, camera_id: str) -> int | None:
         # Should the worker die of it, this is all that is left to know it by.
         camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
     return tracks.newest_pk(session, camera_id)
+
+
+def budget_of(session: Session, camera_id: str) -> LookBudget:
+    """The budget of the look that has begun: less of one, after looks that were too much.
+
+    As long as something is left out by a smaller one, it stays that small.
+    """
+    camera = session.get(CameraRecord, camera_id)
+    if camera is None:
+        return LookBudget()
+    kept = (each.values["share"] for each in camera.lacks if each.code == _LEFT_OUT)
+    share = next((value for value in kept if isinstance(value, float)), 1.0)
+    if camera.estimate_error is not None and camera.estimate_error.startswith(_TOO_MUCH):
+        share *= _NEXT_SHARE ** max(camera.estimate_tries - 1, 0)
+    return LookBudget(max(share, _LEAST_SHARE))
+
+
+def left_out_by(budget: LookBudget) -> Reasons:
+    """A reason that names tracks which a look had no budget for; none where it had for all."""
+    if not budget.left_out:
+        return ()
+    names = list(dict.fromkeys(budget.left_out.values()))[:_NAMED]
+    values: dict[str, Value] = {
+        "tracks": len(budget.left_out),
+        "track_ids": names,
+        "share": budget.share,
+    }
+    return (Reason(code=_LEFT_OUT, values=values),)
 
 
 def end_look(

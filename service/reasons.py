@@ -29,6 +29,7 @@ class ServiceCode(StrEnum):
     OTHER_SOURCES = "other_sources"
     LOOKS_FAIL = "looks_fail"
     TRACKS_WAIT = "tracks_wait"
+    TRACKS_LEFT_OUT = "tracks_left_out"
     DISABLED_BY_PERSON = "disabled_by_person"
     ENDPOINT_GONE = "endpoint_gone"
     ENDPOINT_FAILS = "endpoint_fails"

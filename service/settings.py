@@ -223,6 +223,9 @@ class Settings(BaseSettings):
     estimate_limit_s: float = Field(
         600.0, gt=1, description="a look at a camera that takes longer hangs: its worker is ended"
     )
+    estimate_cpu_s: float = Field(
+        120.0, gt=1, description="CPU seconds of a look; after more it ends, and leaves tracks out"
+    )
     delivery_limit_s: float = Field(300.0, gt=60, description="the same of a delivery job")
     upkeep_limit_s: float = Field(1800.0, gt=1, description="the same of a step of the upkeep")
     training_limit_s: float = Field(

@@ -29,6 +29,7 @@ SERVICE_ROOMS = [
 ]
 MODEL_ROOMS = [
     {"errors", "reasons"},
+    {"code_files", "effort"},
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},
@@ -43,6 +44,7 @@ MODEL_ROOMS = [
 # What the service asks of models, and nothing deeper: by module, what for.
 PUBLIC_MODELS = {
     "models.durations": "hours and days in seconds",
+    "models.effort": "the CPU time that a look may take",
     "models.errors": "what a calibration may fail by",
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
     "models.geometry.intrinsics": "the lens",

@@ -57,7 +57,10 @@ def _people(rng: np.random.Generator) -> list[Trajectory]:
                 top_v=tops_seen(_LENS, _PRIOR.rotation, _PRIOR.centre_m, ground, tall_m),
             )
         )
-    return tracks
+    # The tracker loses the last of them, and finds them again: pieces are linked, too.
+    *others, last = tracks
+    before, after = np.array_split(np.arange(last.time_s.size), 2)
+    return [*others, last.part(before), last.part(after)]
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ Where no source is named, a number is ours, chosen on the recorded scenes.
 STEP_S = 1.5  # from node to node: longer than a stride, shorter than a change of mind
 KERNEL_S = 0.7  # half the width of the smoothing around a node (Cleveland 1979), at least
 LONGEST_GAP_S, USUAL_GAPS = 1.1, 2.5  # seconds, and usual intervals: what is longer ends a run
+SPARSEST_GAP_S = 10.0  # however far apart points usually are: a minute's straight line is no walk
+MOST_NODES = 2_400  # of a track, an hour: what is longer is of a wrong clock; recorded are 1,849
 RUN_POINTS = 3  # of a run, at least
 LINE_POINTS = 2  # that make a line
 DIRECTION_NODES = 2  # on both sides of a step that its direction is of: 4.5 s
@@ -39,6 +41,7 @@ FOOT_NOISE_PX, FOOT_NOISE_M = 1.0, 0.035  # sd, the latter across the line of si
 
 # Pieces of one walk (after Huang, Wu and Nevatia 2008)
 PIECE_GAP_S = 3.5  # between two, at most: walkers of other recordings come back later as others
+MOST_FOLLOWERS = 64  # of a piece that are looked at, the first to come: recorded are 13 at most
 WANDER = 0.18  # of the pace: how much of it is not predicted, along and aside
 SLOWEST_MPS, LEAST_PACE = 0.3, 0.3  # a usual pace where most stand; of it: who stands shifts, too
 PACE_SD, TALL_SD = 0.3, 0.08  # of logs, between two looks at one walk

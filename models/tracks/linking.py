@@ -66,12 +66,10 @@ def link_pieces(
     near = (apart <= config.FARTHEST) & (misfit < 0)
     rank = np.argsort(misfit[near], kind="stable")
     earlier, later, misfit = earlier[near][rank], later[near][rank], misfit[near][rank]
-    free = np.ones(rank.size, dtype=bool)
-    for pair in range(rank.size):
-        rivals = free & ((earlier == earlier[pair]) | (later == later[pair]))
-        if free[pair] and (rivals & (misfit < misfit[pair] + config.CLEAR)).sum() == 1:
-            before[later[pair]] = earlier[pair]
-            free &= ~rivals
+    linked = _clear_links(
+        earlier, later, misfit, _of_each(earlier, before.size), _of_each(later, before.size)
+    )
+    before[later[linked]] = earlier[linked]
     return before
 
 
@@ -94,7 +92,8 @@ def _pairs(heads: Ends, tails: Ends) -> tuple[Index, Index]:
     starts = heads.time_s[order]
     first = np.searchsorted(starts, tails.time_s, side="right")
     behind = np.searchsorted(starts, tails.time_s + config.PIECE_GAP_S, side="right")
-    number = np.where(tails.valid, behind - first, 0)
+    # The first to come: of a flood of pieces the pairs would be as many as their square.
+    number = np.where(tails.valid, np.minimum(behind - first, config.MOST_FOLLOWERS), 0)
     earlier = np.repeat(np.arange(number.size), number)
     place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
     later = order[np.repeat(first, number) + place]
@@ -138,6 +137,72 @@ def _misfit(heads: Ends, tails: Ends, earlier: Index, later: Index) -> tuple[Arr
     room = _spread(off, config.STRANGERS_S * usual) + _spread(turn, usual)
     rivals = max(earlier.size / heads.time_s.size, 1.0)
     return apart, misfit - room + 2 * np.log(config.STRANGERS * rivals)
+
+
+def _of_each(end: Index, count: int) -> tuple[Index, Index]:
+    """Pairs (P,) by the piece of theirs, the likeliest first, and where each piece's begin."""
+    order = np.argsort(end, kind="stable")
+    return order, np.searchsorted(end[order], np.arange(count + 1))
+
+
+@compiled
+def _clear_links(
+    earlier: Index,
+    later: Index,
+    misfit: Array,
+    of_earlier: tuple[Index, Index],
+    of_later: tuple[Index, Index],
+) -> Mask:
+    """A mask (P,) of pairs, the likeliest first, that are links: free, and without a free rival.
+
+    Which pairs are still free only ever becomes less, so each piece's likeliest two of them are
+    found by going on from where they were: all takes as long as there are pairs.
+    """
+    linked = np.zeros(earlier.size, dtype=np.bool_)
+    goes_on = np.zeros(of_earlier[1].size - 1, dtype=np.bool_)
+    gone_on = goes_on.copy()
+    places = (of_earlier[1].copy(), of_earlier[1].copy(), of_later[1].copy(), of_later[1].copy())
+    for pair in range(earlier.size):
+        one, other = earlier[pair], later[pair]
+        if goes_on[one] or gone_on[other]:
+            continue
+        limit = misfit[pair] + config.CLEAR
+        if _has_rival(
+            pair, limit, misfit, of_earlier, one, places[0], places[1], gone_on, later
+        ) or _has_rival(
+            pair, limit, misfit, of_later, other, places[2], places[3], goes_on, earlier
+        ):
+            continue
+        linked[pair] = goes_on[one] = gone_on[other] = True
+    return linked
+
+
+@compiled
+def _has_rival(
+    pair: int,
+    limit: float,
+    misfit: Array,
+    pairs: tuple[Index, Index],
+    piece: int,
+    first: Index,
+    second: Index,
+    taken: Mask,
+    partner: Index,
+) -> bool:
+    """True if a free pair of a piece of this free one is likelier, or less likely by too little.
+
+    `first` and `second` (N,) are places of each piece's free pairs, or before them; they are moved.
+    """
+    order, beyond = pairs[0], pairs[1][piece + 1]
+    while taken[partner[order[first[piece]]]]:
+        first[piece] += 1
+    if order[first[piece]] != pair:
+        return True
+    second[piece] = max(second[piece], first[piece] + 1)
+    while second[piece] < beyond and taken[partner[order[second[piece]]]]:
+        second[piece] += 1
+    near: bool = second[piece] < beyond and misfit[order[second[piece]]] < limit
+    return near
 
 
 def _round(sd: Array) -> Array:

@@ -29,6 +29,7 @@ def runs_of_tracks(time_s: Array, inside: Mask, bounds: Index) -> Index:
         if beyond - first > 1:
             usual_s = float(np.median(time_s[first + 1 : beyond] - time_s[first : beyond - 1]))
             gap_s = max(config.USUAL_GAPS * usual_s, config.LONGEST_GAP_S)
+            gap_s = min(gap_s, config.SPARSEST_GAP_S)
         begin = first
         for j in range(first + 1, beyond + 1):
             if j < beyond and inside[j] and inside[j - 1] and time_s[j] - time_s[j - 1] <= gap_s:
@@ -48,16 +49,22 @@ def nodes_of_runs(
 ) -> tuple[Index, Array, Array, Array]:
     """The first node of each run (R + 1,), nodes' times (K,), smooth feet (K, 2) and tops (K,).
 
-    A run that is shorter than a step has no nodes. A top is NaN where none is known.
+    A run that is shorter than a step has no nodes, and a track no more than `MOST_NODES`: of the
+    run that would pass it the middle, of later ones none. A top is NaN where none is known.
 
     The smoothing is wider where points are sparse; `runs` are those of `runs_of_tracks`.
     """
     step_s = config.STEP_S
     firsts = np.zeros(len(runs) + 1, dtype=np.int64)
+    left = config.MOST_NODES
     for number in range(len(runs)):
         begin, last = runs[number, 1], runs[number, 2] - 1
-        count = int((time_s[last] - time_s[begin]) / step_s + 1e-6)
-        firsts[number + 1] = firsts[number] + (count + 1 if count > 0 else 0)
+        if number and runs[number, 0] != runs[number - 1, 0]:
+            left = config.MOST_NODES
+        count = min(int((time_s[last] - time_s[begin]) / step_s + 1e-6) + 1, left)
+        count = count if count > 1 else 0
+        firsts[number + 1] = firsts[number] + count
+        left -= count
     nodes_s, feet = np.empty(firsts[-1]), np.empty((firsts[-1], 2))
     across, along = uv[:, 0].copy(), uv[:, 1].copy()  # one kind of array for the lines
     tops, tall = np.full(firsts[-1], np.nan), along - top_v
@@ -83,8 +90,9 @@ def nodes_of_runs(
             lined, u = _line(time_s, across, near, beyond, at_s, reach_s)
             _, v = _line(time_s, along, near, beyond, at_s, reach_s)
             if not lined:
-                u = _between(time_s, across, begin, beyond, at_s)
-                v = _between(time_s, along, begin, beyond, at_s)
+                before = max(near - 1, begin)
+                u = _between(time_s, across, before, beyond, at_s)
+                v = _between(time_s, along, before, beyond, at_s)
             feet[node, 0], feet[node, 1] = u, v
             if boxed >= config.LINE_POINTS:
                 # The box's height is smoothed, not its top: it is the same all through a stride.

@@ -9,6 +9,7 @@ import numpy as np
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Index, Mask
+from models.tracks import config
 
 WINDOW_MIN_POINTS = 11
 WINDOW_MAX_POINTS = 31  # N in [11, 31]: Xu et al. 2020, section 4.1
@@ -139,6 +140,12 @@ def points_where(points: Points, kept: Mask) -> Points:
         top_v=points.top_v[kept],
         bounds=before[points.bounds],
     )
+
+
+def most_nodes(points: int, duration_s: float) -> int:
+    """The most nodes that so many points over so long a time can have, of which rows are made."""
+    nodes_s = min(duration_s, (points - 1) * config.SPARSEST_GAP_S)
+    return min(int(nodes_s / config.STEP_S) + 1, config.MOST_NODES)
 
 
 def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:

@@ -17,7 +17,6 @@ import numpy as np
 from models.compiled import compiled
 from models.geometry.ground import ground_flow, landing, rotation_and_turns
 from models.geometry.rotation import Array, Index, Mask, rotation_from_angles
-from models.tracks.linking import first_of_component
 from models.tracks.observations import Rows, Steps, Tops
 from models.walking import config
 
@@ -255,41 +254,68 @@ def walking_groups_of(
     """
     since_s = time_s - time_s.min(initial=np.inf)
     time_bin = np.floor(since_s / config.GROUP_BIN_S + 1e-3).astype(np.int64)
-    order = np.lexsort((owner_idx, time_bin))
+    order = np.lexsort((time_bin, owner_idx))
     fresh = (np.diff(time_bin[order], prepend=-1) != 0) | (
         np.diff(owner_idx[order], prepend=-1) != 0
     )
     first = order[fresh]  # one step for each track and bin
-    together = pairs_beside(time_bin[first], owner_idx[first], place[first], direction[first])
-    pair, count = np.unique(together[:, 0] * owners + together[:, 1], return_counts=True)
-    beside = np.stack(np.divmod(pair, owners), axis=1)
-    lengths = np.bincount(owner_idx[first], minlength=owners)
-    return first_of_component(
-        beside[count >= config.GROUP_SHARE * lengths[beside].min(axis=1)], owners
-    )
+    bounds = np.searchsorted(owner_idx[first], np.arange(owners + 1))
+    there = np.flatnonzero(np.diff(bounds))
+    by_begin = there[np.argsort(time_bin[first[bounds[there]]], kind="stable")]
+    return groups_beside(time_bin[first], place[first], direction[first], bounds, by_begin)
 
 
 @compiled
-def pairs_beside(
-    time_bin: Index,
-    owner_idx: Index,
-    place: Array,
-    direction: Array,
+def groups_beside(
+    time_bin: Index, place: Array, direction: Array, bounds: Index, by_begin: Index
 ) -> Index:
-    """Pairs of tracks (K, 2), one for each time that the two are beside one another.
+    """The first track (N,) of the group of each: those that are beside one another for long enough.
 
-    Bins of time are ascending (M,), and so are tracks (M,) within a bin.
+    Track n has the rows from `bounds[n]` up to `bounds[n + 1]`, one for each of its bins of time,
+    which ascend; `by_begin` are the tracks that have any, by their first bins. Groups grow as they
+    are found (Tarjan 1975): all the times that two of a crowd are together are too many to keep.
     """
-    found = []
-    for i in range(time_bin.size):
-        j = i + 1
-        while j < time_bin.size and time_bin[j] == time_bin[i]:
+    group = np.arange(bounds.size - 1)
+    for place_one in range(by_begin.size):
+        one = by_begin[place_one]
+        last_bin = time_bin[bounds[one + 1] - 1]
+        for place_other in range(place_one + 1, by_begin.size):
+            other = by_begin[place_other]
+            if time_bin[bounds[other]] > last_bin:
+                break
+            first, second = _root(group, one), _root(group, other)
+            if first != second and _are_beside(time_bin, place, direction, bounds, one, other):
+                group[max(first, second)] = min(first, second)
+    for track in range(group.size):
+        group[track] = _root(group, track)
+    return group
+
+
+@compiled
+def _root(group: Index, track: int) -> int:
+    while group[track] != track:
+        group[track] = group[group[track]]
+        track = group[track]
+    return track
+
+
+@compiled
+def _are_beside(
+    time_bin: Index, place: Array, direction: Array, bounds: Index, one: int, other: int
+) -> bool:
+    """True if two tracks go the same way near one another for a share of the shorter of them."""
+    i, j, together = bounds[one], bounds[other], 0
+    while i < bounds[one + 1] and j < bounds[other + 1]:
+        if time_bin[i] < time_bin[j]:
+            i += 1
+        elif time_bin[j] < time_bin[i]:
+            j += 1
+        else:
             apart = np.hypot(place[i, 0] - place[j, 0], place[i, 1] - place[j, 1])
             same = direction[i, 0] * direction[j, 0] + direction[i, 1] * direction[j, 1]
-            if apart < config.GROUP_NEAR_M and same > config.GROUP_SAME_WAY:
-                found.append((owner_idx[i], owner_idx[j]))
+            together += apart < config.GROUP_NEAR_M and same > config.GROUP_SAME_WAY
+            i += 1
             j += 1
-    pairs = np.empty((len(found), 2), dtype=np.int64)
-    for k, (first, second) in enumerate(found):
-        pairs[k, 0], pairs[k, 1] = first, second
-    return pairs
+    shorter = min(bounds[one + 1] - bounds[one], bounds[other + 1] - bounds[other])
+    long: bool = together >= config.GROUP_SHARE * shorter
+    return long

@@ -1,4 +1,4 @@
-"""The alert `stale` of cameras whose estimate is not being made."""
+"""The alert `stale` of cameras whose estimate is not being made, or lacks some of its tracks."""
 
 import time
 from datetime import UTC, datetime, timedelta
@@ -37,19 +37,23 @@ class StaleWatch:
             known_pk, since_s = self._waiting.get(camera_id, (pk, now_s))
             waiting[camera_id] = pk, since_s if known_pk == pk else now_s
         self._waiting = waiting
-        firing = alerts.firing_cameras(session, AlertKind.STALE)
+        firing = alerts.firing_codes(session, AlertKind.STALE)
         found: dict[str, str] = {}
         waits = {camera_id: now_s - since_s for camera_id, (_, since_s) in self._waiting.items()}
         long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}
         # Of hundreds, twelve times a minute: nothing can be wrong with any other.
-        for camera in cameras.failing(session, besides=firing | long):
+        lacking = cameras.lacking(session, ServiceCode.TRACKS_LEFT_OUT)
+        for camera in cameras.failing(session, besides=firing.keys() | long | lacking):
             waits_s = waits.get(camera.id, 0.0)
             reason = _why_stale(camera, settings, waits_s)
             if reason is None:
                 if camera.id in firing and camera.estimate_failing_since is None:
                     _end(session, camera)
                     found[camera.id] = "ended"
-            elif camera.id not in firing and not _answered(session, camera):
+            elif camera.id in firing:
+                if firing[camera.id] != reason.code:
+                    _open(session, settings, camera, reason, waits_s)
+            elif not _answered(session, camera):
                 _open(session, settings, camera, reason, waits_s)
                 found[camera.id] = AlertActivity.OPENED
         return found
@@ -68,7 +72,8 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reas
     if waits_s > settings.stale_after_s:
         waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
         return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
-    return None
+    left_out = (lack for lack in camera.lacks if lack.code == ServiceCode.TRACKS_LEFT_OUT)
+    return next(left_out, None)
 
 
 def _open(
@@ -80,7 +85,8 @@ def _open(
         settings,
         camera.id,
         AlertKind.STALE,
-        Severity.CRITICAL,
+        # Without some of its tracks a camera is watched all the same.
+        Severity.WARNING if reason.code == ServiceCode.TRACKS_LEFT_OUT else Severity.CRITICAL,
         drift={},
         changed_at=since,
         reasons=(reason,),

@@ -20,6 +20,7 @@ from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
 from service.workers.processes.process import (
     give_back,
+    limit_memory,
     resident_mb,
     settle_allocator,
     yield_to_others,
@@ -39,6 +40,8 @@ log = logging.getLogger("surefoot.worker")
 _TRIM_EVERY_S = 30.0
 # A training in hand would start over: the ceiling waits for its end, up to here.
 _CEILING_IN_TRAINING = 1.5
+# What one job may not allocate beyond, at any moment; stacks of threads are counted, hardly used.
+_HARD_CEILING, _THREADS_MB = 1.5, 1_000.0
 
 
 class WorkerRunningError(RuntimeError):
@@ -61,6 +64,7 @@ def run_worker(
     if not lock.held():
         raise WorkerRunningError(f"name: worker {name!r} is running already")
     settle_allocator()
+    limit_memory(_HARD_CEILING * settings.worker_max_mb + _THREADS_MB)
     yield_to_others(settings.worker_nice)
     store = Store(settings)
     limits_s = {  # of a task of each kind; trainings mind theirs themselves

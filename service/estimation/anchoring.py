@@ -115,7 +115,7 @@ def load_anchor_days(
     after_s = record.to_s if record.logged_to_s is None else record.logged_to_s
     if to_s <= after_s:
         return None
-    found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY)
+    found = windows.of_days(session, bounds, after_s, to_s, _MOST_A_DAY, unpacked.budget)
     intrinsics = camera.intrinsics
     return AnchorDays(
         site=reference.data,

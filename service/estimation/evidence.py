@@ -19,6 +19,7 @@ from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
 from service.store.cameras import CameraRecord
+from service.store.look_budget import LookBudget
 from service.store.references import (
     AnchorRecord,
     FlowMapRecord,
@@ -29,27 +30,28 @@ from service.store.tracks import StoredTrack, seen_of, trajectory_of
 from service.store.trainings import ModelRecord
 from service.store.windows import PredictionRecord, WindowBounds
 
-# The store may give a deleted track's number to a new one.
-_Track = tuple[int, datetime]
+# The store may give a deleted track's number to a new one; a budget may leave one point of it.
+_Track = tuple[int, datetime, int]
 
 
 class Unpacked:
-    """A cache of unpacked tracks; to be forgotten with the refresh."""
+    """A cache of unpacked tracks, and the budget by which they are read; of one look."""
 
-    def __init__(self) -> None:
+    def __init__(self, budget: LookBudget | None = None) -> None:
+        self.budget = budget or LookBudget()
         self._feet: dict[_Track, Trajectory] = {}
         self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
 
     def feet(self, record: StoredTrack) -> Trajectory:
         """The foot points of a stored track."""
-        track = (record.id, record.received_at)
+        track = _named(record)
         if track not in self._feet:
             self._feet[track] = trajectory_of(record)
         return self._feet[track]
 
     def seen(self, record: StoredTrack, intrinsics: Intrinsics) -> Trajectory:
         """The feet of a stored track, with the upper edges of its boxes or its heads, if any."""
-        track = (record.id, record.received_at)
+        track = _named(record)
         lens, seen = self._seen.get(track, (None, None))
         if seen is None or (lens is not intrinsics and lens != intrinsics):
             seen = seen_of(record, self.feet(record), intrinsics)
@@ -57,7 +59,12 @@ class Unpacked:
         return seen
 
 
+def _named(record: StoredTrack) -> _Track:
+    return record.id, record.received_at, len(record.points)
+
+
 _SPARE = 40
+_EXACT_ROUNDS, _LARGE_ROUND = 12, 0.25  # then by a quarter of the people wanted, at least
 MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked for an estimate
 
 
@@ -85,7 +92,8 @@ def until_so_many(
     """The fewest tracks that are of so many people; all that there are where these are too few.
 
     One track more is never two people more, so that asking for as many more as are missing ends at
-    the same tracks whenever it is asked. Five times as many tracks as people do in any case.
+    the same tracks whenever it is asked. Five times as many tracks as people do in any case, and
+    of tracks that are nearly all pieces some more than the fewest: each time all are linked anew.
 
     Args:
         load: the first so many tracks, or the newest.
@@ -98,7 +106,9 @@ def until_so_many(
     limit, most = wanted, MOST_PIECES * wanted
     loaded = limit + max(limit // _SPARE, 1)  # most trackers cut few walks: once is enough
     every = load(loaded)
+    rounds = 0
     while True:
+        rounds += 1
         if limit > loaded:
             loaded = limit
             every = load(loaded)
@@ -111,7 +121,10 @@ def until_so_many(
         walks = int((before < 0).sum())
         if walks >= wanted or limit == most:
             return Gathered(records=records, enough=True, before=before)
-        limit = min(limit + wanted - walks, most)
+        missing = wanted - walks
+        if rounds >= _EXACT_ROUNDS:
+            missing = max(missing, round(_LARGE_ROUND * wanted))
+        limit = min(limit + missing, most)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,7 +208,7 @@ def load_evidence(
     prior = cameras.prior_pose(session, camera_id).pose
     bounds = window_of(session, reference, settings)
     gathered = until_so_many(
-        lambda limit: windows.window(session, replace(bounds, tracks=limit)),
+        lambda limit: windows.window(session, replace(bounds, tracks=limit), unpacked.budget),
         bounds.tracks,
         intrinsics,
         prior,

@@ -40,6 +40,7 @@ from service.references import (
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, windows
 from service.store.cameras import CameraRecord
+from service.store.look_budget import MAP_BUDGETS, LookBudget
 from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
 from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
@@ -84,7 +85,18 @@ def load_growth(
     attended = attendance_of(session, camera_id, datetime.now(UTC))
     judged = window_beside(attended, reference, settings)
     spoilt = kept is not None and _is_spoilt(kept, reference.to_s, moves, attended)
-    found = _still_tracks(session, settings, reference, kept, moves, attended, judged, spoilt)
+    unpacked = unpacked or Unpacked()
+    found = _still_tracks(
+        session,
+        settings,
+        reference,
+        kept,
+        moves,
+        attended,
+        judged,
+        spoilt,
+        LookBudget(MAP_BUDGETS * unpacked.budget.share),
+    )
     if found is None:
         return None
     to_s = found[-1].ended_s if found else reference.to_s
@@ -95,7 +107,7 @@ def load_growth(
         and weights.sum() < kept.weight * _faded(to_s - kept.to_s, settings)
     ):
         return None  # retention has deleted more than has come: the map knows more than they
-    intrinsics, unpacked = camera.intrinsics, unpacked or Unpacked()
+    intrinsics = camera.intrinsics
     return GrowthPeriod(
         reference_id=reference.id,
         site=reference.data,
@@ -120,6 +132,7 @@ def _still_tracks(
     attended: Attendance,
     judged: WindowBounds,
     spoilt: bool,
+    budget: LookBudget,
 ) -> Sequence[StoredTrack] | None:
     """The tracks that are known to be of a still camera; None where too few of them are new.
 
@@ -142,7 +155,8 @@ def _still_tracks(
     )
     if not spoilt and windows.count_still(session, bounds, since_s) < enough:
         return None
-    return windows.still(session, bounds, min(settings.flow_tracks, settings.keep_tracks))
+    most = min(settings.flow_tracks, settings.keep_tracks)
+    return windows.still(session, bounds, most, budget)
 
 
 def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:

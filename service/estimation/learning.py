@@ -63,7 +63,7 @@ def load_reference_period(
     prior = cameras.prior_pose(session, camera_id).pose
     gathered = until_so_many(
         lambda limit: windows.first(
-            session, camera_id, reference.from_s, limit, without=attended.spans
+            session, camera_id, reference.from_s, limit, attended.spans, unpacked.budget
         ),
         wanted,
         intrinsics,

@@ -13,6 +13,9 @@ COCO_PEOPLE = frozenset((0.0,))
 MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
 MAX_ID_LENGTH = 200
+# Nobody takes an hour to walk through a picture, or is the same person to a tracker that has not
+# seen them for ten minutes: the longest of our recordings are 46 minutes and 3 s.
+MAX_DURATION_S, MAX_GAP_S = 3_600.0, 600.0
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
 FOOT_COLUMNS = 3  # of a point: time, u and v; after them its head's, where it carries one
@@ -147,6 +150,7 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
             f"{len(rows)} points over {duration_s:.1f} s; at least {TRACK_MIN_POINTS} points "
             f"over {TRACK_MIN_DURATION_S:g} s are needed",
         )
+    _check_lengths(time_s)
     boxes = None
     points = rows
     if rows.shape[1] == 5:
@@ -209,6 +213,25 @@ def _check_times(time_s: Array, limits: Limits) -> None:
             "one of the two clocks, or a zone, is wrong"
         )
     raise TrackRejectedError("time_out_of_range", f"points/{at}/0: {needed}, got {got:.3f}")
+
+
+def _check_lengths(time_s: Array) -> None:
+    """Refuse times that a wrong clock or frame rate makes, and nobody's walk."""
+    duration_s = float(time_s[-1] - time_s[0])
+    if duration_s > MAX_DURATION_S:
+        raise TrackRejectedError(
+            "too_long",
+            f"points: at most {MAX_DURATION_S:g} s a track are taken, got {duration_s:.1f} s: "
+            "the clock or frame_rate_hz is wrong, or a track of several people is to be cut",
+        )
+    gap_s = np.diff(time_s)
+    if gap_s.max() > MAX_GAP_S:
+        at = int(np.argmax(gap_s)) + 1
+        raise TrackRejectedError(
+            "gap",
+            f"points/{at}/0: at most {MAX_GAP_S:g} s after the point before are taken, got "
+            f"{gap_s[at - 1]:.1f} s: what comes after such a gap is a track of its own",
+        )
 
 
 def _check_inside(uv: Array, size: tuple[int, int], what: str = "points") -> None:

@@ -130,10 +130,14 @@ def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | N
     return session.scalars(_FIRING, {"camera": camera_id, "kind": kind}).first()
 
 
-def firing_cameras(session: Session, kind: AlertKind) -> set[str]:
-    """The cameras about which an alert of a kind is open."""
+def firing_codes(session: Session, kind: AlertKind) -> dict[str, str | None]:
+    """The codes of the open alerts of a kind, by the cameras that they are about."""
     found = session.scalars(_all_firing(AlertRecord.kind == kind))
-    return {record.camera_id for record in found if record.camera_id is not None}
+    return {
+        record.camera_id: code_of(record.reasons)
+        for record in found
+        if record.camera_id is not None
+    }
 
 
 def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:

@@ -15,6 +15,7 @@ from sqlalchemy import (
     LargeBinary,
     String,
     bindparam,
+    cast,
     delete,
     func,
     select,
@@ -25,7 +26,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from service.enums import Origin
-from service.reasons import Reasons
+from service.reasons import Reasons, ServiceCode
 from service.store.engines.sqlite import Prepared
 from service.store.estimates import EstimateRecord
 from service.store.record import (
@@ -254,6 +255,12 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
         .where(CameraRecord.estimate_failing_since.is_not(None) | CameraRecord.id.in_(besides))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()
+
+
+def lacking(session: Session, code: ServiceCode) -> set[str]:
+    """The cameras whose estimate lacks something, by the code of the reason."""
+    lacks = cast(CameraRecord.lacks, String)
+    return set(session.scalars(select(CameraRecord.id).where(lacks.contains(f'"{code}"'))))
 
 
 class RhythmRecord(Record):

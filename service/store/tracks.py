@@ -16,10 +16,13 @@ from sqlalchemy import (
     Connection,
     Index,
     LargeBinary,
+    Result,
     Select,
+    SQLColumnExpression,
     String,
     UniqueConstraint,
     bindparam,
+    case,
     func,
     select,
 )
@@ -33,6 +36,7 @@ from models.tracks.trajectory import Trajectory
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
 from service.store.engines.sqlite import Prepared
+from service.store.look_budget import LookBudget, TrackSize
 from service.store.record import Record, camera_key, count_where, delete_some
 from service.store.references import CameraId, counting_source
 
@@ -76,6 +80,7 @@ class StoredTrack(NamedTuple):
 
 
 _COLUMNS = [getattr(TrackRecord, name) for name in StoredTrack._fields]
+_LAST_BYTES = {"points": 24, "boxes": 32, "heads": 16}
 
 
 def by_end(
@@ -83,12 +88,36 @@ def by_end(
     *conditions: ColumnElement[bool],
     newest_first: bool = False,
     limit: int | None = None,
+    budget: LookBudget | None = None,
 ) -> Sequence[StoredTrack]:
-    """Tracks that meet some conditions in the order of their ends; or the newest first."""
+    """Tracks that meet some conditions in the order of their ends; or the newest first.
+
+    Of tracks beyond a `budget` the last point alone is read: they count, and tell nothing.
+    """
     order = [TrackRecord.ended_s.desc(), TrackRecord.id.desc()]
-    query = select(*_COLUMNS).where(*conditions)
-    query = query.order_by(*order if newest_first else (TrackRecord.ended_s, TrackRecord.id))
-    return [StoredTrack._make(row) for row in session.execute(query.limit(limit))]
+    ordered = order if newest_first else (TrackRecord.ended_s, TrackRecord.id)
+
+    def rows(columns: Sequence[SQLColumnExpression[Any]]) -> Result[Any]:
+        query = select(*columns).where(*conditions).order_by(*ordered)
+        return session.execute(query.limit(limit))
+
+    columns: Sequence[SQLColumnExpression[Any]] = _COLUMNS
+    if budget is not None:
+        left_out = budget.leave_out([TrackSize._make(row) for row in rows(_SIZE_COLUMNS)])
+        if left_out:
+            columns = [_only_last(column, left_out) for column in _COLUMNS]
+    return [StoredTrack._make(row) for row in rows(columns)]
+
+
+def _only_last(
+    column: InstrumentedAttribute[Any], track_pks: Sequence[int]
+) -> SQLColumnExpression[Any]:
+    """A column of tracks; of some of them the last point, box or head alone."""
+    size = _LAST_BYTES.get(column.key)
+    if size is None:
+        return column
+    last = func.substr(column, func.length(column) - size + 1)
+    return case((TrackRecord.id.in_(track_pks), last), else_=column)
 
 
 def pack(array: Array) -> bytes:
@@ -131,6 +160,15 @@ def bytes_of_track() -> ColumnElement[int]:
         + func.coalesce(func.length(TrackRecord.boxes), 0)
         + func.coalesce(func.length(TrackRecord.heads), 0)
     )
+
+
+_SIZE_COLUMNS = [
+    TrackRecord.id,
+    TrackRecord.track_id,
+    TrackRecord.ended_s - TrackRecord.started_s,
+    func.length(TrackRecord.points) // _LAST_BYTES["points"],
+    bytes_of_track(),
+]
 
 
 def of_counting_source(camera_id: CameraId) -> ColumnElement[bool]:

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
 from service.store.engines.dialects import new_rows, whole
+from service.store.look_budget import LookBudget
 from service.store.record import Record, count_where, foreign_key
 from service.store.tracks import (
     Spans,
@@ -57,9 +58,11 @@ class StillBounds:
     attended: Spans = ()
 
 
-def window(session: Session, bounds: WindowBounds) -> Sequence[StoredTrack]:
+def window(
+    session: Session, bounds: WindowBounds, budget: LookBudget | None = None
+) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
-    return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)))
+    return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)), budget=budget)
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
@@ -74,15 +77,18 @@ def first(
     started_from_s: float | None,
     limit: int,
     without: Spans = (),
+    budget: LookBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """The first tracks by their ends that started from a time on and were not seen at others."""
     conditions = *started_from(camera_id, started_from_s), *outside(without)
-    return by_end(session, *conditions, limit=limit)
+    return by_end(session, *conditions, limit=limit, budget=budget)
 
 
-def still(session: Session, bounds: StillBounds, limit: int) -> Sequence[StoredTrack]:
+def still(
+    session: Session, bounds: StillBounds, limit: int, budget: LookBudget | None = None
+) -> Sequence[StoredTrack]:
     """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
-    return by_end(session, *_still(bounds), newest_first=True, limit=limit)[::-1]
+    return by_end(session, *_still(bounds), newest_first=True, limit=limit, budget=budget)[::-1]
 
 
 def count_still(session: Session, bounds: StillBounds, ended_after_s: float | None) -> int:
@@ -120,7 +126,12 @@ def oldest_end_s(session: Session, bounds: WindowBounds) -> float | None:
 
 
 def of_days(
-    session: Session, bounds: WindowBounds, after_s: float, to_s: float, most_a_day: int
+    session: Session,
+    bounds: WindowBounds,
+    after_s: float,
+    to_s: float,
+    most_a_day: int,
+    budget: LookBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """The tracks within bounds that ended after a time and before another, by their ends.
 
@@ -139,7 +150,8 @@ def of_days(
     )
     nth = (each.c.place * most_a_day) // each.c.people
     before = ((each.c.place - 1) * most_a_day) // each.c.people
-    return by_end(session, TrackRecord.id.in_(select(each.c.id).where(nth > before)))
+    some = TrackRecord.id.in_(select(each.c.id).where(nth > before))
+    return by_end(session, some, budget=budget)
 
 
 def window_ids(session: Session, bounds: WindowBounds) -> Select[int]:
@@ -182,14 +194,18 @@ class PredictionRecord(Record):
 
 
 def without_prediction(
-    session: Session, bounds: WindowBounds, model_id: str, limit: int
+    session: Session,
+    bounds: WindowBounds,
+    model_id: str,
+    limit: int,
+    budget: LookBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """Tracks of the window that the model has not looked at, newest first."""
     predicted = exists().where(
         PredictionRecord.track_pk == TrackRecord.id, PredictionRecord.model_id == model_id
     )
     inside = TrackRecord.id.in_(window_ids(session, bounds))
-    return by_end(session, inside, ~predicted, newest_first=True, limit=limit)
+    return by_end(session, inside, ~predicted, newest_first=True, limit=limit, budget=budget)
 
 
 def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:

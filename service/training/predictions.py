@@ -15,6 +15,7 @@ from service.references import window_of
 from service.settings import Settings
 from service.store import references, tracks, trainings, windows
 from service.store.engines.store import Store
+from service.store.look_budget import LookBudget
 from service.store.tracks import StoredTrack
 from service.store.trainings import ModelRecord, WeightsRecord
 
@@ -53,7 +54,11 @@ class PendingTracks:
 
 
 def load_pending(
-    session: Session, settings: Settings, camera_id: str, limit: int
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    limit: int,
+    budget: LookBudget | None = None,
 ) -> PendingTracks | None:
     """Tracks of the window that the model in use has not seen; None without model or camera."""
     reference = references.newest_if_any(session, camera_id)
@@ -63,7 +68,7 @@ def load_pending(
     bounds = window_of(session, reference, settings)
     return PendingTracks(
         model=model,
-        tracks=windows.without_prediction(session, bounds, model.id, limit),
+        tracks=windows.without_prediction(session, bounds, model.id, limit, budget),
     )
 
 

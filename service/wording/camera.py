@@ -144,7 +144,7 @@ def fleet_line(
     if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
     if kinds and kinds[0] == AlertKind.STALE:
-        return "its estimate is not being made: what was seen last may be long ago"
+        return "its estimate lacks tracks: the alert says which, and since when"
     if state == PoseState.LEARNING and learned is not None:
         return f"learning what is usual: {learned} of {wanted} people"
     if state == PoseState.LEARNING:

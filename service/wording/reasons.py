@@ -255,6 +255,11 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         f"its tracks have waited for {v['waits_s'] / 60:.0f} min; up to {v['limit_s'] / 60:g} min "
         "are waited for"
     ),
+    ServiceCode.TRACKS_LEFT_OUT: lambda v: (
+        f"{v['tracks']} of its tracks are not looked at, for a look would take too long of them: "
+        + ", ".join(f"{name!r}" for name in v["track_ids"])
+        + (" and others" if v["tracks"] > len(v["track_ids"]) else "")
+    ),
     ServiceCode.DISABLED_BY_PERSON: "disabled by a person",
     ServiceCode.ENDPOINT_GONE: "it answered 410: it is gone for good",
     ServiceCode.ENDPOINT_FAILS: "it failed for more than {patience_s_in_h:g} h: {error}",

@@ -4,12 +4,15 @@ import logging
 import time
 from functools import partial
 
+from models.effort import limited_effort
 from models.errors import CheckpointError
 from service.estimate_queue import (
     begin_look,
+    budget_of,
     end_look,
     fail_look,
     leave_poisoned,
+    left_out_by,
     note_partial_failures,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
@@ -18,6 +21,7 @@ from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.finding import PartialFailures, compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.learning import compute_reference, load_reference_period, save_reference
+from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
 
@@ -38,18 +42,20 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
             return
         # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
         newest_pk = begin_look(session, camera_id)
+        budget = budget_of(session, camera_id)
     try:
-        _look(context, camera_id, newest_pk)
+        with limited_effort(context.settings.estimate_cpu_s):
+            _look(context, camera_id, newest_pk, budget)
     except Exception as error:
         with context.store.write(camera_id) as session:
             fail_look(session, camera_id, repr(error))
         raise
 
 
-def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
+def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: LookBudget) -> None:
     """Look at all tracks up to one. No transaction is open while anything is computed."""
     store, settings = context.store, context.settings
-    begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked()
+    begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
         failures.add("averaged estimate", missing)
@@ -57,6 +63,9 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None) -> None:
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked)
+    if left_out := left_out_by(budget):
+        log.warning("tracks_left_out", extra={"camera_id": camera_id, **left_out[0].values})
+        failures.reasons.extend(left_out)
     finding = None if evidence is None else compute_finding(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
@@ -92,7 +101,7 @@ def predict_pending(context: JobContext, camera_id: str, unpacked: Unpacked) -> 
 def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     while True:
         with context.store.read() as session:
-            pending = load_pending(session, context.settings, camera_id, _BATCH)
+            pending = load_pending(session, context.settings, camera_id, _BATCH, unpacked.budget)
         if pending is None or not pending.tracks:
             return
         fetch_weights(context.store, context.settings, pending.model.weights_sha256)
@@ -165,7 +174,8 @@ def _grow_unless_failed(context: JobContext, camera_id: str, unpacked: Unpacked)
                 return  # the next job finds it due again
     failures = PartialFailures(camera_id)
     grow = partial(grow_if_due, context, camera_id, unpacked)
-    failures.unless_failed("growth_of_the_flow_map", grow)
+    with limited_effort(context.settings.estimate_cpu_s):
+        failures.unless_failed("growth_of_the_flow_map", grow)
     if failures.reasons:
         failed = tuple(failures.reasons)
         context.growth_cooldown.begin(camera_id, failed)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from service.logs import configure_logs
-from service.workers.processes.process import settle_allocator, yield_to_others
+from service.workers.processes.process import limit_memory, settle_allocator, yield_to_others
 
 log = logging.getLogger("surefoot.jobs")
 _TELLS_EVERY_S = 0.25
@@ -34,6 +34,7 @@ def main() -> None:
     # Beside this, even the idle class would let a busy machine stop trainings for good.
     yield_to_others(order["nice"])
     settle_allocator()
+    limit_memory(None)  # the worker's, which started it
     configure_logs()
     tells.write(json.dumps(_train(order, tells)) + "\n")
 

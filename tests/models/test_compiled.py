@@ -46,7 +46,7 @@ print(stats.cache_path)
 def ask(tmp_path):
     package = tmp_path / "models"
     package.mkdir()
-    for name in ("__init__.py", "compiled.py"):
+    for name in ("__init__.py", "compiled.py", "code_files.py", "effort.py"):
         shutil.copy(Path(models.__path__[0]) / name, package)
     (package / "outer.py").write_text(OUTER)
 
@@ -78,7 +78,7 @@ def test_no_code_is_kept_among_sources(ask, tmp_path):
     usual = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     ask(usual, factor=2, limit=5)
     try:
-        assert list(ask.place.glob("*.nbi"))
+        assert list(ask.place.glob("*.nbc"))
         assert not ask.place.is_relative_to(tmp_path)
         assert not list(tmp_path.rglob("*.nb?"))
     finally:
@@ -95,6 +95,66 @@ def test_code_of_former_sources_is_removed_beside_new_code(ask, tmp_path):
     assert not old.exists()
     assert new.exists()
     assert other.exists()
+
+
+def cut_off(whole):
+    return whole[: len(whole) // 2]
+
+
+def emptied(whole):
+    return b""
+
+
+def with_one_other_byte(whole):
+    return whole[:-100] + bytes([whole[-100] ^ 1]) + whole[-99:]
+
+
+@pytest.mark.parametrize("damage", [cut_off, emptied, with_one_other_byte])
+def test_code_that_a_crash_has_damaged_is_compiled_anew_once(ask, damage):
+    assert ask(factor=2, limit=5) == (11, "0 1")
+    files = sorted(ask.place.rglob("*"))
+    assert len(files) == 2  # of the function and of what it calls
+    for file in files:
+        file.write_bytes(damage(file.read_bytes()))
+    assert ask(factor=2, limit=5) == (11, "0 1")
+    assert ask(factor=2, limit=5) == (11, "1 0")
+    assert sorted(ask.place.rglob("*")) == files
+
+
+def test_code_that_others_may_have_written_is_not_run(ask, tmp_path):
+    users = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "users")}
+    first = "import sys; sys.prefix = sys.base_prefix"
+    given = {**users, "NUMBA_CACHE_DIR": str(tmp_path / "code")}
+    assert ask(given, first, factor=2, limit=5) == (11, "0 1")
+    folder = ask.place.parent
+    assert folder.stat().st_mode & 0o077 == 0
+    folder.chmod(0o777)
+    assert ask(given, first, factor=2, limit=5) == (11, "0 1")
+    assert ask.place.is_relative_to(tmp_path / "users")
+
+
+def test_a_full_disk_keeps_nobody_from_computing(tmp_path):
+    pytest.importorskip("resource")
+    body = """
+import numpy, resource, signal
+from models.compiled import compiled
+
+@compiled
+def twice(x):
+    return 2 * x
+
+twice.made()
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+assert twice(3.0) == 6.0
+"""
+    (tmp_path / "small.py").write_text(body)
+    path = str(Path(models.__path__[0]).parent)
+    code = tmp_path / "code"
+    environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(code)}
+    command = [sys.executable, str(tmp_path / "small.py")]
+    subprocess.run(command, env=environment, check=True, timeout=120)
+    assert not [file for file in code.rglob("*") if file.is_file()]
 
 
 def test_where_nothing_can_be_written_each_process_compiles_for_itself(ask, tmp_path):

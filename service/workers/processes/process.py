@@ -3,6 +3,7 @@
 import ctypes
 import logging
 import os
+import resource
 import signal
 from pathlib import Path
 
@@ -34,6 +35,18 @@ def give_back() -> None:
         ctypes.CDLL("libc.so.6").malloc_trim(0)
     except (OSError, AttributeError):
         return
+
+
+def limit_memory(mb: float | None) -> None:
+    """Have what this process allocates beyond so much fail where that is done; None: no limit.
+
+    Without it the system ends the process, or another one, for what a single job wants.
+    """
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = most if mb is None else int(mb * 2**20)
+    if most != resource.RLIM_INFINITY:
+        wanted = min(wanted, most)
+    resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
 def resident_mb() -> float:

@@ -131,6 +131,8 @@ def test_a_fit_is_judged_by_its_drop():
     assert fit.has_changed(np.full(16, -2.05))
     assert not fit.has_changed(np.full(10_000, -1.99))  # sure, but hours differ by as much
     assert not fit.has_changed(np.empty(0))
+    unknown = UsualFit(mean=np.nan, sd=np.nan, walking_groups=0.0)
+    assert not unknown.has_changed(np.full(16, -9.0))
 
 
 def test_the_map_says_the_less_the_worse_it_fits():

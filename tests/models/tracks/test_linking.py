@@ -5,11 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.upright import tops_seen
 from models.simulation.poses import PoseOffset
-from models.tracks.linking import count_walks, link_pieces, walks_of
+from models.tracks import config
+from models.tracks.linking import (
+    _both_ends,
+    _clear_links,
+    _of_each,
+    _pairs,
+    count_walks,
+    link_pieces,
+    walks_of,
+)
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import Trajectory
 from studies.faults.identities import fragments
@@ -101,6 +112,47 @@ def test_who_stands_is_linked_by_the_place():
 def test_what_is_above_the_horizon_of_the_prior_is_left_alone():
     upward = replace(PRIOR, tilt_rad=-math.radians(5))
     assert links(walk(0, 3), walk(4, 6), pose=upward) == [-1, -1]
+
+
+def each_against_all_others(earlier, later, misfit):
+    """Links by their definition: a free pair, the likeliest first, without a free rival."""
+    linked, free = np.zeros(misfit.size, dtype=bool), np.ones(misfit.size, dtype=bool)
+    for pair in range(misfit.size):
+        rivals = free & ((earlier == earlier[pair]) | (later == later[pair]))
+        if free[pair] and (rivals & (misfit < misfit[pair] + config.CLEAR)).sum() == 1:
+            linked[pair] = True
+            free &= ~rivals
+    return linked
+
+
+@given(
+    st.integers(2, 12).flatmap(
+        lambda count: st.tuples(
+            st.just(count),
+            st.dictionaries(
+                st.tuples(*[st.integers(0, count - 1)] * 2),
+                st.integers(-30, -1) | st.floats(-30, -1e-9),
+                min_size=1,
+            ),
+        )
+    )
+)
+def test_links_are_those_of_each_pair_against_all_others(drawn):
+    count, pairs = drawn
+    earlier, later = np.array(list(pairs)).T.copy()
+    misfit = np.array([float(value) for value in pairs.values()])
+    rank = np.argsort(misfit, kind="stable")
+    earlier, later, misfit = earlier[rank], later[rank], misfit[rank]
+    found = _clear_links(earlier, later, misfit, _of_each(earlier, count), _of_each(later, count))
+    assert found.tolist() == each_against_all_others(earlier, later, misfit).tolist()
+
+
+def test_of_a_flood_of_pieces_each_has_so_many_followers_at_most():
+    """A thousand that begin where a thousand others end were a million pairs."""
+    flood = [walk(0, 2) for _ in range(500)] + [walk(2.5, 4.5) for _ in range(500)]
+    earlier, _ = _pairs(*_both_ends(flood, LENS, PRIOR))
+    assert set(np.bincount(earlier).tolist()) == {config.MOST_FOLLOWERS}
+    assert set(links(*flood)) == {-1}
 
 
 def test_nobody_and_a_single_one():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.tracks import config
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import observe_each
 from studies.simulation.lanes import SiteConfig
@@ -69,6 +70,30 @@ def test_a_gap_and_the_edge_of_the_picture_part_a_track():
     found = observe_each([beyond], LENS).steps.rows
     assert 18 < found.time_s[-1] < 21
     assert found.owner_idx.tolist() == [0] * found.owner_idx.size
+
+
+@pytest.mark.parametrize("days", [1 / 24, 30.0, 7300.0])
+def test_points_far_apart_are_no_run_however_far_they_always_are(days):
+    """Six points over a month were one run, with a node each 1.5 s: 1.7 million."""
+    sparse = Trajectory(
+        time_s=1e9 + np.linspace(0, 86_400 * days, 6), uv=straight(np.arange(6.0)).uv
+    )
+    assert not len(observe_each([sparse], LENS).steps.rows)
+    near = Trajectory(time_s=1e9 + np.linspace(0, 50.0, 6), uv=sparse.uv)  # 10 s apart
+    assert len(observe_each([near], LENS).steps.rows) == 33
+
+
+def test_a_track_has_no_more_nodes_than_an_hour_has():
+    time_s = np.arange(0.0, 5_000.1, 1.0)
+    goes_on = Trajectory(time_s=time_s, uv=np.full((time_s.size, 2), 400.0))
+    cut = goes_on.part(np.flatnonzero(time_s % 100))  # 50 runs, each of 65 nodes at most
+    beside = straight(np.arange(0.0, 9.1, 0.5))
+    for track in (goes_on, cut):
+        rows = observe_each([track, beside, track], LENS).steps.rows
+        steps = np.bincount(rows.owner_idx)
+        assert steps[1] == 6
+        assert steps[0] == steps[2]
+        assert 0.9 * config.MOST_NODES < steps[0] < config.MOST_NODES
 
 
 def test_feet_that_a_box_has_lost_below_the_picture_are_not_where_it_ends():

@@ -194,6 +194,31 @@ def test_five_points_over_two_seconds_are_enough(corner):
     assert post(corner, [edge])["accepted"] == 1
 
 
+def times(*time_s):
+    return {"id": "t", "points": [[T0 + at, 1, 1] for at in time_s]}
+
+
+def test_a_track_of_more_than_an_hour_is_nobodys_walk(corner):
+    rejection = refused(corner, times(*range(-30 * 86_400, 1, 6 * 86_400)))
+    assert rejection["code"] == "too_long"
+    assert "at most 3600 s a track are taken, got 2592000.0 s" in rejection["detail"]
+    assert post(corner, [times(*range(0, 3_601, 600))])["accepted"] == 1
+
+
+def test_a_frame_rate_that_is_a_thousand_times_too_low_makes_a_track_too_long(corner):
+    frames = {"id": "f", "frames": [[n, 1, 1] for n in range(6)]}
+    answer = post(corner, [track("ok"), frames], frame_rate_hz=1e-6, started_at=T0 - 6e6)
+    assert [each["code"] for each in answer["rejected"]] == ["too_long"]
+    assert "frame_rate_hz" in answer["rejected"][0]["detail"]
+
+
+def test_who_was_not_seen_for_ten_minutes_is_another(corner):
+    rejection = refused(corner, times(0, 1, 2, 3, 604, 605))
+    assert rejection["code"] == "gap"
+    assert rejection["detail"].startswith("points/4/0: at most 600 s after the point before")
+    assert "got 601.0 s" in rejection["detail"]
+
+
 def test_too_many_points(corner):
     rejection = refused(corner, track("long", count=10_001) | {})
     assert rejection["code"] == "too_many_points"

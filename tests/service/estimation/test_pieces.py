@@ -65,6 +65,24 @@ def test_a_reference_is_of_so_many_people_however_they_were_posted(pieces, sizes
     assert "are pieces of others' walks" in pieces.pose()["reason"]
 
 
+def test_tracks_that_are_all_pieces_are_linked_a_few_times_and_not_for_each(monkeypatch):
+    one = np.column_stack([np.arange(6.0), np.full((6, 2), 300.0)])
+    records = [
+        TrackRecord(id=n, points=pack(one), received_at=datetime.now(UTC)) for n in range(2_001)
+    ]
+    sizes = []
+
+    def all_but_one(trajectories, *_):
+        sizes.append(len(trajectories))
+        return np.where(np.arange(len(trajectories)) < 399, -1, 0)
+
+    monkeypatch.setattr("service.estimation.evidence.link_pieces", all_but_one)
+    found = until_so_many(lambda limit: records[:limit], 400, LENS, PRIOR, Unpacked())
+    assert (found.enough, len(found.records)) == (True, 2_000)
+    assert sizes[:12] == list(range(400, 412))
+    assert len(sizes) <= 30
+
+
 def test_as_many_tracks_are_read_as_are_of_so_many_people(pieces):
     pieces.walk(PRIOR, REFERENCE)
     stored = pieces.people[: len(pieces.people) // 2]

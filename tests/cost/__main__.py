@@ -1,0 +1,106 @@
+"""Fuzzing of cost: `python -m tests.cost --windows 2000` draws windows and prints the worst ten.
+
+Exits with 1 where one is beyond the budget of a look; Ctrl-C ends it early, with what it has.
+"""
+
+import argparse
+import contextlib
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from hypothesis import HealthCheck, Phase, given, seed, settings, target
+
+from tests.cost.drawn import windows
+from tests.cost.looks import LOOK_CPU_S, LOOK_MB, Cost, looker
+
+_WORST = 10
+
+
+def main() -> int:
+    """Draw, look, print."""
+    parser = argparse.ArgumentParser(prog="python -m tests.cost", description=__doc__)
+    parser.add_argument("--windows", type=int, default=2_000)
+    parser.add_argument("--points", type=int, default=400_000, help="most points of a crowd")
+    parser.add_argument("--seed", type=int, default=0)
+    given_ = parser.parse_args()
+    costs: list[Cost] = []
+    with tempfile.TemporaryDirectory() as folder, looker(Path(folder) / "data") as found:
+
+        @seed(given_.seed)
+        @settings(
+            max_examples=given_.windows,
+            deadline=None,
+            database=None,
+            phases=(Phase.generate, Phase.target),
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(windows(given_.points))
+        def look(window) -> None:  # type: ignore[no-untyped-def]
+            drawn, checked = window
+            cost = found.look(drawn, checked=checked)
+            costs.append(cost)
+            target(cost.peak_mb, label="MB")
+            target(cost.cpu_s, label="CPU seconds")
+            if _is_beyond(cost):
+                _say(f"beyond: {_words(cost)}")
+            if len(costs) % 50 == 0:
+                _say(f"{len(costs)} windows, {_most(costs)}")
+
+        with contextlib.suppress(KeyboardInterrupt):
+            look()
+    for title, key in (("CPU seconds", _cpu), ("memory", _memory), ("CPU a point", _cpu_a_point)):
+        _say(f"\nThe worst by {title}:")
+        for cost in sorted(costs, key=key, reverse=True)[:_WORST]:
+            _say(_words(cost))
+    beyond = [cost for cost in costs if _is_beyond(cost)]
+    _say(f"\n{len(costs)} windows, {_most(costs)}; {len(beyond)} beyond their budget")
+    for cost in beyond[:_WORST]:
+        _say(_words(cost))
+    return 1 if beyond else 0
+
+
+def _is_beyond(cost: Cost) -> bool:
+    return cost.error is not None or cost.peak_mb >= LOOK_MB or cost.cpu_s >= LOOK_CPU_S
+
+
+def _cpu(cost: Cost) -> float:
+    return cost.cpu_s
+
+
+def _memory(cost: Cost) -> float:
+    return cost.peak_mb
+
+
+def _cpu_a_point(cost: Cost) -> float:
+    return cost.cpu_s / max(cost.points, 1_000)
+
+
+def _most(costs: list[Cost]) -> str:
+    keys: list[Callable[[Cost], float]] = [_cpu, _memory]
+    cpu_s, peak_mb = (max(map(key, costs)) for key in keys)
+    return f"at most {cpu_s:.1f} CPU-s and {peak_mb:.0f} MB"
+
+
+def _words(cost: Cost) -> str:
+    crowds = "; ".join(
+        f"{each.tracks} of {each.points} points over {each.seconds:.4g} s, {each.rhythm}, "
+        f"{each.gaps} gaps of {each.gap_s:g} s, within {each.spread_s:g} s, {each.scatter_px:g} px "
+        f"apart, {each.pace_px:g} px/s, jumps of {each.jump_px:g} px, {each.form}"
+        for each in cost.crowds
+    )
+    ended = "" if cost.error is None else f", {cost.error}"
+    return (
+        f"{cost.cpu_s:6.2f} CPU-s {cost.peak_mb:5.0f} MB, {cost.tracks} tracks of {cost.points} "
+        f"points, {cost.left_out} left out{ended}: {crowds}"
+    )
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
