@@ -1,6 +1,8 @@
 # Two stages: what builds stays behind. Everything is installed by its hash, torch in its CPU build;
 # --build-arg TORCH=cuda takes PyPI's, which is several GB larger and needs no second index.
-FROM python:3.11-slim AS build
+# --build-arg BASE=python:3.11-slim@sha256:... is for images that others get: docs/contributing.md.
+ARG BASE=python:3.11-slim
+FROM $BASE AS build
 ARG TORCH=cpu
 WORKDIR /src
 COPY deploy/lock deploy/lock
@@ -12,7 +14,9 @@ COPY service service
 COPY migrations migrations
 RUN VENV=/opt/surefoot PIP_NO_CACHE_DIR=1 .ci/install runtime "$TORCH"
 
-FROM python:3.11-slim
+FROM $BASE
+ARG BASE
+LABEL org.opencontainers.image.base.name="$BASE"
 RUN useradd --system --uid 10001 --home-dir /data --create-home surefoot
 COPY --from=build /opt/surefoot /opt/surefoot
 # Others than the container reach it, so that it starts once somebody has a token; see

@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
+from io import BytesIO
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -23,6 +24,7 @@ from models.errors import CheckpointError
 
 _ENTRY = "surefoot"  # alone in the header: several entries have no order
 _STORED = "stored"
+_MOST_BYTES = 256 * 2**20  # unpacked: gzip makes a gigabyte of one megabyte
 _DAMAGED = (OSError, EOFError, zlib.error, SafetensorError, ValueError, KeyError, TypeError)
 
 Made = TypeVar("Made")
@@ -54,7 +56,7 @@ def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
         CheckpointError: the bytes are damaged, or of another format or version.
     """
     try:
-        raw = gzip.decompress(data)
+        raw = _unpacked(data)
         # On a place of their own in memory: those of safetensors lie as they come.
         arrays = {name: array.copy() for name, array in load(raw).items()}
         length = int.from_bytes(raw[:8], "little")
@@ -67,6 +69,14 @@ def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
             f"format: {form.name} {form.version} is needed, got {found[0]} {found[1]}"
         )
     return {**values, **arrays}
+
+
+def _unpacked(data: bytes) -> bytes:
+    with gzip.GzipFile(fileobj=BytesIO(data)) as file:
+        raw = file.read(_MOST_BYTES + 1)
+    if len(raw) > _MOST_BYTES:
+        raise ValueError(f"over {_MOST_BYTES} bytes when unpacked")
+    return raw
 
 
 def stored_as(name: str) -> Any:

@@ -1,7 +1,8 @@
 """The one place that knows the job engine: what the rest of the service says to it.
 
 Jobs are rows of the same database, so enqueueing is part of the caller's transaction. Nothing
-here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs.
+here imports torch; the HTTP process holds a `JobQueue`, the worker process runs the jobs. What a
+job is about is kept as JSON: whoever can write a row, or has made a backup, gets no code run by it.
 """
 
 import contextlib
@@ -9,22 +10,37 @@ import logging
 import secrets
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from typing import Any, NoReturn
 
-from dbos import DBOS, DBOSClient, DBOSConfig, error
-from sqlalchemy import Engine, select, text
+from dbos import DBOS, DBOSClient, DBOSConfig, DBOSPortableJSONSerializer, error
+from dbos._serialization import DefaultSerializer  # private; pinned, see _refuse_pickle
+from sqlalchemy import Engine, TextClause, select, text
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
 from service.store.cameras import CameraRecord
-from service.store.engines.store import savepoint
+from service.store.engines.store import engine_for, savepoint
+
+log = logging.getLogger("surefoot.jobs")
 
 APPLICATION = "surefoot"
 # Jobs belong to a version; it changes only when jobs that were queued before cannot be run.
 JOBS_VERSION = "1"
 TRAIN_JOB, ESTIMATE_JOB, DELIVER_JOB = "train", "estimate", "deliver"  # and the queue of each
-# Of the engine's tables those that nothing works without.
-ENGINE_TABLES = ("workflow_status", "workflow_input", "workflow_schedules", "queues")
+_JSON = DBOSPortableJSONSerializer()
+JOBS_FORM = _JSON.name()
+# The engine's tables whose rows name how their content is written.
+_SERIALIZED = (
+    *("workflow_status", "operation_outputs", "notifications", "streams"),
+    *("workflow_events", "workflow_events_history"),
+)
+_CONTENT = ("workflow_input", "workflow_output")  # of rows of workflow_status
+# All of the engine's but the number of its schema. What is in them is made anew when it is gone:
+# the store's own marks say what is to be done.
+ENGINE_TABLES = (
+    *(*_SERIALIZED, *_CONTENT),
+    *("workflow_schedules", "queues", "application_versions"),
+)
 _ENGINE_CONNECTIONS = 5  # to a server, of each worker
 # The engine's priorities are whole numbers from 1 to 2**31 - 1, the smallest first: 68 years.
 _BEGINNING = datetime(2026, 1, 1, tzinfo=UTC)
@@ -62,7 +78,10 @@ class JobQueue:
 
     def __init__(self, engine: Engine) -> None:
         self._client = DBOSClient(
-            system_database_engine=engine, application_name=APPLICATION, lazy=True
+            system_database_engine=engine,
+            application_name=APPLICATION,
+            lazy=True,
+            serializer=_JSON,
         )
 
     def enqueue_training(self, session: Session, camera_id: str, training_id: str) -> None:
@@ -137,9 +156,45 @@ def queue_of(session: Session) -> JobQueue:
 
 
 def migrate_engine_tables(settings: Settings) -> None:
-    """Create or upgrade the engine's own tables; they are not Alembic's."""
+    """Create or upgrade the engine's own tables; they are not Alembic's.
+
+    Jobs that are no JSON, of releases that kept pickles or of whoever wrote them, are deleted; the
+    upkeep queues anew what is still to be done.
+    """
     logging.getLogger("dbos").setLevel(logging.WARNING)
     DBOS.migrate(settings.store_url)
+    engine = engine_for(settings.store_url)
+    try:
+        if forgotten := _forget_pickles(engine):
+            log.warning("pickled_jobs_deleted", extra={"rows": forgotten})
+    finally:
+        engine.dispose()
+
+
+def _forget_pickles(engine: Engine) -> int:
+    with engine.connect() as connection:  # nothing waits for who writes, where there is none
+        found = [table for table in _SERIALIZED if connection.scalar(*_strange("SELECT 1", table))]
+    if not found:
+        return 0
+    with engine.begin() as connection:
+        forgotten = sum(connection.execute(*_strange("DELETE", table)).rowcount for table in found)
+        for table in _CONTENT:
+            kept = "SELECT workflow_uuid FROM workflow_status"
+            connection.execute(text(f"DELETE FROM {table} WHERE workflow_uuid NOT IN ({kept})"))
+    return forgotten
+
+
+def _strange(act: str, table: str) -> tuple[TextClause, dict[str, str]]:
+    return text(f"{act} FROM {table} WHERE serialization <> :json"), {"json": JOBS_FORM}
+
+
+def _refuse_pickle(cls: DefaultSerializer, serialized_data: str) -> NoReturn:
+    raise ValueError("a job is kept as a pickle, which may be any code: it is not read")
+
+
+# Each row says how it is to be read, whatever serializer the engine was given: "py_pickle" would
+# run what it holds. `tests/service/workers/test_pickles.py` plants one.
+DefaultSerializer.deserialize = _refuse_pickle  # type: ignore[method-assign]
 
 
 def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
@@ -151,6 +206,7 @@ def engine_config(settings: Settings, worker_name: str) -> DBOSConfig:
         "executor_id": worker_name,
         "run_migrations": False,
         "enable_otlp": False,
+        "serializer": _JSON,
         "log_level": "WARNING",
         "scheduler_polling_interval_sec": 1.0,
     }

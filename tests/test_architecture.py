@@ -162,6 +162,25 @@ def test_torch_stays_in_its_rooms():
                 assert any(place.startswith(allowed) for allowed in TORCH_ROOMS), place
 
 
+# Readers for which what they read is a program. What a crash may do to the compiler's own cache is
+# read by `code_files` against its hash.
+_PROGRAM_READERS = {"pickle", "marshal", "shelve", "dill", "joblib", "cloudpickle", "yaml", "runpy"}
+_PROGRAM_CALLS = {"eval", "exec", "__import__", "torch.load", "np.load", "import_module"}
+
+
+def test_nothing_that_is_shipped_reads_programs_out_of_data():
+    for path in (path for top in ("surefoot", "models", "service") for path in sources(top)):
+        if path.name == "code_files.py":
+            continue
+        assert not {name.split(".")[0] for name in imports(path)} & _PROGRAM_READERS, path
+        calls = {
+            ast.unparse(node.func)
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call)
+        }
+        assert not calls & _PROGRAM_CALLS, path
+
+
 @pytest.mark.parametrize("top", ["models", "service"])
 def test_no_way_through_the_folders_comes_back(top):
     """What goes down through folders, a post of tracks to its webhook, enters none of them twice.

@@ -142,6 +142,7 @@ table(
     *needed(NUMBER, "tracks"),
     *needed(DateTime, "first_seen_at", "last_seen_at"),
     *optional(DateTime, "told_at"),
+    *optional(String(16), "token_id"),
 )
 table(
     "site_references",
@@ -395,7 +396,7 @@ table(
     *needed(String, "name"),
     *needed(String(64), "secret_sha256"),
     *needed(JSON, "scopes"),
-    *optional(JSON, "cameras"),
+    *optional(JSON, "cameras", "sources"),
     *needed(DateTime, "created_at"),
     *optional(String, "created_by"),
     *optional(DateTime, "expires_at", "used_at", "revoked_at"),

@@ -144,4 +144,5 @@ def plan_from_config(config: dict[str, Any]) -> TrainingPlan:
 
 def weights_path(folder: Path, digest: str) -> Path:
     """The file in a folder for weights with this SHA-256."""
-    return folder / f"{digest}.safetensors"
+    # A name alone: what a database or an archive says leads out of no folder.
+    return folder / f"{Path(digest).name}.safetensors"

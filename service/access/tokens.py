@@ -3,6 +3,7 @@
 import hashlib
 import hmac
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -10,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.enums import Activity, TokenScope
-from service.errors import MalformedError, NotFoundError
+from service.errors import ForbiddenError, MalformedError, NotFoundError
 from service.store import access
 from service.store.access import Actor, TokenRecord
 
@@ -28,13 +29,15 @@ class Caller(Actor):
     """Somebody who was let in.
 
     `token_id` is None where a proxy vouches for a person, `session_hash` where no page is logged
-    in. `cameras` are those that tracks may be posted for; None: all.
+    in. `cameras` are those that tracks may be posted for, `sources` the names that they may be
+    posted under; None: all, but for what is others' (`claims`).
     """
 
     scopes: frozenset[str]
     token_id: str | None = None
     session_hash: str | None = None
     cameras: frozenset[str] | None = None
+    sources: frozenset[str] | None = None
 
     def may(self, scope: TokenScope) -> bool:
         """True if what needs a scope is allowed."""
@@ -45,14 +48,32 @@ class Caller(Actor):
         """True if tracks of a camera may be posted, as far as the camera goes."""
         return self.cameras is None or camera_id in self.cameras
 
+    def require_sources(self, names: Sequence[str]) -> None:
+        """Check that tracks may be posted under names, as far as the token names any.
+
+        Raises:
+            ForbiddenError: it names others.
+        """
+        for name in names:
+            if self.sources is not None and name not in self.sources:
+                raise ForbiddenError(
+                    f"source: {self.name} posts under {', '.join(sorted(self.sources)):.200}, "
+                    f"got {name!r:.60}"
+                )
+
+    def has_source(self, name: str) -> bool:
+        """True if a source is one that the token names."""
+        return self.sources is not None and name in self.sources
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TokenSpec:
-    """A token to make: whose, for what, for which cameras (None: all), until when."""
+    """A token to make: whose, for what, for which cameras and sources (None: all), until when."""
 
     name: str
     scopes: tuple[str, ...]
     cameras: tuple[str, ...] | None = None
+    sources: tuple[str, ...] | None = None
     expires_at: datetime | None = None
 
 
@@ -79,6 +100,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
         secret_sha256=hash_of(secret),
         scopes=[scope for scope in TokenScope if scope in spec.scopes],
         cameras=None if spec.cameras is None else sorted(set(spec.cameras)),
+        sources=None if spec.sources is None else sorted(set(spec.sources)),
         created_at=now,
         created_by=by,
         expires_at=spec.expires_at,
@@ -87,7 +109,10 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
     )
     session.add(record)
     session.flush()
-    details = {"name": record.name, "scopes": record.scopes, "cameras": record.cameras}
+    details = {
+        **{"name": record.name, "scopes": record.scopes},
+        **{"cameras": record.cameras, "sources": record.sources},
+    }
     note(session, Activity.TOKEN_ADDED, by=by, subject_id=token_id, details=details)
     return MadeToken(record=record, text=f"{_PREFIX}_{token_id}_{secret}")
 
@@ -129,6 +154,7 @@ def caller_of(record: TokenRecord) -> Caller:
         scopes=frozenset(record.scopes),
         token_id=record.id,
         cameras=None if record.cameras is None else frozenset(record.cameras),
+        sources=None if record.sources is None else frozenset(record.sources),
     )
 
 
@@ -153,7 +179,11 @@ def _check(spec: TokenSpec, now: datetime) -> None:
     if unknown or not spec.scopes:
         got = ", ".join(unknown) or "none"
         raise refuse("scopes", f"some of {', '.join(TokenScope)} are needed, got {got:.80}")
-    if spec.cameras is not None and (TokenScope.INGEST not in spec.scopes or not spec.cameras):
-        raise refuse("cameras", "cameras are named for the scope ingest alone, one at least")
+    for field, named in (("cameras", spec.cameras), ("sources", spec.sources)):
+        if named is not None and (TokenScope.INGEST not in spec.scopes or not named):
+            raise refuse(field, f"{field} are named for the scope ingest alone, one at least")
+    for name in spec.sources or ():
+        if not 0 < len(name) <= MAX_NAME or not name.isprintable():
+            raise refuse("sources", f"1 to {MAX_NAME} printable characters each, got {name!r:.80}")
     if spec.expires_at is not None and spec.expires_at <= now:
         raise refuse("expires_at", f"a time after now is needed, got {spec.expires_at.isoformat()}")

@@ -41,7 +41,7 @@ def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) 
     with state.store.read() as session:
         cameras.require_camera(session, camera_id)
     snapshots.require_snapshots(state.settings)
-    with state.large_bodies.turn(state.settings.http_wait_s):
+    with state.stills.turn(state.settings.http_wait_s):
         return read_still(body, media_type_of(request))
 
 

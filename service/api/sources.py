@@ -18,7 +18,10 @@ class UseBody(Body):
 
 
 class SourceOut(Out):
-    """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it."""
+    """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it.
+
+    `token_id` is of the token whose name it is; null where access was off.
+    """
 
     name: str
     counts: bool
@@ -27,6 +30,7 @@ class SourceOut(Out):
     wanted_tracks: int
     first_seen_at: datetime
     last_seen_at: datetime
+    token_id: str | None
 
 
 class SourceList(BaseModel):

@@ -9,18 +9,19 @@ from pydantic import BaseModel, Field
 from service.access import tokens
 from service.access.tokens import MAX_NAME, TokenSpec
 from service.api.middleware.dependencies import ReadDep, WriteDep
-from service.api.schemas import Body, CameraId, Moment, Out
+from service.api.schemas import Body, CameraId, Moment, Out, Text
 from service.enums import TokenScope, TokenState
 from service.store import access
 from service.store.access import TokenRecord, name_in
 
 
 class TokenBody(Body):
-    """A token to make; `cameras` are those that it posts tracks for, all if left out."""
+    """A token to make; it posts tracks for `cameras` and under `sources`, all if left out."""
 
     name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
     scopes: Annotated[list[TokenScope], Field(min_length=1, max_length=4)]
     cameras: Annotated[list[CameraId], Field(min_length=1, max_length=1000)] | None = None
+    sources: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
     expires_at: Moment | None = None
 
 
@@ -31,6 +32,7 @@ class TokenOut(Out):
     name: str
     scopes: list[TokenScope]
     cameras: list[str] | None
+    sources: list[str] | None
     state: TokenState
     created_at: datetime
     created_by: str | None
@@ -70,6 +72,7 @@ def create(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
         name=body.name,
         scopes=tuple(body.scopes),
         cameras=None if body.cameras is None else tuple(body.cameras),
+        sources=None if body.sources is None else tuple(body.sources),
         expires_at=body.expires_at,
     )
     made = tokens.make_token(session, spec, name_in(session, None))

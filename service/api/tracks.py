@@ -11,7 +11,15 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 from pydantic import Field
 
-from service.api.middleware.dependencies import AppState, BodyDep, StateDep, media_type_of
+from service.access.tokens import Caller
+from service.api.middleware.dependencies import (
+    AppState,
+    BodyDep,
+    CallerDep,
+    StateDep,
+    get_caller,
+    media_type_of,
+)
 from service.api.schemas import Out
 from service.cameras import tracks
 from service.errors import MalformedError, UnsupportedMediaTypeError
@@ -158,11 +166,11 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
     )
 
 
-def _take(state: AppState, camera_id: str, came: Posted) -> Response:
+def _take(state: AppState, camera_id: str, came: Posted, caller: Caller | None) -> Response:
     camera = state.pictures.of(state.store, camera_id)
     while True:
         try:
-            receipt = _store(state, camera_id, camera, came)
+            receipt = _store(state, camera_id, camera, came, caller)
             break
         except (MalformedError, tracks.StalePictureError) as error:
             # It may be that the picture is another than when it was last asked for.
@@ -174,7 +182,9 @@ def _take(state: AppState, camera_id: str, came: Posted) -> Response:
     return Response(body, 202, media_type="application/json")
 
 
-def _store(state: AppState, camera_id: str, camera: Picture, came: Posted) -> tracks.Receipt:
+def _store(
+    state: AppState, camera_id: str, camera: Picture, came: Posted, caller: Caller | None
+) -> tracks.Receipt:
     batch = read_batch(state, camera, came)
     state.quota.check(state.store, camera_id, batch)
     with state.store.change(camera_id) as connection:
@@ -186,6 +196,7 @@ def _store(state: AppState, camera_id: str, camera: Picture, came: Posted) -> tr
             read_by=camera,
             max_sources=state.settings.max_sources,
             watched=camera_id in state.watched,
+            caller=caller,
         )
 
 
@@ -205,7 +216,8 @@ class _PostRoute(APIRoute):
                 return await declared(request)
             came = Posted(body=await request.body(), media_type=media_type_of(request))
             camera_id = request.path_params["camera_id"]
-            return await run_in_threadpool(_take, request.state.app, camera_id, came)
+            caller = await get_caller(request)
+            return await run_in_threadpool(_take, request.state.app, camera_id, came, caller)
 
         return handle
 
@@ -220,10 +232,13 @@ router = APIRouter(tags=["tracks"], route_class=_PostRoute)
     response_model=ReceiptOut,
 )
 def post_tracks(
-    camera_id: str, came: Annotated[Posted, Depends(posted)], state: StateDep
+    camera_id: str,
+    came: Annotated[Posted, Depends(posted)],
+    state: StateDep,
+    caller: CallerDep,
 ) -> Response:
     """Store tracks. One bad track never loses the others; 202 means that they are on disk.
 
     422 where there were tracks and none of them could be taken.
     """
-    return _take(state, camera_id, came)
+    return _take(state, camera_id, came, caller)

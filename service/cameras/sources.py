@@ -14,6 +14,8 @@ from sqlalchemy.orm import Session
 from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.access.activity import note
+from service.access.claims import may_claim, require_own
+from service.access.tokens import Caller
 from service.alerts.alerts import end_alert, open_alert
 from service.cameras.cameras import require_camera
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
@@ -50,20 +52,39 @@ class SourceView:
 
 
 def note_source(
-    connection: Connection, camera_id: str, name: str, stored: int, max_sources: int
+    connection: Connection,
+    camera_id: str,
+    name: str,
+    stored: int,
+    max_sources: int,
+    caller: Caller | None,
 ) -> None:
-    """Take down that a source has posted.
+    """Take down that a source has posted. Where access is off there is no `caller`.
 
     Raises:
+        ForbiddenError: the name is another token's.
         TooManySourcesError: it is new, and the camera has as many as it may have.
     """
     now = datetime.now(UTC)
-    if sources.note_seen(connection, camera_id, name, stored, now):
+    token_id = None if caller is None else caller.token_id
+    shared = caller is None or caller.has_source(name)
+    if sources.note_seen(connection, camera_id, name, stored, now, token_id, shared=shared):
         return
     with joined(connection) as session:
+        record = sources.find(session, camera_id, name)
+        require_own(session, caller, camera_id, name, None if record is None else record.token_id)
+        if record is not None:  # of a token that is over
+            record.token_id, record.last_seen_at = token_id, now
+            record.tracks += stored
+            return
         _make_room(session, camera_id, name, max_sources)
         record = SourceRecord(
-            camera_id=camera_id, name=name, tracks=stored, first_seen_at=now, last_seen_at=now
+            camera_id=camera_id,
+            name=name,
+            tracks=stored,
+            first_seen_at=now,
+            last_seen_at=now,
+            token_id=token_id,
         )
         session.add(record)
 
@@ -146,6 +167,7 @@ def watch_sources(
     counting = next((record for record in found if record.name == reference.source), None)
     for record in sorted(others, key=lambda each: each.last_seen_at, reverse=True):
         silent = counting is None or _is_silent(session, settings, counting, record)
+        silent = silent and may_claim(session, record.token_id, camera_id)
         if silent and _is_ready(session, settings, reference, record.name):
             _count(session, queue, record, _still_from_s(session, settings, reference), None)
             return f"the tracks of {record.name!r} count now"

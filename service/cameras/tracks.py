@@ -7,6 +7,8 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection
 
+from service.access.claims import require_claim
+from service.access.tokens import Caller
 from service.cameras.cameras import no_camera
 from service.cameras.sources import note_source
 from service.errors import FieldError, NothingTakenError, QuotaError
@@ -146,6 +148,7 @@ def receive_tracks(
     read_by: Picture,
     max_sources: int = 16,
     watched: bool = False,
+    caller: Caller | None = None,
 ) -> Receipt:
     """Store the good tracks of a request and have them looked at, in one transaction.
 
@@ -158,6 +161,7 @@ def receive_tracks(
         NotFoundError: there is no such camera.
         StalePictureError: its picture is another by now; nothing is stored.
         NothingTakenError: there were tracks, and none of them could be taken.
+        ForbiddenError: the source is another token's, or the camera others' to claim.
         TooManySourcesError: the source is new, and the camera has as many as it may have.
     """
     awaited = cameras.awaited(connection, camera_id)
@@ -167,6 +171,9 @@ def receive_tracks(
         raise StalePictureError(camera_id)
     if batch.rejections and not batch.tracks:
         raise _nothing_taken(batch)
+    sources = sorted({track.source for track in batch.tracks})
+    if caller is not None:
+        caller.require_sources(sources)
     now = datetime.now(UTC)
     added = tracks.add(
         connection,
@@ -185,11 +192,12 @@ def receive_tracks(
             for track in batch.tracks
         ],
     )
-    sources = sorted({track.source for track in batch.tracks})
     for source in sources:
         stored = added if source == batch.tracks[0].source else 0
-        note_source(connection, camera_id, source, stored, max_sources)
+        note_source(connection, camera_id, source, stored, max_sources, caller)
     if awaited.source and sources:
+        with joined(connection) as session:
+            require_claim(session, caller, camera_id)
         references.be_of_source(connection, camera_id, sources[0])
     if added and awaited.look:
         with joined(connection) as session:

@@ -36,6 +36,9 @@ def add(
     camera: Annotated[
         list[str] | None, typer.Option(help="With ingest: a camera to post for; repeatedly.")
     ] = None,
+    source: Annotated[
+        list[str] | None, typer.Option(help="With ingest: a name to post under; repeatedly.")
+    ] = None,
     expires: Annotated[
         str | None, typer.Option(help="How long it holds: 12h, 90d, 8w, 1y; for ever if left out.")
     ] = None,
@@ -48,6 +51,7 @@ def add(
         name=name,
         scopes=tuple(scope),
         cameras=tuple(camera) if camera else None,
+        sources=tuple(source) if source else None,
         expires_at=None if expires is None else _time_after(expires),
     )
     with _store(data_dir) as store, store.write() as session:
@@ -60,7 +64,7 @@ def list_all(data_dir: DataDir = None) -> None:
     """List the tokens, without their secrets."""
     from service.store import access
 
-    table = Table("id", "name", "may", "cameras", "made", "last used", "ends")
+    table = Table("id", "name", "may", "cameras", "sources", "made", "last used", "ends")
     with _store(data_dir) as store, store.read() as session:
         for record in access.every(session):
             table.add_row(
@@ -68,6 +72,7 @@ def list_all(data_dir: DataDir = None) -> None:
                 record.name,
                 ", ".join(record.scopes),
                 "all" if record.cameras is None else ", ".join(record.cameras),
+                "all" if record.sources is None else ", ".join(record.sources),
                 _time(record.created_at),
                 _time(record.used_at),
                 _end(record),

@@ -1,25 +1,22 @@
 """Calibrations as OpenCV's FileStorage keeps them: checked here, read in a process of its own.
 
 OpenCV's parser is C++ that a file can crash, so that it never runs in the process of the API: see
-`calibration_reader`.
+`calibration_reader` and `confined`.
 """
 
 import json
-import os
 import re
-import subprocess
-import sys
 import threading
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from service.errors import MalformedError, OverloadedError
+from service.formats.confined import MAX_SECONDS, ReaderError, read_apart
 
 MAX_BYTES = 1024 * 1024
 MAX_DEPTH = 32  # brackets or tags in each other; OpenCV itself writes 4
 MAX_INDENT = 200  # columns, by which YAML nests, too
-MAX_SECONDS = 10.0
 _AT_ONCE = 2
 _READER = "service.formats.calibration_reader"
 
@@ -54,7 +51,11 @@ def read_calibration(body: bytes, timeout_s: float = MAX_SECONDS) -> Calibration
             f"file: {_AT_ONCE} files are read at once, and so many are", retry_after_s=2
         )
     try:
-        answer = _ask_reader(body, timeout_s)
+        answer: dict[str, Any] = json.loads(read_apart(_READER, body, within_s=timeout_s))
+    except ReaderError as error:
+        raise _malformed(str(error)) from error
+    except ValueError as error:
+        raise _malformed("its reader said nothing that makes sense") from error
     finally:
         _free.release()
     if "refused" in answer:
@@ -76,29 +77,3 @@ def _check(body: bytes) -> None:
             raise _malformed(f"lists or tags in each other: at most {MAX_DEPTH} are taken")
     if max(len(found.group()) for found in _INDENT.finditer(body)) > MAX_INDENT:
         raise _malformed(f"indent: at most {MAX_INDENT} columns are taken")
-
-
-def _ask_reader(body: bytes, timeout_s: float) -> dict[str, Any]:
-    # Of this process's environment, which may hold secrets, the reader gets nothing but the way to
-    # the modules.
-    environment = {"PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", _READER],
-            input=body,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-            timeout=timeout_s,
-            check=True,
-        )
-        answer = json.loads(done.stdout)
-    except subprocess.TimeoutExpired as error:
-        raise _malformed(f"it was not read within {timeout_s:g} s") from error
-    except subprocess.CalledProcessError as error:
-        status = error.returncode
-        raise _malformed(f"its reader ended over it with status {status}") from error
-    except ValueError as error:
-        raise _malformed("its reader said nothing that makes sense") from error
-    assert isinstance(answer, dict)
-    return answer

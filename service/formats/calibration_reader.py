@@ -1,22 +1,19 @@
 """Reads one OpenCV file from stdin and writes what it says to stdout, as JSON.
 
-A process of its own, with little to lose and nothing to reach: `python -m
-service.formats.calibration_reader`. By the time that it sees the file it can open no other file
-and no connection, and it is ended when it wants too much memory or time.
+A process of its own, see `confined`: `python -m service.formats.calibration_reader CPU_S`.
 """
 
 import json
 import math
-import resource
 import sys
 from typing import Any
 
 import cv2
 import numpy as np
 
+from service.formats.confined import give_up_rights
+
 MAX_INPUT_BYTES = 2 * 1024 * 1024
-MAX_MEMORY_BYTES = 1024 * 1024 * 1024  # above what the libraries have mapped already
-MAX_CPU_S = 5
 # What tutorials, calib3d's samples and ROS call things.
 _NAMES = {
     "matrix": ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "intrinsics", "M"),
@@ -38,27 +35,12 @@ class _RefusedError(Exception):
 def main() -> None:
     """Answer for the file on stdin: its numbers, or `{"refused": why}`."""
     body = sys.stdin.buffer.read(MAX_INPUT_BYTES)
-    _give_up_rights()
+    give_up_rights(int(sys.argv[1]))
     try:
         answer: dict[str, Any] = _read_file(body)
     except _RefusedError as error:
         answer = {"refused": str(error)}
     sys.stdout.write(json.dumps(answer))
-
-
-def _give_up_rights() -> None:
-    """Cap what this process may still take. Once done, it cannot be undone."""
-    with open("/proc/self/statm") as counts:
-        mapped = int(counts.read().split()[0]) * resource.getpagesize()
-    _cap(resource.RLIMIT_AS, mapped + MAX_MEMORY_BYTES)
-    _cap(resource.RLIMIT_CPU, MAX_CPU_S)
-    _cap(resource.RLIMIT_CORE, 0)
-    _cap(resource.RLIMIT_FSIZE, 0)  # of files: pipes are none
-    _cap(resource.RLIMIT_NOFILE, 0)  # no file and no socket more
-
-
-def _cap(what: int, most: int) -> None:
-    resource.setrlimit(what, (most, most))
 
 
 def _read_file(body: bytes) -> dict[str, Any]:

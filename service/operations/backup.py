@@ -27,6 +27,7 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
+from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import require_openable, sealer_of
 from service.settings import Settings
 from service.store.engines import files
@@ -78,6 +79,18 @@ def read_manifest(data: bytes) -> Manifest:
         return Manifest(**fields, members=members)
     except (ValueError, KeyError, TypeError) as error:
         raise StartError(f"backup: its manifest cannot be read ({error!r})") from error
+
+
+def require_plain(database: Path, what: str) -> None:
+    """Check that a database has nothing that would run by itself, but what we have put there.
+
+    Raises:
+        StartError: it has.
+    """
+    if found := files.programs(database):
+        raise StartError(
+            f"{what} has a {found[0]} that is none of surefoot's; see where it is from"
+        )
 
 
 def release() -> str:
@@ -166,6 +179,8 @@ def _gather(settings: Settings, scratch: Path, on_progress: Progress) -> list[st
             f"backup: {settings.database_path} is damaged ({found[0]}); put an earlier backup in "
             "its place by `surefoot restore`"
         )
+    require_plain(database, f"backup: {settings.database_path}")
+    files.empty(database, ENGINE_TABLES)  # what was queued is queued anew
     files.drop_log(database)
     on_progress("checking the database", 1, 1)
     return missing

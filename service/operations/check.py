@@ -18,7 +18,7 @@ from service.data_dir import (
     running_in,
     strangers_in,
 )
-from service.job_queue import ENGINE_TABLES
+from service.job_queue import ENGINE_TABLES, JOBS_FORM
 from service.notifications.keys import require_openable, sealer_of
 from service.operations.backup import hash_file
 from service.operations.restore import READY
@@ -101,8 +101,14 @@ def _database(path: Path) -> Iterator[Finding]:
         yield _noted("schema", old, newest)
     except StartError as error:
         yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
+    yield _finding("programs", files.programs(path), "no trigger or view but ours", "not ours: ")
     missing = sorted(set(ENGINE_TABLES) - files.tables(path))
-    yield _finding("job engine", missing, "its tables are there", "missing: ")
+    if missing:
+        yield _finding("job engine", missing, "", "missing: ")
+    else:
+        pickled = files.jobs_but(path, JOBS_FORM)
+        said = f"{pickled} jobs as pickles, which nobody reads; the next start deletes them"
+        yield _noted("job engine", said if pickled else "", "its tables are there")
 
 
 def _weights(settings: Settings) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """A backup put into a data directory: verified first, then in place whole or not at all."""
 
 import os
+import re
 import shutil
 import tarfile
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
+from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import read_key_file, require_openable, sealer_of
 from service.operations.backup import (
     MANIFEST,
@@ -30,6 +32,7 @@ from service.operations.backup import (
     hash_file,
     hash_stream,
     read_manifest,
+    require_plain,
 )
 from service.settings import Settings
 from service.store.engines import files
@@ -37,6 +40,7 @@ from service.store.engines.failures import telling_of_database
 from service.store.engines.revisions import require_known
 
 _LARGEST_MANIFEST = 64 * 2**20
+_WEIGHTS = re.compile(r"[0-9a-f]{64}\.safetensors")
 READY = "restored"
 _PARTS = (KEY_FILE, WEIGHTS, DATABASE)
 _REPLACED = (DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm", KEY_FILE, f"{KEY_FILE}.new", WEIGHTS)
@@ -130,7 +134,7 @@ def _unpack(archive: Path, folder: Path, on_progress: Progress) -> Manifest:
 
 def _write(folder: Path, member: Member, content: object, archive: Path) -> None:
     kind, _, name = member.name.rpartition("/")
-    safe = member.name in (DATABASE, KEY_FILE) or (kind == WEIGHTS and name.strip("."))
+    safe = member.name in (DATABASE, KEY_FILE) or (kind == WEIGHTS and _WEIGHTS.fullmatch(name))
     if not safe:
         raise StartError(f"restore: {archive}: a member {member.name!r} has no place")
     path = folder / member.name
@@ -146,12 +150,18 @@ def _write(folder: Path, member: Member, content: object, archive: Path) -> None
 
 
 def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Progress) -> None:
-    """The database is sound, its weights are there, and a key opens its secrets."""
+    """The database is sound, its weights are there, and a key opens its secrets.
+
+    Nothing of it is run: its jobs are deleted, and queued anew from what the store says.
+    """
     database = folder / DATABASE
     on_progress("checking", 0, 1)
     if not database.exists() or files.faults(database):
         raise StartError("restore: the database of the backup is damaged; take another backup")
     require_known(files.revision(database), "the backup")
+    require_plain(database, "restore: the backup's database")
+    files.empty(database, ENGINE_TABLES)
+    files.drop_log(database)
     for digest in set(files.weights_of_models(database).values()) - set(manifest.missing_weights):
         path = weights_path(folder / WEIGHTS, digest)
         if not path.exists() or hash_file(path).sha256 != digest:

@@ -208,6 +208,7 @@ def _spec(form: Form) -> TokenSpec:
         MalformedError: the days are no number.
     """
     cameras = tuple(form.one("cameras").replace(",", " ").split())
+    sources = tuple(name.strip() for name in form.one("sources").split(",") if name.strip())
     days = form.one("days")
     expires_at = None
     if days:
@@ -219,5 +220,6 @@ def _spec(form: Form) -> TokenSpec:
         name=form.one("name"),
         scopes=tuple(form.get("scopes", [])),
         cameras=cameras or None,
+        sources=sources or None,
         expires_at=expires_at,
     )

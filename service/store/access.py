@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import JSON, ForeignKey, Index, String, delete, or_, select, update
+from sqlalchemy import JSON, ColumnElement, ForeignKey, Index, String, delete, or_, select, update
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.record import Record, count_where
@@ -20,6 +20,7 @@ class TokenRecord(Record):
     secret_sha256: Mapped[str] = mapped_column(String(64))
     scopes: Mapped[list[str]]
     cameras: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))  # None: all
+    sources: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))  # None: all
     created_at: Mapped[datetime]
     created_by: Mapped[str | None]
     expires_at: Mapped[datetime | None]
@@ -46,10 +47,20 @@ def every(session: Session) -> Sequence[TokenRecord]:
     return session.scalars(query).all()
 
 
+def valid(session: Session, now: datetime) -> Sequence[TokenRecord]:
+    """The tokens that are valid, oldest first."""
+    query = select(TokenRecord).where(*_valid(now))
+    return session.scalars(query.order_by(TokenRecord.created_at, TokenRecord.id)).all()
+
+
 def count_valid(session: Session, now: datetime) -> int:
     """The number of tokens that are valid."""
+    return count_where(session, *_valid(now))
+
+
+def _valid(now: datetime) -> tuple[ColumnElement[bool], ...]:
     fresh = or_(TokenRecord.expires_at.is_(None), TokenRecord.expires_at > now)
-    return count_where(session, TokenRecord.revoked_at.is_(None), fresh)
+    return TokenRecord.revoked_at.is_(None), fresh
 
 
 def note_use(session: Session, token_id: str, now: datetime) -> None:

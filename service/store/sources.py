@@ -3,7 +3,18 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from sqlalchemy import Connection, ForeignKey, String, bindparam, delete, func, select, update
+from sqlalchemy import (
+    Connection,
+    ForeignKey,
+    Integer,
+    String,
+    bindparam,
+    delete,
+    func,
+    or_,
+    select,
+    update,
+)
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.engines.sqlite import Prepared
@@ -14,7 +25,8 @@ from service.store.tracks import Spans, TrackRecord, outside
 class SourceRecord(Record):
     """A name that tracks of a camera came under. Which one counts is the reference's to say.
 
-    `tracks` is how many have been stored, `told_at` when an alert told of it as new.
+    `tracks` is how many have been stored, `told_at` when an alert told of it as new, `token_id` the
+    token whose name it is; None where access was off.
     """
 
     __tablename__ = "track_sources"
@@ -27,12 +39,26 @@ class SourceRecord(Record):
     first_seen_at: Mapped[datetime]
     last_seen_at: Mapped[datetime]
     told_at: Mapped[datetime | None]
+    token_id: Mapped[str | None] = mapped_column(String(16))
 
 
+_TOKEN = bindparam("token", type_=String)
 _SEEN = Prepared(
     update(SourceRecord.__table__)  # type: ignore[arg-type]
-    .where(SourceRecord.camera_id == bindparam("camera"), SourceRecord.name == bindparam("posted"))
-    .values(tracks=SourceRecord.tracks + bindparam("stored"), last_seen_at=bindparam("now"))
+    .where(
+        SourceRecord.camera_id == bindparam("camera"),
+        SourceRecord.name == bindparam("posted"),
+        or_(
+            SourceRecord.token_id.is_(None),
+            SourceRecord.token_id == _TOKEN,
+            bindparam("shared", type_=Integer) == 1,
+        ),
+    )
+    .values(
+        tracks=SourceRecord.tracks + bindparam("stored"),
+        last_seen_at=bindparam("now"),
+        token_id=func.coalesce(_TOKEN, SourceRecord.token_id),
+    )
 )
 
 # Built once: each reconcile of a camera asks for it.
@@ -44,11 +70,18 @@ _OF_CAMERA = (
 
 
 def note_seen(
-    connection: Connection, camera_id: str, name: str, stored: int, now: datetime
+    connection: Connection,
+    camera_id: str,
+    name: str,
+    stored: int,
+    now: datetime,
+    token_id: str | None,
+    *,
+    shared: bool,
 ) -> bool:
-    """Count what a source has posted; whether it is known."""
+    """Count what a source has posted, if it is known, and the token's or `shared` with it."""
     said = {"camera": camera_id, "posted": name, "stored": stored, "now": now}
-    return bool(_SEEN.change(connection, said))
+    return bool(_SEEN.change(connection, said | {"token": token_id, "shared": int(shared)}))
 
 
 def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:

@@ -1,8 +1,11 @@
 """The codec of stored models: what is packed comes back to the bit, and nothing else is read."""
 
 import gzip
+import io
 import json
 import math
+import os
+import pickle
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +92,36 @@ def test_bytes_are_a_safetensors_file_under_gzip():
 def test_what_is_damaged_is_named_so(wrong):
     with pytest.raises(CheckpointError, match="^site: not readable"):
         from_bytes(FORM, wrong)
+
+
+class Touch:
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.system, (f"touch {self.path}",)
+
+
+def test_nothing_that_is_stored_is_run(tmp_path):
+    """A pickle, numpy's file with one in it, and one among the values: none is read as such."""
+    touch = Touch(tmp_path / "pwned")
+    with_objects = io.BytesIO()
+    np.save(with_objects, np.array([touch], dtype=object), allow_pickle=True)
+    for code in (pickle.dumps(touch), with_objects.getvalue()):
+        for data in (code, gzip.compress(code)):
+            with pytest.raises(CheckpointError, match="not readable"):
+                from_bytes(FORM, data)
+    told = pickle.dumps(touch, protocol=0).decode()
+    assert from_bytes(FORM, to_bytes(FORM, {"doubt": told}))["doubt"] == told
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_what_grows_beyond_its_limit_is_not_unpacked(monkeypatch):
+    monkeypatch.setattr("models.serialization._MOST_BYTES", 2**20)
+    bomb = gzip.compress(bytes(2**26))
+    assert len(bomb) < 2**17
+    with pytest.raises(CheckpointError, match="over 1048576 bytes when unpacked"):
+        from_bytes(FORM, bomb)
 
 
 @pytest.mark.parametrize("other", [Format(name="site", version=2), Format(name="flow", version=3)])

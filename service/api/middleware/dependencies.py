@@ -28,7 +28,8 @@ from service.store.engines.store import Store
 class AppState:
     """State of one application from start to stop.
 
-    Event streams follow the `feed`; large bodies are read in `large_bodies`' turns.
+    Event streams follow the `feed`; large bodies are read in `large_bodies`' turns, still images in
+    `stills`', for each takes a process of its own.
     """
 
     settings: Settings
@@ -40,6 +41,7 @@ class AppState:
     watched: Watched = field(default_factory=Watched)
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
+    stills: Turns = field(default_factory=lambda: Turns("still images"))
     stopping: threading.Event = field(default_factory=threading.Event)
 
 

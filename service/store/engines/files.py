@@ -1,6 +1,7 @@
 """The database as a file: copies of it, what is wrong in it, and its size."""
 
 import contextlib
+import re
 import sqlite3
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +15,11 @@ from service.data_dir import make_file
 _PAGES_AT_ONCE = 2048
 _BUSY_MS = 30_000
 _STEPS_A_LOOK = 10_000  # of SQLite, between two looks at the clock
+# Triggers of ours do nothing but refuse what would change the log.
+_REFUSAL = re.compile(
+    r"CREATE TRIGGER \"?\w+\"? BEFORE (UPDATE|DELETE) ON \"?activity\"?"
+    r"( WHEN OLD\.at > strftime\([^()]*\))? BEGIN SELECT RAISE\(ABORT, '[^']*'\); END"
+)
 Progress = Callable[[int, int], None]  # done, total
 
 
@@ -101,6 +107,34 @@ def tables(path: Path) -> set[str]:
     with connected(path) as connection:
         rows = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         return {str(row[0]) for row in rows}
+
+
+def programs(path: Path) -> list[str]:
+    """Triggers, views and virtual tables that are none of ours: SQL that runs in our name."""
+    with connected(path) as connection:
+        rows = connection.execute(
+            "SELECT type, name, sql FROM sqlite_master "
+            "WHERE type IN ('trigger', 'view') OR sql LIKE 'CREATE VIRTUAL%'"
+        ).fetchall()
+    return [f"{kind} {name}" for kind, name, sql in rows if not _REFUSAL.fullmatch(sql or "")]
+
+
+def empty(path: Path, names: Sequence[str]) -> None:
+    """Delete all rows of tables, where there are such."""
+    with connected(path) as connection:
+        connection.execute("BEGIN IMMEDIATE")
+        for name in sorted(tables(path).intersection(names)):
+            connection.execute(f"DELETE FROM {name}")
+        connection.execute("COMMIT")
+
+
+def jobs_but(path: Path, form: str) -> int:
+    """The number of the engine's jobs that are not written in a form."""
+    if "workflow_status" not in tables(path):
+        return 0
+    with connected(path) as connection:
+        query = "SELECT count(*) FROM workflow_status WHERE serialization <> ?"
+        return int(connection.execute(query, (form,)).fetchone()[0])
 
 
 def weights_of_models(path: Path) -> dict[str, str]:

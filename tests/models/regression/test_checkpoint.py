@@ -1,11 +1,19 @@
+import hashlib
 import json
+import os
+import pickle
 from dataclasses import asdict, replace
 
 import pytest
 import torch
 
 from models.errors import CheckpointError
-from models.regression.checkpoint import load_weights, save_weights, weights_path
+from models.regression.checkpoint import (
+    load_weights,
+    save_weights,
+    starting_network,
+    weights_path,
+)
 from models.regression.network import network_for
 from models.regression.recipe import DEFAULT, PAPER, TrainingPlan, plan_from_config, plan_to_config
 from models.simulation.walkers import WalkConfig
@@ -37,6 +45,34 @@ def test_missing_damaged_or_foreign_weights_are_refused(plan, tmp_path):
         load_weights(tmp_path, digest, plan.recipe)
     with pytest.raises(CheckpointError, match="No such file"):
         load_weights(tmp_path, "0" * 64, plan.recipe)
+
+
+class Touch:
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.system, (f"touch {self.path}",)
+
+
+def test_weights_with_code_in_them_are_refused_unread(plan, tmp_path):
+    """A file of torch's own is a pickle, whatever its name and hash say."""
+    for name, kept in (("torch", torch.save), ("pickle", pickle.dump)):
+        path = tmp_path / name
+        with path.open("wb") as file:
+            kept({"weight": Touch(tmp_path / "pwned")}, file)
+        data = path.read_bytes()
+        digest = hashlib.sha256(data).hexdigest()
+        weights_path(tmp_path, digest).write_bytes(data)
+        with pytest.raises(CheckpointError, match="not of recipe default"):
+            load_weights(tmp_path, digest, plan.recipe)
+        with pytest.raises(CheckpointError, match="not readable"):
+            starting_network(plan.recipe, path)
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_no_name_of_weights_leads_out_of_their_folder(tmp_path):
+    assert weights_path(tmp_path, "../../home/ab").parent == tmp_path
 
 
 def test_a_plan_survives_json(plan):

@@ -7,6 +7,8 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from service.app import create_app
+from service.formats import confined
+from service.formats.still import read_still
 from service.store.cameras import SnapshotRecord
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
@@ -24,7 +26,9 @@ def image(width=1280, height=720, form="JPEG", mode="RGB", **how):
 
 @pytest.fixture
 def allowed(settings):
-    with TestClient(create_app(settings.model_copy(update={"snapshots": True}))) as client:
+    with TestClient(
+        create_app(settings.model_copy(update={"snapshots": True, "http_wait_s": 1}))
+    ) as client:
         assert client.post("/cameras", json=CAMERA).status_code == 201
         yield client
 
@@ -78,6 +82,51 @@ def test_a_png_with_holes_becomes_a_jpeg_and_takes_the_place_of_the_one_before(a
 def test_what_is_no_picture_of_the_camera_is_refused(allowed, content, headers, status, code):
     problem(allowed.put(URL, content=content, headers=headers), status, code)
     problem(allowed.get(URL), 404, "not_found")
+
+
+def scans(width, height, count):
+    """A progressive JPEG whose last scan comes again and again: small, and dear to read."""
+    data = image(width, height, mode="L", progressive=True)
+    last = data.rindex(b"\xff\xda")
+    return data[:-2] + data[last:-2] * count + data[-2:]
+
+
+def test_thousands_of_scans_cost_a_reader_its_limit_and_hold_up_nobody(allowed, monkeypatch):
+    """12,000 of them, 1 MB of 49 million pixels, held all large bodies for a minute and a half."""
+    monkeypatch.setattr(confined, "MAX_CPU_S", 1)
+    assert read_still(scans(64, 36, 12_000), "image/jpeg").width == 64
+    document = problem(
+        allowed.put(URL, content=scans(2560, 1440, 12_000), headers=JPEG), 422, "malformed"
+    )
+    assert document["detail"] == "body: reading it takes more than 1 s of a CPU"
+    problem(allowed.get(URL), 404, "not_found")
+    assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200
+
+
+def test_a_picture_takes_no_turn_of_large_bodies(allowed):
+    with allowed.app_state["app"].large_bodies.turn(0):
+        assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200
+    with allowed.app_state["app"].stills.turn(0):
+        document = problem(allowed.put(URL, content=image(), headers=JPEG), 503, "overloaded")
+    assert "still images" in document["detail"]
+
+
+def test_a_picture_of_every_kind_is_read_without_another_file(allowed):
+    """What the library imports only for some is imported before the reader gives up its rights."""
+    turned = Image.Exif()
+    turned[0x0112] = 6
+    kinds = [
+        (image(720, 1280, exif=turned), JPEG),
+        (image(mode="L", progressive=True), JPEG),
+        (image(mode="CMYK"), JPEG),
+        (image(form="PNG", mode="P"), PNG),
+        (image(form="PNG", mode="I;16"), PNG),
+        (image(720, 1280, form="PNG", exif=turned), PNG),
+    ]
+    for content, headers in kinds:
+        assert allowed.put(URL, content=content, headers=headers).status_code == 200
+        kept = Image.open(BytesIO(allowed.get(URL).content))
+        assert (kept.format, kept.mode, kept.size) == ("JPEG", "RGB", (1280, 720))
 
 
 def test_a_picture_goes_when_it_is_deleted_and_with_its_camera(allowed, settings):

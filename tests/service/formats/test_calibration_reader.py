@@ -28,7 +28,7 @@ NESTED = {
 
 def read_by_itself(body: bytes) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(
-        [sys.executable, "-m", "service.formats.calibration_reader"],
+        [sys.executable, "-m", "service.formats.calibration_reader", "5"],
         input=body,
         check=False,
         capture_output=True,
@@ -83,8 +83,8 @@ def test_only_so_many_are_read_at_once(http):
 def test_the_reader_opens_no_file_and_no_connection_and_its_memory_ends():
     program = """
 import socket
-from service.formats import calibration_reader as reader
-reader._give_up_rights()
+from service.formats import confined as reader
+reader.give_up_rights()
 for what in (lambda: open("/etc/hostname"), lambda: open("/tmp/x", "w"), socket.socket):
     try:
         what()

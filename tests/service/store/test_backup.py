@@ -20,17 +20,21 @@ import pytest
 
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone
+from service.job_queue import ENGINE_TABLES
 from service.notifications.keys import secret_of
 from service.operations.backup import write_backup
 from service.operations.check import check_data_dir
 from service.operations.restore import finish_restore, restore_backup
+from service.store.engines import files
 from service.store.engines.revisions import known_revisions
 from service.store.engines.store import Store
+from service.store.record import Record
 from service.store.webhooks import WebhookRecord
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
 from tests.service.commands import forked
 from tests.service.notifications.test_sealing import hook
+from tests.service.workers.test_pickles import planted
 from tests.test_migrations import put
 
 
@@ -186,6 +190,83 @@ def test_a_damaged_archive_changes_nothing(settings, tmp_path, name, change, tol
         restore_backup(settings, cut, quiet, force=True)
     with pytest.raises(StartError, match="is not there"):
         restore_backup(settings, tmp_path / "none.tar", quiet, force=True)
+
+
+def doctored(archive, *statements):
+    """A copy of an archive whose database was changed, with a manifest that fits."""
+    database = archive.with_name("doctored.sqlite")
+
+    def change(data):
+        database.write_bytes(data)
+        with sqlite3.connect(database) as connection:
+            for statement in statements:
+                connection.execute(statement)
+        connection.close()
+        return database.read_bytes()
+
+    def describe(data):
+        manifest, changed = json.loads(data), database.read_bytes()
+        digest = hashlib.sha256(changed).hexdigest()
+        manifest["members"][0] |= {"size": len(changed), "sha256": digest}
+        return json.dumps(manifest).encode()
+
+    damaged(archive, "surefoot.sqlite", change).rename(archive.with_name("half.tar"))
+    return damaged(archive.with_name("half.tar"), "manifest.json", describe)
+
+
+def test_no_job_comes_out_of_an_archive(settings, tmp_path):
+    """Neither into one: what a job is about would be read by the next worker."""
+    with sqlite3.connect(settings.database_path) as connection:
+        put(connection, "cameras", id="corner")
+        connection.executescript(";".join(planted(tmp_path / "pwned")))
+    archive = tmp_path / "b.tar"
+    write_backup(settings, archive, quiet)
+    other = doctored(archive, *planted(tmp_path / "pwned"))
+    for number, each in enumerate((archive, other)):
+        fresh = settings.model_copy(update={"data_dir": tmp_path / f"fresh{number}"})
+        restore_backup(fresh, each, quiet, force=False)
+        with sqlite3.connect(fresh.database_path) as connection:
+            counts = [
+                connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
+                for table in ("cameras", *ENGINE_TABLES)
+            ]
+        assert counts == [1] + [0] * len(ENGINE_TABLES)
+        found = {one.what: one.verdict for one in check_data_dir(fresh)}
+        assert found["job engine"] == "ok"
+        assert not files.faults(fresh.database_path)
+    assert not (tmp_path / "pwned").exists()
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "CREATE TRIGGER later AFTER INSERT ON workers BEGIN DELETE FROM access_tokens; END",
+        "CREATE TRIGGER activity_more BEFORE UPDATE ON activity "
+        "BEGIN SELECT RAISE(ABORT, 'no'); DELETE FROM access_tokens; END",
+        "CREATE VIEW later AS SELECT 1",
+        "CREATE VIRTUAL TABLE later USING fts5(words)",
+    ],
+)
+def test_an_archive_with_programs_in_it_is_refused(settings, tmp_path, program):
+    """A trigger would fill the job tables again, or make a token, when the service first writes."""
+    archive = tmp_path / "b.tar"
+    write_backup(settings, archive, quiet)
+    before = settings.database_path.read_bytes()
+    with pytest.raises(StartError, match=r"(trigger|view|table) \w+ that is none of surefoot's"):
+        restore_backup(settings, doctored(archive, program), quiet, force=True)
+    assert settings.database_path.read_bytes() == before
+    with sqlite3.connect(settings.database_path) as connection:
+        connection.execute(program)
+    found = {one.what: one.verdict for one in check_data_dir(settings)}
+    assert found["programs"] == "fault"
+    with pytest.raises(StartError, match="none of surefoot's"):
+        write_backup(settings, tmp_path / "another.tar", quiet)
+
+
+def test_the_engine_has_no_table_that_is_not_emptied(settings):
+    known = {*Record.metadata.tables, *ENGINE_TABLES}
+    others = {"alembic_version", "sqlite_sequence", "dbos_migrations"}
+    assert files.tables(settings.database_path) == known | others
 
 
 class Cut(BaseException):
