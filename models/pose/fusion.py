@@ -197,7 +197,9 @@ def _estimate_of(
     best, sd = modes[0], np.sqrt(np.diag(covariance))
     others = list(zip(modes[1:], odds[1:], strict=True))
     rivals = tuple(
-        Rival(values=mode.candidate, odds=float(own)) for mode, own in others if own > config.RIVAL
+        Rival(values=mode.candidate, weight=float(own / odds.sum()))
+        for mode, own in others
+        if own > config.RIVAL
     )
     near = [mode.candidate for mode, own in others if own > config.NO_RIVAL]
     # What speeds leave open, places alone do not determine: crowds that all cross the picture fit

@@ -47,10 +47,10 @@ class PathNeighbourhood:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rival:
-    """Another pose (4,) that explains the tracks, with its odds against the best."""
+    """Another pose (4,) that explains the tracks: its weight, among all that do."""
 
     values: Array
-    odds: float
+    weight: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

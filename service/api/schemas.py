@@ -174,13 +174,13 @@ class PriorPoseBody(Body):
 
 
 class RivalOut(BaseModel):
-    """Another pose that explains the tracks, with its odds against the served one."""
+    """Another pose that explains the tracks: its weight among all that do."""
 
     height_m: float
     tilt_deg: float
     roll_deg: float
     heading_deg: float
-    odds: float
+    weight: float
 
 
 class SinceOut(BaseModel):

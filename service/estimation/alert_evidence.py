@@ -44,9 +44,9 @@ def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
 
 
 def rivals_of(finding: Finding) -> list[dict[str, Any]]:
-    """Other poses that explain the tracks, with their odds against the served one."""
+    """Other poses that explain the tracks, each with its weight among all that do."""
     return [
-        {**asdict(PoseParameters.of_array(rival.values)), "odds": rival.odds}
+        {**asdict(PoseParameters.of_array(rival.values)), "weight": rival.weight}
         for rival in finding.fused.rivals
     ]
 

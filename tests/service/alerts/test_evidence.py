@@ -91,10 +91,10 @@ def test_a_camera_that_learns_would_notice_nothing_yet(bench):
     assert pose["rivals"] == []
 
 
-def test_other_poses_that_explain_the_tracks_are_served_with_their_odds(bench):
+def test_other_poses_that_explain_the_tracks_are_served_with_their_weights(bench):
     other = array_of(PRIOR) + np.radians([0, 0, 0, 60])
-    see_with(bench, moved(), rivals=(Rival(values=other, odds=0.3),))
+    see_with(bench, moved(), rivals=(Rival(values=other, weight=0.3),))
     (rival,) = bench.pose()["rivals"]
-    assert rival["odds"] == 0.3
+    assert rival["weight"] == 0.3
     assert rival["heading_deg"] == pytest.approx(np.degrees(PRIOR.heading_rad) + 60)
     assert rival["height_m"] == pytest.approx(PRIOR.height_m)
