@@ -32,6 +32,7 @@ OTHERS = {
     ("operations/check.py", "ok"): "a verdict, defined there",
     ("formats/batch.py", "source"): "the name of a field",
     ("formats/batch.py", "tracks"): "the name of a field",
+    ("formats/json_body.py", "source"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
     ("workers/processes/workers.py", "estimate"): "what a worker may be for alone, defined there",

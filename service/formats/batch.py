@@ -1,13 +1,14 @@
 """Requests that carry tracks as JSON and NDJSON, and what all forms have in common."""
 
 import json
+import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from functools import partial
 from typing import Any
 
 from service.errors import FieldError, MalformedError, TooLargeError
-from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack, TrackTexts, read_document
+from service.formats.json_body import TrackTexts, read_document, read_track_text
 from service.formats.json_track import read_track
 from service.formats.track import (
     MAX_ID_LENGTH,
@@ -25,6 +26,31 @@ from service.formats.track import (
 
 DEFAULT_SOURCE = "unnamed"
 _FAR_S = 1e12
+MAX_CPU_S = 10.0  # of reading one body: the largest honest ones take one or two
+_LARGE_LINE = 64 * 1024  # bytes
+_MOST_ENDS = 4 * MAX_TRACKS  # of lines, blank ones among them
+
+
+class CpuBudget:
+    """The CPU that one body may take to be read, from now on and in this thread.
+
+    Counts are bounded before anything is read: this ends what nobody thought of.
+    """
+
+    def __init__(self) -> None:
+        self._end_s = time.thread_time() + MAX_CPU_S
+
+    def check(self) -> None:
+        """Go on, if there is some left.
+
+        Raises:
+            TooLargeError: there is none.
+        """
+        if time.thread_time() > self._end_s:
+            raise TooLargeError(
+                f"body: at most {MAX_CPU_S:g} s of CPU are spent on reading one, got more; "
+                "post a part of the tracks at once"
+            )
 
 
 def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
@@ -70,14 +96,17 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
     Raises:
         TooLargeError: too many lines.
     """
+    ends = body.count(b"\n")
+    if ends > _MOST_ENDS:
+        raise TooLargeError(f"lines: at most {_MOST_ENDS} ends of one are taken, got {ends}")
     lines = [line for line in body.split(b"\n") if line.strip()]
     check_count(len(lines))
 
     def items() -> Iterator[tuple[int, Any, Callable[[], IncomingTrack]]]:
         for index, line in enumerate(lines):
             try:
-                large = len(line) > MAX_TRACK_CHARS
-                raw = OversizedTrack(characters=len(line)) if large else json.loads(line)
+                large = len(line) > _LARGE_LINE
+                raw = read_track_text(line) if large else json.loads(line)
             except (ValueError, RecursionError) as error:
                 yield index, None, partial(refuse, f"not JSON: {error}")
             else:
@@ -134,15 +163,21 @@ def read_time(value: Any) -> float:
 def collect(
     items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int = 0
 ) -> Batch:
-    """The batch of tracks, each given with its index, what it was and how to read it."""
+    """The batch of tracks, each given with its index, what it was and how to read it.
+
+    Raises:
+        TooLargeError: reading them takes too long.
+    """
     tracks, rejections = [], []
+    budget = CpuBudget()
     for index, raw, read in items:
+        budget.check()
         try:
             tracks.append(read())
         except NoPersonError:
             left_out += 1
         except TrackRejectedError as refused:
-            name = raw.get("id") if isinstance(raw, dict) else None
+            name = raw.get("id") if isinstance(raw, dict) else getattr(raw, "id", None)
             known = isinstance(name, str | int) and not isinstance(name, bool)
             text = str(name)[:MAX_ID_LENGTH].encode(errors="replace").decode()
             rejections.append(
@@ -163,7 +198,9 @@ def check_count(count: int) -> None:
         TooLargeError: there are more.
     """
     if count > MAX_TRACKS:
-        raise TooLargeError(f"tracks: at most {MAX_TRACKS} a request are taken, got {count}")
+        raise TooLargeError(
+            f"tracks: at most {MAX_TRACKS} a request are taken, got {count} or more"
+        )
 
 
 def malformed(reason: str) -> MalformedError:

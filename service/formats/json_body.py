@@ -1,138 +1,179 @@
-"""Large JSON bodies, track by track: one call for all of it would stop every other thread."""
+"""Large JSON bodies: only what is looked for is built, however much else there is.
+
+`json.loads` builds up to 80 bytes for one of a body, and stops every other thread meanwhile.
+"""
 
 import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
-from service.errors import TooLargeError
+import msgspec
+from msgspec import UNSET, Raw, UnsetType
+
+from service.errors import MalformedError, TooLargeError
+from service.formats.track import MAX_TRACKS
 
 _SMALL = 1024 * 1024  # bytes that are read in one go, in some ten milliseconds
-_MOST_OTHER = 1024 * 1024  # characters of what is no track
-MAX_TRACK_CHARS = 2 * 1024 * 1024  # more than the most points of a track need
-_SPACE = re.compile(r"[ \t\n\r]*")
-_STRUCTURE = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
-_PLAIN = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s,\[\]{}"]+', re.DOTALL)
-_ENDS = {"{": 1, "[": 1, "}": -1, "]": -1}
+_MOST_OTHER = 4096  # bytes of a field that is not the tracks
+MAX_TRACK_BYTES = 2 * 1024 * 1024  # more than the most points of a track need
+# JSON has neither, but Python's writers do: a track with one is refused, and no other. While such a
+# body is taken apart, a number that no float holds stands for it.
+_STAND_INS = ((b"NaN", b"9e991"), (b"Infinity", b"9e992"))
+_ABSENT = Raw(b"")
+_raw = partial(msgspec.field, default=_ABSENT)
+# An array that is read into a struct is skipped from where the struct ends; that of a list is not.
+_Tracks = msgspec.defstruct(
+    "_Tracks", [(f"at_{n}", Raw, _ABSENT) for n in range(MAX_TRACKS + 1)], array_like=True
+)
+_Rows = list[tuple[float, ...]] | UnsetType
+_Kind = TypeVar("_Kind")
+_PLACE = re.compile(r" - at `\$\.?(.*)`$")
+
+
+class _Document(msgspec.Struct):
+    """A body as it is taken apart: the text of each field."""
+
+    tracks: _Tracks | None = None  # type: ignore[valid-type]
+    source: Raw = _raw()
+    frame_rate_hz: Raw = _raw()
+    started_at: Raw = _raw()
+
+
+class _Named(msgspec.Struct):
+    id: str | int | None = None
+
+
+class _Track(_Named, gc=False):
+    kind: str | float | bool | None = msgspec.field(name="class", default=None)
+    points: _Rows = UNSET
+    boxes: _Rows = UNSET
+    frames: _Rows = UNSET
+    frame_boxes: _Rows = UNSET
+
+
+_FORMS = ("points", "boxes", "frames", "frame_boxes")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OversizedTrack:
-    """Stands for a track that is too long to be read."""
+class UnreadableTrack:
+    """Stands for a track that is no such thing, or too long to be read."""
 
-    characters: int
+    id: str | int | None
+    code: str
+    detail: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackTexts:
-    """The tracks of a body, each read when its turn comes."""
+    """The tracks of a body, each read when its turn comes; one more than may be, of too many."""
 
-    text: str
-    spans: tuple[tuple[int, int], ...]
+    texts: tuple[Raw, ...]
+    stand_ins: bool
 
     def __len__(self) -> int:
-        return len(self.spans)
+        return len(self.texts)
 
     def __iter__(self) -> Iterator[Any]:
-        for begin, end in self.spans:
-            if end - begin > MAX_TRACK_CHARS:
-                yield OversizedTrack(characters=end - begin)
-            else:
-                yield json.loads(self.text[begin:end])
+        return (read_track_text(text, stand_ins=self.stand_ins) for text in self.texts)
 
 
 def read_document(body: bytes) -> Any:
-    """The JSON value of a body; of a large object, `tracks` are a `TrackTexts`.
+    """The JSON value of a body; of a large object its known fields, `tracks` as a `TrackTexts`.
 
     Raises:
         ValueError: it is no JSON. Of `TrackTexts` each track may raise it, too.
         RecursionError: it is nested too deeply.
         TooLargeError: something other than tracks is large.
+        MalformedError: a large body that is no object, or has no list of tracks.
     """
     if len(body) <= _SMALL:
         return json.loads(body)
-    text = body.decode(json.detect_encoding(body))
+    encoding = json.detect_encoding(body)
+    if encoding != "utf-8":
+        body = body.decode(encoding).encode()
+    try:
+        return _document(body, stand_ins=False)
+    except ValueError:
+        if any(number in body for _, number in _STAND_INS):
+            raise
+        replaced = body
+        for word, number in _STAND_INS:
+            replaced = replaced.replace(word, number)
+        if replaced == body:
+            raise
+    return _document(replaced, stand_ins=True)
+
+
+def read_track_text(text: bytes | Raw, *, stand_ins: bool = False) -> Any:
+    """The value of a track in a large body, or what stands for one that cannot be read.
+
+    Raises:
+        ValueError: it is no JSON.
+        RecursionError: it is nested too deeply.
+    """
+    name = None
+    try:
+        name = _decode(text, _Named).id
+        if isinstance(name, str) and stand_ins:
+            name = _with_words(name.encode()).decode()
+        size = len(memoryview(text))
+        if size > MAX_TRACK_BYTES:
+            words = f"a track of at most {MAX_TRACK_BYTES} bytes is taken, got {size}"
+            return UnreadableTrack(id=name, code="too_many_points", detail=words)
+        track = _decode(text, _Track)
+    except msgspec.ValidationError as error:
+        return _unreadable(name, str(error))
+    rows = {form: found for form in _FORMS if (found := getattr(track, form)) is not UNSET}
+    return {"id": name, "class": track.kind, **rows}
+
+
+def _decode(text: bytes | Raw, kind: type[_Kind]) -> _Kind:
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except msgspec.ValidationError:
+        raise
+    except msgspec.DecodeError as error:
+        raise ValueError(str(error)) from error
+
+
+def _unreadable(name: str | int | None, words: str) -> UnreadableTrack:
+    """What stands for a track of which msgspec says: "Expected `x`, got `y` - at `$.place[0]`"."""
+    found = _PLACE.search(words)
+    place = re.sub(r"\[(\d+)\]", r"/\1", found[1]) if found else "track"
+    not_finite = "out of range" in words or "`float`, got `null`" in words
+    return UnreadableTrack(
+        id=name,
+        code="not_finite" if not_finite else "malformed",
+        detail=f"{place}: {_PLACE.sub('', words)}",
+    )
+
+
+def _document(body: bytes, *, stand_ins: bool) -> dict[str, Any]:
+    try:
+        found = _decode(body, _Document)
+    except msgspec.ValidationError as error:
+        if "$.tracks" not in str(error):
+            return {}
+        raise MalformedError.of_field("tracks", "a list of tracks is needed") from error
     document: dict[str, Any] = {}
-    at = _symbol(text, 0, "{")
-    while text[at : at + 1] != "}":
-        end = _end(text, at)
-        name = json.loads(text[at:end])
-        if not isinstance(name, str):
-            raise ValueError(f"a name is needed at {at}")
-        at = _symbol(text, end, ":")
-        if name == "tracks" and text[at : at + 1] == "[":
-            spans, at = _spans(text, at)
-            document[name] = TrackTexts(text=text, spans=spans)
-        else:
-            end = _end(text, at)
-            if end - at > _MOST_OTHER:
-                raise TooLargeError(
-                    f"{name:.40}: at most {_MOST_OTHER} characters are taken, got {end - at}"
-                )
-            document[name] = json.loads(text[at:end])
-            at = _space(text, end)
-        at = _next(text, at, "}")
-    if _space(text, at + 1) != len(text):
-        raise ValueError(f"nothing more is needed from {at + 1} on")
+    for name in ("source", "frame_rate_hz", "started_at"):
+        raw = memoryview(getattr(found, name))
+        if len(raw) > _MOST_OTHER:
+            raise TooLargeError(f"{name}: at most {_MOST_OTHER} bytes are taken, got {len(raw)}")
+        if raw:
+            text = bytes(raw)
+            document[name] = json.loads(_with_words(text) if stand_ins else text)
+    if found.tracks is not None:
+        texts = msgspec.structs.astuple(found.tracks)
+        count = next((n for n, text in enumerate(texts) if text is _ABSENT), len(texts))
+        document["tracks"] = TrackTexts(texts=texts[:count], stand_ins=stand_ins)
     return document
 
 
-def _spans(text: str, at: int) -> tuple[tuple[tuple[int, int], ...], int]:
-    """Where the items of the list that begins at a place are, and the place after the list."""
-    spans = []
-    at = _symbol(text, at, "[")
-    while text[at : at + 1] != "]":
-        end = _end(text, at)
-        spans.append((at, end))
-        at = _next(text, _space(text, end), "]")
-    return tuple(spans), _space(text, at + 1)
-
-
-def _end(text: str, at: int) -> int:
-    """The place after the value that begins at a place."""
-    if text[at : at + 1] not in ("{", "["):
-        plain = _PLAIN.match(text, at)
-        if plain is None:
-            raise ValueError(f"a value is needed at {at}")
-        return plain.end()
-    if text[at] == "{":
-        # Most tracks hold no other object, and no text with a brace in it.
-        end = text.find("}", at) + 1
-        if (
-            end
-            and text.count("{", at, end) == 1
-            and text.count('"', at, end) % 2 == 0
-            and text.find("\\", at, end) < 0
-        ):
-            return end
-    depth = 0
-    for found in _STRUCTURE.finditer(text, at):
-        depth += _ENDS.get(found[0], 0)
-        if not depth:
-            return found.end()
-    raise ValueError(f"what begins at {at} has no end")
-
-
-def _space(text: str, at: int) -> int:
-    found = _SPACE.match(text, at)
-    assert found is not None
-    return found.end()
-
-
-def _symbol(text: str, at: int, symbol: str) -> int:
-    """The next place that is not space after a symbol, which must come."""
-    at = _space(text, at)
-    if text[at : at + 1] != symbol:
-        raise ValueError(f"{symbol!r} is needed at {at}")
-    return _space(text, at + 1)
-
-
-def _next(text: str, at: int, end: str) -> int:
-    """The place of the next item, or of the symbol that ends all of them."""
-    if text[at : at + 1] == end:
-        return at
-    at = _symbol(text, at, ",")
-    if text[at : at + 1] == end:
-        raise ValueError(f"a value is needed at {at}")
-    return at
+def _with_words(text: bytes) -> bytes:
+    for word, number in _STAND_INS:
+        text = text.replace(number, word)
+    return text

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.geometry.rotation import Array
-from service.formats.json_body import MAX_TRACK_CHARS, OversizedTrack
+from service.formats.json_body import UnreadableTrack
 from service.formats.track import (
     COCO_PEOPLE,
     FOOT_COLUMNS,
@@ -29,6 +29,7 @@ _NAMES = frozenset(
     ("person", "people", "pedestrian", "human", "walker", "man", "woman", "child", "adult")
 )
 # How many numbers a row has: of a point three, or five with its head.
+_LIST = (list, tuple)  # a row; of large bodies, tuples
 _FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
 
 
@@ -39,11 +40,8 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
         TrackRejectedError: with a code, the field, the limit and the value received.
         NoPersonError: its class is none of a person; null is none at all.
     """
-    if isinstance(raw, OversizedTrack):
-        raise TrackRejectedError(
-            "too_many_points",
-            f"a track of at most {MAX_TRACK_CHARS} characters is taken, got {raw.characters}",
-        )
+    if isinstance(raw, UnreadableTrack):
+        raise TrackRejectedError(raw.code, raw.detail)
     if not isinstance(raw, dict):
         refuse(f"a track is an object, got {type(raw).__name__}")
     _check_person(raw.get("class"))
@@ -94,24 +92,25 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
         return plain
     columns = taken[0]
     for at, row in enumerate(value):
-        if not at and isinstance(row, list) and len(row) in taken:
+        if not at and isinstance(row, _LIST) and len(row) in taken:
             columns = len(row)
-        if not isinstance(row, list) or len(row) != columns:
+        if not isinstance(row, _LIST) or len(row) != columns:
             needed = str(columns) if at else " or ".join(map(str, taken))
-            if isinstance(row, list) and len(row) in taken:
+            if isinstance(row, _LIST) and len(row) in taken:
                 needed += ", as in the first point: all points carry a head or none,"
             refuse(f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}")
-        for number in row:
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                # JSON has no NaN; some writers put null or a word in its place.
-                code = "not_finite" if number is None else "malformed"
-                raise TrackRejectedError(
-                    code, f"{form}/{at}: numbers are needed, got {number!r:.40}"
-                )
-            if isinstance(number, int) and abs(number) > LARGEST or math.isinf(number):
-                raise TrackRejectedError(
-                    "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
-                )
+    for index, number in enumerate(chain.from_iterable(value)):
+        if type(number) is float and -LARGEST < number < LARGEST:
+            continue
+        at = index // columns
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            # JSON has no NaN; some writers put null or a word in its place.
+            code = "not_finite" if number is None else "malformed"
+            raise TrackRejectedError(code, f"{form}/{at}: numbers are needed, got {number!r:.40}")
+        if isinstance(number, int) and abs(number) > LARGEST or math.isinf(number):
+            raise TrackRejectedError(
+                "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
+            )
     return np.array(value, dtype=np.float64).reshape(-1, columns)
 
 
@@ -121,7 +120,7 @@ def plain_rows(value: list[Any], lengths: tuple[int, ...]) -> Array | None:
     All its rows are lists of one of the lengths, of numbers within `LARGEST`. Who says what is
     wrong looks at one number after another.
     """
-    if set(map(type, value)) != {list} or len(found := set(map(len, value))) != 1:
+    if not set(map(type, value)) <= set(_LIST) or len(found := set(map(len, value))) != 1:
         return None
     numbers = list(chain.from_iterable(value))
     if not found <= set(lengths) or not set(map(type, numbers)) <= {int, float}:

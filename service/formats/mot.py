@@ -1,16 +1,20 @@
 """Tracks as MOTChallenge text, and as the trackers write it that took their form from there."""
 
 import re
+from array import array
 from dataclasses import dataclass, field
 from functools import partial
+from io import BytesIO, TextIOWrapper
 
 import numpy as np
 
+from models.geometry.rotation import Array, Index
 from service.errors import MalformedError, TooLargeError
-from service.formats.batch import check_count, collect, malformed
+from service.formats.batch import CpuBudget, check_count, collect, malformed
 from service.formats.track import (
     COCO_PEOPLE,
     MAX_ID_LENGTH,
+    MAX_TRACKS,
     Batch,
     Clock,
     IncomingTrack,
@@ -21,9 +25,15 @@ from service.formats.track import (
 )
 
 MAX_LINES = 500_000  # some seconds of reading
+_CHECKED_EVERY = 1_000  # lines
+MAX_LINE_CHARS = 1_000  # ten numbers need 200
+_MOST_IDS = 4 * MAX_TRACKS  # those of cars among them
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
-_CONF, _CLASS, _VISIBILITY = 6, 7, 8
-_WITH_CLASS = (8, 9)  # lines of ten have a place in the world there
+# Columns of a line's numbers, which have no id among them; a line may end before the last.
+_CONF, _CLASS, _VISIBILITY = 5, 6, 7
+_READ_CELLS = 9  # up to the visibility
+_NONE = (float("nan"),) * (_VISIBILITY + 1)
+_WITH_CLASS = (8, 9)  # cells of lines that have one; lines of ten have a place in the world there
 _NONE_GIVEN = -1.0
 # Of ground truth, which has a visibility in column 9: pedestrians and people who stand.
 _TRUTH_PEOPLE = frozenset((1.0, 7.0))
@@ -32,10 +42,16 @@ _MOST_NAMED = 12  # class numbers in a message
 
 @dataclass(slots=True)
 class _Lines:
-    """Lines of a text: numbers of lines by track, lines that cannot be read by track."""
+    """Lines of a text as they are read: of a line its track, its numbers and how many cells it had.
 
-    rows: dict[str, list[list[float]]] = field(default_factory=dict)
-    broken: dict[str, str] = field(default_factory=dict)
+    Floats of Python's in lists would be ten times as large.
+    """
+
+    names: dict[str, int] = field(default_factory=dict)  # of tracks, in the order of their coming
+    broken: dict[str, str] = field(default_factory=dict)  # tracks with a line that cannot be read
+    tracks: "array[int]" = field(default_factory=lambda: array("q"))
+    cells: "array[int]" = field(default_factory=lambda: array("q"))
+    numbers: "array[float]" = field(default_factory=lambda: array("d"))
 
 
 def read_mot(
@@ -63,31 +79,39 @@ def read_mot(
     if clock.frame_rate_hz is None or clock.started_at_s is None:
         raise malformed("query: frame_rate_hz and started_at are needed with text/csv")
     lines = _read_lines(body)
-    if lines.broken and not any(lines.rows[name] for name in lines.rows):
+    if lines.broken and not lines.tracks:
         raise malformed(f"not MOTChallenge text: {next(iter(lines.broken.values()))}")
-    every = [row for rows in lines.rows.values() for row in rows]
-    people = _people(every, classes)
-    boxes: dict[str, list[list[float]]] = {}
-    for name, rows in lines.rows.items():
-        kept = [row for row in rows if _counts(row, people, given=classes is not None)]
-        if kept or name in lines.broken:
-            boxes[name] = [_box(row, clock) for row in kept]
-    check_count(len(boxes))
-    left_out = len(every) - sum(len(rows) for rows in boxes.values())
-    if every and not boxes:
-        raise _nobody(every, people, given=classes is not None)
+    numbers = np.frombuffer(lines.numbers).reshape(-1, len(_NONE))
+    cells = np.frombuffer(lines.cells, dtype=np.int64)
+    found = _classes_of(numbers, cells, given=classes is not None)
+    people = _people(numbers, cells) if classes is None else classes
+    # Who stands with conf 0 is marked "ignore".
+    kept = (cells <= _CONF + 1) | (numbers[:, _CONF] != 0)
+    kept &= (found == _NONE_GIVEN) | np.isin(found, sorted(people))
+    left_out = len(kept) - int(kept.sum())
+    boxes = _boxes(numbers[kept], clock)
+    of = np.frombuffer(lines.tracks, dtype=np.int64)[kept]
+    ordered = np.lexsort((boxes[:, 0], of))
+    boxes = boxes[ordered]
+    ends = np.cumsum(np.bincount(of, minlength=len(lines.names))).tolist()
+    spans = {
+        name: boxes[begin:end]
+        for name, begin, end in zip(lines.names, [0, *ends], ends, strict=False)
+        if end > begin or name in lines.broken
+    }
+    check_count(len(spans))
+    if lines.tracks and not spans:
+        raise _nobody(found, people)
 
     def read(track_id: str) -> IncomingTrack:
         if track_id in lines.broken:
             refuse(lines.broken[track_id])
-        array = np.array(boxes[track_id], dtype=np.float64).reshape(-1, 5)
-        ordered = array[np.argsort(array[:, 0], kind="stable")]
-        return check_track(track_name(track_id), source, ordered, limits)
+        return check_track(track_name(track_id), source, spans[track_id], limits)
 
     return collect(
         (
             (index, {"id": track_id}, partial(read, track_id))
-            for index, track_id in enumerate(boxes)
+            for index, track_id in enumerate(spans)
         ),
         left_out,
     )
@@ -106,69 +130,79 @@ def read_classes(text: str) -> frozenset[int]:
 
 
 def _read_lines(body: bytes) -> _Lines:
-    lines = _Lines()
-    count = body.count(b"\n")
+    count = body.count(b"\n") + body.count(b"\r") - body.count(b"\r\n")
     if count > MAX_LINES:
         raise TooLargeError(
             f"lines: at most {MAX_LINES} a request are taken, got {count}; "
             "post a part of the time at once"
         )
-    text = body.decode("utf-8", errors="replace")
-    for line_no, line in enumerate(text.splitlines(), start=1):
-        if not line.strip() or (line_no == 1 and line.lower().startswith("frame")):
+    lines = _Lines()
+    text = TextIOWrapper(BytesIO(body), encoding="utf-8", errors="replace")
+    budget = CpuBudget()
+    for line_no, line in enumerate(text, start=1):
+        if line_no % _CHECKED_EVERY == 0:
+            budget.check()
+        if line.isspace() or (line_no == 1 and line.lower().startswith("frame")):
             continue
-        cells = [cell.strip() for cell in line.split(",")]
-        name = cells[1][:MAX_ID_LENGTH] if len(cells) > 1 and cells[1] else f"line {line_no}"
-        rows = lines.rows.setdefault(name, [])
-        try:
-            numbers = [float(cell) for number, cell in enumerate(cells) if number != 1]
-        except ValueError as error:
-            lines.broken.setdefault(name, f"line {line_no}: {error}; got {line[:80]!r}")
-            continue
-        if len(cells) < _LEAST_CELLS:
-            few = f"at least {_LEAST_CELLS} columns are needed, got {line[:80]!r}"
-            lines.broken.setdefault(name, f"line {line_no}: {few}")
-            continue
-        rows.append([numbers[0], float(line_no), *numbers[1:]])
+        _read_line(lines, line_no, line)
+        if len(lines.names) > _MOST_IDS:
+            raise TooLargeError(f"ids: at most {_MOST_IDS} of all classes are taken, got more")
+        if len(lines.broken) > MAX_TRACKS:
+            if lines.tracks:
+                check_count(len(lines.broken))
+            break
     return lines
 
 
-def _people(rows: list[list[float]], classes: frozenset[int] | None) -> frozenset[float]:
-    if classes is not None:
-        return frozenset(float(number) for number in classes)
-    truth = any(len(row) == max(_WITH_CLASS) and 0 <= row[_VISIBILITY] <= 1 for row in rows)
+def _read_line(lines: _Lines, line_no: int, line: str) -> None:
+    count = line.count(",") + 1
+    cells = line.split(",", _READ_CELLS)[:_READ_CELLS] if len(line) <= MAX_LINE_CHARS else []
+    name = cells.pop(1).strip()[:MAX_ID_LENGTH] if count > 1 and cells else ""
+    name = name or f"line {line_no}"
+    at = lines.names.setdefault(name, len(lines.names))
+    try:
+        numbers = tuple(map(float, cells))
+        if len(numbers) < _LEAST_CELLS - 1:
+            few = f"at least {_LEAST_CELLS} columns and at most {MAX_LINE_CHARS} characters"
+            raise ValueError(f"{few} are needed")
+    except ValueError as error:
+        lines.broken.setdefault(name, f"line {line_no}: {error}; got {line.strip()[:80]!r}")
+        return
+    lines.tracks.append(at)
+    lines.cells.append(count)
+    lines.numbers.extend((numbers + _NONE)[: len(_NONE)])
+
+
+def _people(numbers: Array, cells: Index) -> frozenset[float]:
+    """Numbers of the classes that are people, where the request does not say."""
+    visible = numbers[cells == max(_WITH_CLASS), _VISIBILITY]
+    truth = bool(((visible >= 0) & (visible <= 1)).any())
     return _TRUTH_PEOPLE if truth else COCO_PEOPLE
 
 
-def _class_of(row: list[float], *, given: bool) -> float:
-    has = len(row) > _CLASS if given else len(row) in _WITH_CLASS
-    return row[_CLASS] if has else _NONE_GIVEN
+def _classes_of(numbers: Array, cells: Index, *, given: bool) -> Array:
+    """The class of each line (N,), `_NONE_GIVEN` where it has none."""
+    has = cells > _CLASS + 1 if given else np.isin(cells, _WITH_CLASS)
+    return np.where(has, numbers[:, _CLASS], _NONE_GIVEN)
 
 
-def _counts(row: list[float], people: frozenset[float], *, given: bool) -> bool:
-    """True of a line of a person that is not to be ignored."""
-    if len(row) > _CONF and row[_CONF] == 0:
-        return False
-    number = _class_of(row, given=given)
-    return number == _NONE_GIVEN or number in people
-
-
-def _box(row: list[float], clock: Clock) -> list[float]:
-    """Time and box, counted from 0."""
+def _boxes(numbers: Array, clock: Clock) -> Array:
+    """Times and boxes (N, 5), counted from 0."""
     assert clock.frame_rate_hz is not None
     assert clock.started_at_s is not None
-    frame, _, left, top, width, height = row[:_LEAST_CELLS]
+    frame, left, top, width, height = numbers[:, : _LEAST_CELLS - 1].T
     time_s = clock.started_at_s + (frame - 1) / clock.frame_rate_hz
-    return [time_s, left - 1, top - 1, left - 1 + width, top - 1 + height]
+    return np.column_stack([time_s, left - 1, top - 1, left - 1 + width, top - 1 + height])
 
 
-def _nobody(rows: list[list[float]], people: frozenset[float], *, given: bool) -> MalformedError:
-    found = sorted({_class_of(row, given=given) for row in rows})
+def _nobody(classes: Array, people: frozenset[float]) -> MalformedError:
+    found = np.unique(classes).tolist()
     seen = ", ".join(f"{number:g}" for number in found[:_MOST_NAMED])
     seen += ", ..." if len(found) > _MOST_NAMED else ""
     wanted = ", ".join(f"{number:g}" for number in sorted(people))
     reason = (
-        f"no line is of a person: classes {wanted} are taken for people, got {len(rows)} lines of "
-        f"classes {seen}; say with classes= which numbers are people; lines with conf 0 are ignored"
+        f"no line is of a person: classes {wanted} are taken for people, got {len(classes)} lines "
+        f"of classes {seen}; say with classes= which numbers are people; lines with conf 0 are "
+        "ignored"
     )
     return MalformedError.of_field("classes", reason)

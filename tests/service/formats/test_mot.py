@@ -1,5 +1,7 @@
 """MOTChallenge text: counted from 1, and of people alone."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from sqlalchemy import select
@@ -108,6 +110,7 @@ def test_what_is_no_such_text_or_lacks_its_clock(corner):
     problem(corner.post(url, content="1,1,1,1,1,1,1", headers=headers), 422, "malformed")
     problem(send(corner, ["a;b;c"]), 422, "malformed")
     problem(send(corner, ["1,1,2,3"]), 422, "malformed")
+    assert send(corner, ["frame,id", ""]).json()["accepted"] == 0
 
 
 def test_the_form_to_register_with_reads_it_the_same(http):
@@ -118,3 +121,42 @@ def test_the_form_to_register_with_reads_it_the_same(http):
     ).json()
     assert answer["text"] == "1 tracks read; 6 lines are of no person."
     assert answer["tracks"][0][0] == [0.0, 120.0, 200.0]
+
+
+@pytest.mark.parametrize("end", ["\r", "\r\n", "\n\r\n"])
+def test_lines_end_as_elsewhere(corner, settings, end):
+    answer = corner.post(
+        "/cameras/corner/tracks?started_at=2023-11-14T22:13:20Z",
+        content=end.join([*walk("a\x0bb"), *walk("a\u2028b")]),  # no ends of lines
+        headers={"Content-Type": "text/csv"},
+    )
+    assert answer.json()["accepted"] == 2, answer.text
+
+
+def test_every_end_of_a_line_counts(corner):
+    """`x\\r` 16 million times took 5 GB, since the lines were counted by their `\\n`."""
+    document = problem(send(corner, ["x\r" * (mot.MAX_LINES + 1)]), 413, "too_large")
+    assert f"lines: at most {mot.MAX_LINES} a request are taken, got" in document["detail"]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("1," * 2**20, "at least 6 columns and at most 1000 characters"),
+        ("x\n" * 6_000, "not MOTChallenge text: line 1"),
+    ],
+)
+def test_little_is_built_of_what_is_no_line(corner, line, said):
+    tracemalloc.start()
+    try:
+        document = problem(send(corner, [line]), 422, "malformed")
+        assert tracemalloc.get_traced_memory()[1] < 12 * 2**20
+    finally:
+        tracemalloc.stop()
+    assert said in document["errors"][0]["reason"]
+
+
+def test_ids_are_bounded_whatever_they_are_of(corner):
+    lines = (f"1,{n},1,1,9,9,1,5" for n in range(20_001))  # a car each
+    document = problem(send(corner, lines), 413, "too_large")
+    assert document["detail"].startswith("ids: at most 20000 of all classes")
