@@ -46,6 +46,7 @@ PUBLIC_MODELS = {
     "models.durations": "hours and days in seconds",
     "models.effort": "the CPU time that a look may take",
     "models.errors": "what a calibration may fail by",
+    "models.geometry.footprint": "the ground in the picture",
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
     "models.geometry.intrinsics": "the lens",
     "models.geometry.pose": "the pose, its parameters and their names",

@@ -33,7 +33,8 @@ from service.cameras.poses import PoseView
 from service.degrees import in_degrees
 from service.enums import PoseState, ReferenceState
 from service.errors import MalformedError
-from service.formats.opencv_yaml import opencv_yaml
+from service.formats.geojson import GeoOrigin
+from service.formats.pose_formats import MEDIA_TYPES, PoseFormat, pose_file
 from service.job_queue import JobQueue
 from service.reasons import code_of, values_of
 from service.settings import Settings
@@ -215,39 +216,79 @@ router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
 
 
 class _YamlResponse(PlainTextResponse):
-    media_type = "application/yaml"
+    media_type = MEDIA_TYPES[PoseFormat.OPENCV]
 
 
-@router.get("/pose", response_model=ServedPoseOut)
+_Format = Annotated[
+    PoseFormat | None,
+    Query(alias="format", description="a file for another tool, with the lens; else our JSON"),
+]
+_Latitude = Annotated[
+    float | None,
+    Query(ge=-85, le=85, description="with geojson: of the world's x = y = 0, whose +Y is north"),
+]
+_Longitude = Annotated[
+    float | None, Query(ge=-180, le=180, description="with geojson, beside the latitude")
+]
+_FILES: dict[str, Any] = {kind: {} for kind in sorted(set(MEDIA_TYPES.values()))}
+
+
+@router.get("/pose", response_model=ServedPoseOut, responses={200: {"content": _FILES}})
 def show(
     camera_id: str,
     state: StateDep,
     session: ReadDep,
     response: Response,
+    format_: _Format = None,
+    origin_lat_deg: _Latitude = None,
+    origin_lon_deg: _Longitude = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> ServedPoseOut | Response:
-    """The pose now, how sure it is, and why the state is what it is."""
+    """The pose now, how sure it is, and why the state is what it is; or a file of another tool's.
+
+    What each of the files holds and leaves out is in the guide to formats out.
+    """
     view = poses.view_pose(session, state.settings, camera_id)
     headers = {"ETag": view.etag}
     if if_none_match is not None and view.etag in map(str.strip, if_none_match.split(",")):
         return Response(status_code=304, headers=headers)
+    if format_ is not None:
+        return _file(session, view, format_, _origin(origin_lat_deg, origin_lon_deg))
     response.headers.update(headers)
     return ServedPoseOut.from_value(view)
 
 
 @router.get("/pose.yaml", response_class=_YamlResponse)
-def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> PlainTextResponse:
+def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
     """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
     view = poses.view_pose(session, state.settings, camera_id)
-    lens = cameras.view_camera(session, camera_id).intrinsics
-    words = (f"state: {view.status.state}", f"why: {view.reason}")
-    return _YamlResponse(
-        opencv_yaml(lens, view.pose, camera_id=camera_id, words=words),
-        headers={
-            "ETag": view.etag,
-            "Content-Disposition": f'inline; filename="{camera_id}.yaml"',
-        },
+    return _file(session, view, PoseFormat.OPENCV, None)
+
+
+def _file(session: Session, view: PoseView, kind: PoseFormat, origin: GeoOrigin | None) -> Response:
+    camera_id, estimate = view.status.camera_id, view.status.estimate
+    file = pose_file(
+        kind,
+        cameras.view_camera(session, camera_id).intrinsics,
+        view.pose,
+        camera_id=camera_id,
+        at=None if estimate is None else from_seconds(estimate.to_s),
+        words=(f"state: {view.status.state}", f"why: {view.reason}"),
+        origin=origin,
     )
+    headers = {"ETag": view.etag, "Content-Disposition": f'inline; filename="{file.name}"'}
+    return Response(file.content, media_type=file.media_type, headers=headers)
+
+
+def _origin(lat_deg: float | None, lon_deg: float | None) -> GeoOrigin | None:
+    if lat_deg is None and lon_deg is None:
+        return None
+    for name, value in (("origin_lat_deg", lat_deg), ("origin_lon_deg", lon_deg)):
+        if value is None:
+            raise MalformedError.of_field(name, "latitude and longitude are needed together")
+    assert lat_deg is not None
+    assert lon_deg is not None
+    return GeoOrigin(lat_deg=lat_deg, lon_deg=lon_deg)
 
 
 @router.get("/pose/history")

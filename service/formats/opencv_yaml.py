@@ -48,10 +48,15 @@ def opencv_yaml(
     return "\n".join(lines) + "\n"
 
 
+def yaml_number(value: float) -> str:
+    """A number with a point: without one OpenCV reads an integer, and YAML 1.1 `1e-05` as text."""
+    mantissa, e, exponent = repr(float(value)).partition("e")
+    return mantissa + ("" if "." in mantissa else ".0") + e + exponent
+
+
 def _matrix(name: str, values: Array) -> list[str]:
     rows, columns = values.shape
-    # OpenCV reads a number without a point as an integer, and says so loudly.
-    numbers = [repr(float(value)) for value in values.ravel()]
+    numbers = [yaml_number(value) for value in values.ravel()]
     lines = [", ".join(numbers[at : at + columns]) for at in range(0, rows * columns, columns)]
     return [
         f"{name}: !!opencv-matrix",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from models.geometry.footprint import REACH, view_outline
 from models.geometry.ground import Misplacement, ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -21,8 +22,6 @@ _SIZE_PX = 640.0
 _MARGIN_PX, _TRIED_MARGIN_PX = 18.0, 20.0
 _STRIP_PX = 26.0  # below the ground, for the scale and +Y
 _HEIGHT_PX = 470.0
-_BORDER = 25  # pixels of each side of the picture's edge
-_REACH = 10.0  # camera heights, where no track says how far people are seen
 _FARTHEST = 30.0
 _SCALES_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
@@ -110,23 +109,6 @@ def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]
     return svg("picture", f"0 0 {_SIZE_PX:.0f} {_SIZE_PX:.0f}", label, parts)
 
 
-def view_outline(lens: Intrinsics, pose: CameraPose, reach_m: float) -> Array:
-    """The outline (N, 2) of the ground that a camera sees, cut at a distance from its foot.
-
-    Where the edge of the picture is above the horizon, the ground ends at that distance.
-    """
-    edge = _picture_edge(lens)
-    rays, on_ray = lens.rays(edge)
-    world = rays[on_ray] @ pose.rotation
-    level = np.linalg.norm(world[:, :2], axis=1)
-    down = -world[:, 2]
-    far = down * reach_m <= level * pose.height_m  # not downwards counts as far, too
-    scale = np.where(
-        far, reach_m / np.maximum(level, 1e-12), pose.height_m / np.where(far, 1, down)
-    )
-    return np.asarray(pose.centre_m[:2] + world[:, :2] * scale[:, None])
-
-
 def plan_around(points_m: Array) -> Plan:
     """The paper that shows some points of the ground (N, 2), all of them."""
     (left, low), (right, high) = points_m.min(0).tolist(), points_m.max(0).tolist()
@@ -141,21 +123,12 @@ def plan_around(points_m: Array) -> Plan:
 
 def _reach_m(pose: CameraPose, walked: Sequence[Array]) -> float:
     if not walked:
-        return _REACH * pose.height_m
+        return REACH * pose.height_m
     away = np.linalg.norm(np.concatenate(walked) - pose.centre_m[:2], axis=1)
     away = away[np.isfinite(away)]
     if not len(away):
-        return _REACH * pose.height_m
+        return REACH * pose.height_m
     return float(min(1.15 * np.quantile(away, 0.98), _FARTHEST * pose.height_m))
-
-
-def _picture_edge(lens: Intrinsics) -> Array:
-    across = np.linspace(-0.5, lens.width - 0.5, _BORDER)
-    along = np.linspace(-0.5, lens.height - 0.5, _BORDER)
-    left, right = np.full(_BORDER, across[0]), np.full(_BORDER, across[-1])
-    top, bottom = np.full(_BORDER, along[0]), np.full(_BORDER, along[-1])
-    sides = [(across, top), (right, along), (across[::-1], bottom), (left, along[::-1])]
-    return np.concatenate([np.stack(side, axis=-1) for side in sides])
 
 
 def _stroke(plan: Plan, each: Misplacement) -> str:
