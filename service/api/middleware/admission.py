@@ -1,6 +1,7 @@
 """Admission of requests: a body is read whole, then it waits for its turn; so many at once.
 
 Kinds of requests have lanes of their own, so that none starves another; `/healthz` needs none.
+Who has shown no token where one is needed can only log in: in a lane of its own, by a small body.
 """
 
 import asyncio
@@ -18,11 +19,14 @@ from anyio._backends import _asyncio
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.middleware.hosts import auth_on
 from service.errors import OverloadedError, TooLargeError
 from service.settings import Settings
 
 _COME_BACK_S = 2.0
 _OPERATION_AT_ONCE = 2
+_STRANGERS_AT_ONCE = 4
+_STRANGERS_MB = 1 / 64  # of a body: a token is some hundred bytes
 STREAM_POLLS = 2  # of all event streams together
 LOOKUPS = 4  # of who asks, before a request has its turn
 _THREADS_START_S = 30.0  # at the longest
@@ -85,15 +89,18 @@ class Lanes:
         self._reads = lane("reads", settings.http_at_once, settings.http_waiting)
         self._writes = lane("writes", settings.http_at_once, settings.http_waiting)
         self._operation = lane("operation", _OPERATION_AT_ONCE, settings.http_waiting)
+        self._strangers = lane("logins", _STRANGERS_AT_ONCE, settings.http_waiting)
         self._streams = lane("streams", settings.max_streams, 0)
 
-    def of(self, scope: Scope) -> Lane | None:
+    def of(self, scope: Scope, *, stranger: bool) -> Lane | None:
         """The lane of a request; None for what is answered whatever the load."""
         path = scope["path"]
         if path == "/healthz":
             return None
         if path in ("/readyz", "/metrics"):
             return self._operation
+        if stranger:
+            return self._strangers
         if path == "/events":
             return self._streams
         return self._reads if scope["method"] in ("GET", "HEAD") else self._writes
@@ -101,7 +108,8 @@ class Lanes:
 
 def sessions_at_once(settings: Settings) -> int:
     """The most sessions that requests have at once: a request has one at a time."""
-    return 2 * settings.http_at_once + _OPERATION_AT_ONCE + STREAM_POLLS + LOOKUPS
+    in_lanes = 2 * settings.http_at_once + _OPERATION_AT_ONCE + _STRANGERS_AT_ONCE
+    return in_lanes + STREAM_POLLS + LOOKUPS
 
 
 async def start_threads(number: int) -> None:
@@ -135,6 +143,7 @@ class AdmissionMiddleware:
         self._app = app
         self._settings = settings
         self._lanes = Lanes(settings)
+        self._auth = auth_on(settings)
         self._held = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -147,14 +156,15 @@ class AdmissionMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        lane = self._lanes.of(scope)
+        stranger = self._auth and scope.get("state", {}).get("caller") is None
+        lane = self._lanes.of(scope, stranger=stranger)
         if lane is not None:
             lane.check()
         headers = {name: value for name, value in scope["headers"] if name in _LENGTHS}
         if not headers:
             await self._admit(lane, scope, receive, send)
             return
-        limit = round(self._limit_mb(scope["path"]) * _MB)
+        limit = round((_STRANGERS_MB if stranger else self._limit_mb(scope["path"])) * _MB)
         declared = headers.get(b"content-length", b"0")
         if declared.isdigit() and int(declared) > limit:
             raise _too_large(limit, f"{int(declared)}")

@@ -1,5 +1,8 @@
 """Connections: so many, so many from an address, and none that only keeps its place.
 
+Where tokens are needed, who has shown none gives way to who comes, the oldest first: a place is
+kept by a token. Elsewhere a request keeps it.
+
 uvicorn waits for ever for headers, for bodies and for clients that take their answers.
 """
 
@@ -8,19 +11,22 @@ import json
 import math
 import resource
 from collections import Counter
-from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.api.middleware.hosts import auth_on
 from service.api.middleware.instruments import Instruments
 from service.settings import Settings
 
 _OTHER_FILES = 256  # the database, logs, pipes, and what is accepted in one go before it is counted
 _LEAST_BODY_BYTES = 1024  # a second
-_MOST_UNREAD_BYTES = 8 * 1024 * 1024  # of a body that was refused, until the connection is cut
+# Of a body that was refused so much is read and thrown away: a client that is cut while it sends
+# does not see the answer.
+_LINGER_S = 15.0
+_MOST_UNREAD_BYTES = 8 * 1024 * 1024  # of who has shown no token
 
 
 def _refusal(status: HTTPStatus, code: str, detail: str) -> bytes:
@@ -52,7 +58,8 @@ class ConnectionGuard:
         self.refused = instruments.connections_refused
         self.of_address: Counter[str] = Counter()
         self.open = 0
-        self.silent: dict[GuardedProtocol, None] = {}  # no request has come yet; oldest first
+        self.auth = auth_on(settings)
+        self.strangers: dict[GuardedProtocol, None] = {}  # who may have to give way; oldest first
 
 
 def allow_descriptors() -> int:
@@ -73,6 +80,7 @@ class GuardedProtocol(H11Protocol):
         self._address = ""
         self._received = 0  # since the timer was set
         self._unread = 0  # of the body of a request that is answered already
+        self._answered_s = 0.0
         self._awaiting: Any = None  # h11's state of the client that the timer is for
         self._timer: asyncio.TimerHandle | None = None
         self._reader_timer: asyncio.TimerHandle | None = None
@@ -83,15 +91,15 @@ class GuardedProtocol(H11Protocol):
         guard = self._guard
         self._address = self.client[0] if self.client else "local"
         if guard.of_address[self._address] >= guard.most_of_address:
-            same = (other for other in guard.silent if other._address == self._address)
+            same = [other for other in guard.strangers if other._address == self._address]
             if not self._made_room(same, "address"):
                 return
-        if guard.open >= guard.most and not self._made_room(iter(guard.silent), "full"):
+        if guard.open >= guard.most and not self._made_room(list(guard.strangers), "full"):
             return
         self._counted = True
         guard.open += 1
         guard.of_address[self._address] += 1
-        guard.silent[self] = None
+        guard.strangers[self] = None
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -105,11 +113,9 @@ class GuardedProtocol(H11Protocol):
             return
         self._received += len(data)
         super().data_received(data)
-        if self.conn.their_state is not h11.IDLE:
-            self._guard.silent.pop(self, None)
-        if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
+        if self._answered_early():
             self._unread += len(data)
-            if self._unread > _MOST_UNREAD_BYTES:
+            if self._unread > _MOST_UNREAD_BYTES and not self._known():
                 self._count("unread")
                 self.transport.abort()
                 return
@@ -119,6 +125,7 @@ class GuardedProtocol(H11Protocol):
         """Wait for the next request."""
         super().on_response_complete()
         self._unread = 0
+        self._answered_s = self.loop.time()
         self._watch()
 
     def pause_writing(self) -> None:
@@ -134,14 +141,32 @@ class GuardedProtocol(H11Protocol):
             self._reader_timer.cancel()
             self._reader_timer = None
 
-    def _made_room(self, silent: Iterator["GuardedProtocol"], reason: str) -> bool:
-        """End the oldest of those that keep silent, since this one may not; else end this one."""
-        oldest = next(silent, None)
-        if oldest is None:
-            self._end(reason, _BUSY)
+    def _known(self) -> bool:
+        """True once a request was let in by a token, or has come where none is needed.
+
+        uvicorn makes the scope of each request; the guard notes in it who asks.
+        """
+        if self.scope is None:
             return False
-        oldest._end("silent", _LATE, abort=True)
-        return True
+        return not self._guard.auth or self.scope["state"].get("caller") is not None
+
+    def _made_room(self, strangers: "list[GuardedProtocol]", reason: str) -> bool:
+        """End the oldest of those who have to give way; else this one."""
+        for oldest in strangers:
+            if oldest._known():
+                del self._guard.strangers[oldest]
+                continue
+            if oldest.scope is None:
+                oldest._end("silent", _LATE, abort=True)
+            else:
+                oldest._end("stranger", _BUSY, abort=True)
+            return True
+        self._end(reason, _BUSY)
+        return False
+
+    def _answered_early(self) -> bool:
+        """True while there is more to come of a body that is answered already."""
+        return self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
 
     def _watch(self) -> None:
         """Set the timer for what the client must send next; a drip does not set it anew."""
@@ -169,7 +194,8 @@ class GuardedProtocol(H11Protocol):
     def _body_late(self) -> None:
         self._timer = None
         least = _LEAST_BODY_BYTES * self._guard.stall_timeout_s
-        if self.flow.read_paused or self._received >= least:
+        lingers = self._answered_early() and self.loop.time() - self._answered_s >= _LINGER_S
+        if not lingers and (self.flow.read_paused or self._received >= least):
             self._watch()
             return
         self._end("body", _LATE)
@@ -204,7 +230,7 @@ class GuardedProtocol(H11Protocol):
 
     def _leave(self) -> None:
         guard = self._guard
-        guard.silent.pop(self, None)
+        guard.strangers.pop(self, None)
         for timer in (self._timer, self._reader_timer):
             if timer is not None:
                 timer.cancel()

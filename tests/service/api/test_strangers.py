@@ -1,0 +1,100 @@
+"""Who has shown no token keeps nobody out who has, against a real server."""
+
+import socket
+
+import pytest
+
+from service.access import tokens
+from service.access.tokens import TokenSpec
+from service.store.engines.store import Store
+from tests.running import wait_for
+from tests.service.api.test_connections import everything, in_process
+
+FEW = {"auth": "on", "max_connections": 12, "connections_per_address": 0}
+LOGIN = (
+    b"POST /ui/login HTTP/1.1\r\nHost: localhost\r\n"
+    b"Content-Type: application/x-www-form-urlencoded\r\nContent-Length: %d\r\n\r\ntoken="
+)
+
+
+@pytest.fixture
+def bearer(settings):
+    with Store(settings).write() as session:
+        spec = TokenSpec(name="ada", scopes=("admin", "ingest"))
+        return f"Authorization: Bearer {tokens.make_token(session, spec, None).text}".encode()
+
+
+def ask(made, line, *headers, body=b""):
+    """The first bytes of the answer over a connection that is kept open."""
+    head = b"\r\n".join((line + b" HTTP/1.1", b"Host: localhost", *headers))
+    made.sendall(head + b"\r\n\r\n" + body)
+    return made.recv(65536)
+
+
+def test_slow_logins_keep_nobody_out(settings, bearer):
+    """1,000 of these got every other request a 503 for as long as they dripped."""
+    with in_process(settings, **FEW) as (address, _):
+        held = socket.create_connection(address, timeout=10)
+        assert ask(held, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        slow = [socket.create_connection(address, timeout=10) for _ in range(40)]
+        for made in slow:
+            made.sendall(LOGIN % 9_000)
+        for path in (b"GET /healthz", b"GET /cameras"):
+            new = socket.create_connection(address, timeout=10)
+            assert ask(new, path, bearer).startswith(b"HTTP/1.1 200 ")
+        # The oldest gave way; who has shown a token kept its place, and its next request.
+        assert everything(slow[0])[:12] in (b"", b"HTTP/1.1 408", b"HTTP/1.1 503")
+        assert ask(held, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+
+
+def test_a_place_is_kept_while_a_body_is_sent(settings, bearer):
+    """The token has come, the answer not yet."""
+    with in_process(settings, **FEW) as (address, _):
+        post = b"POST /cameras HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n"
+        sending = socket.create_connection(address, timeout=10)
+        sending.sendall(post + b"Content-Type: application/json\r\n" + bearer + b"\r\n\r\n{")
+        for _ in range(30):
+            ask(socket.create_connection(address, timeout=10), b"GET /healthz")
+        sending.sendall(b"       }")
+        assert sending.recv(65536).startswith(b"HTTP/1.1 422 ")
+
+
+def test_those_who_have_tokens_are_refused_once_all_places_are_theirs(settings, bearer):
+    with in_process(settings, **FEW) as (address, _):
+        held = [socket.create_connection(address, timeout=10) for _ in range(12)]
+        for made in held:
+            assert ask(made, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        beyond = socket.create_connection(address, timeout=10)
+        assert everything(beyond).startswith(b"HTTP/1.1 503 ")
+        held[0].close()
+
+        def taken():
+            new = socket.create_connection(address, timeout=10)
+            return ask(new, b"GET /healthz").startswith(b"HTTP/1.1 200 ")
+
+        wait_for(taken, 10)
+
+
+def test_a_stranger_sends_a_token_and_no_more(settings, bearer):
+    """440 bodies of a megabyte took the room of honest ones."""
+    with in_process(settings, **FEW) as (address, _):
+        made = socket.create_connection(address, timeout=10)
+        made.sendall(LOGIN % (16 * 1024 + 1))
+        assert made.recv(65536).startswith(b"HTTP/1.1 413 ")
+        whole = socket.create_connection(address, timeout=10)
+        whole.sendall(LOGIN % (16 * 1024) + b"x" * (16 * 1024 - 6))
+        assert whole.recv(65536).startswith(b"HTTP/1.1 401 ")
+
+
+def test_the_answer_to_a_body_too_large_is_read(settings, bearer):
+    """It ended in a reset, since the rest of the body was not read."""
+    size = 64 * 2**20
+    post = b"POST /cameras/c/tracks HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n" % size
+    with in_process(settings, **FEW) as (address, _):
+        made = socket.create_connection(address, timeout=10)
+        made.sendall(post + bearer + b"\r\n\r\n")
+        for _ in range(size // 2**20):
+            made.sendall(b" " * 2**20)
+        assert made.recv(65536).startswith(b"HTTP/1.1 413 ")
+        # The connection goes on to be used.
+        assert ask(made, b"GET /healthz").startswith(b"HTTP/1.1 200 ")
