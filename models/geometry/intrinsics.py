@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -42,6 +43,40 @@ class Intrinsics:
             raise ShapeError(f"distortion: 5 numbers are needed, got {len(self.distortion)}")
         if not all(math.isfinite(value) for value in (self.cx, self.cy, *self.distortion)):
             raise ShapeError("cx, cy, distortion: must be finite")
+
+    @classmethod
+    def of_view(cls, *, width: int, height: int, hfov_rad: float) -> Self:
+        """The pinhole that sees an angle from the left edge to the right, pixels being square.
+
+        Raises:
+            ShapeError: as of the lens itself.
+        """
+        return cls._centred(width, height, focal_px=width / 2 / math.tan(hfov_rad / 2))
+
+    @classmethod
+    def of_sensor(
+        cls, *, width: int, height: int, focal_mm: float, sensor_mm: tuple[float, float]
+    ) -> Self:
+        """The pinhole of a focal length before a sensor of (width, height), both in millimetres.
+
+        Pixels are square. A picture of another shape than the sensor is taken to be cut from it
+        on the one side that has to be cut.
+
+        Raises:
+            ShapeError: as of the lens itself.
+        """
+        pitch_mm = min(sensor_mm[0] / width, sensor_mm[1] / height)
+        return cls._centred(width, height, focal_px=focal_mm / pitch_mm)
+
+    @classmethod
+    def _centred(cls, width: int, height: int, *, focal_px: float) -> Self:
+        cx, cy = (width - 1) / 2, (height - 1) / 2
+        return cls(width=width, height=height, fx=focal_px, fy=focal_px, cx=cx, cy=cy)
+
+    @property
+    def hfov_rad(self) -> float:
+        """The angle that the picture is wide, by its focal length alone."""
+        return 2 * math.atan(self.width / 2 / self.fx)
 
     @property
     def matrix(self) -> Array:

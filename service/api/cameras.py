@@ -6,14 +6,16 @@ from datetime import datetime
 from typing import Annotated, Self
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import BaseModel, Field, StringConstraints, model_validator
 
+from models.geometry.intrinsics import Intrinsics
 from service.api.middleware.dependencies import EtagDep, ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     Body,
     CameraId,
     Finite,
     IntrinsicsBody,
+    LensBody,
     Out,
     PoseOut,
     PriorPoseBody,
@@ -21,6 +23,7 @@ from service.api.schemas import (
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
+from service.wording.typed_pose import Tone, judge_pose
 
 CameraName = Annotated[str, StringConstraints(max_length=200)]
 FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
@@ -34,23 +37,48 @@ class WalkingSpeedBody(Body):
     sd_mps: Finite = Field(0.1, ge=0, lt=2)
 
 
-class CameraBody(Body):
-    """A camera to register."""
+class _LensedBody(Body):
+    """A camera's lens, in one of two forms."""
+
+    intrinsics: IntrinsicsBody | None = None
+    lens: LensBody | None = None
+
+    @model_validator(mode="after")
+    def _one_lens(self) -> Self:
+        if self.intrinsics is not None and self.lens is not None:
+            raise ValueError("either intrinsics or lens is taken, got both")
+        return self
+
+    def lens_value(self) -> Intrinsics | None:
+        """The lens in pixels; None where neither form is given."""
+        body = self.intrinsics if self.lens is None else self.lens.to_intrinsics()
+        return None if body is None else body.to_value()
+
+
+class CameraBody(_LensedBody):
+    """A camera to register, by its `intrinsics` or its `lens`."""
 
     id: CameraId | None = None
     name: CameraName | None = None
-    intrinsics: IntrinsicsBody
     prior_pose: PriorPoseBody
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
 
+    @model_validator(mode="after")
+    def _has_lens(self) -> Self:
+        if self.intrinsics is None and self.lens is None:
+            raise ValueError("intrinsics or lens is needed, got neither")
+        return self
+
     def to_spec(self) -> CameraSpec:
         """A camera for the use case; its id is made of the name where none is given."""
+        intrinsics = self.lens_value()
+        assert intrinsics is not None
         return CameraSpec(
             camera_id=self.id or (slug(self.name) if self.name else None) or None,
             name=self.name or "",
-            intrinsics=self.intrinsics.to_value(),
+            intrinsics=intrinsics,
             prior_pose=self.prior_pose.to_value(),
             frame_rate_hz=self.frame_rate_hz,
             walking_speed_mean_mps=self.walking_speed.mean_mps,
@@ -59,15 +87,21 @@ class CameraBody(Body):
         )
 
 
-class CameraPatch(Body):
+class CameraPatch(_LensedBody):
     """What to change of a camera; fields left out stay."""
 
     name: CameraName | None = None
-    intrinsics: IntrinsicsBody | None = None
     prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
+
+
+class QuestionOut(Out):
+    """What may be a slip, refuses nothing, and was stored as it came; `field` is the suspect."""
+
+    field: str | None
+    text: str
 
 
 class CameraOut(Out):
@@ -101,6 +135,21 @@ class CameraOut(Out):
         )
 
 
+class CameraAnswer(CameraOut):
+    """A camera as it is stored, and what about its lens and prior pose is worth a second look."""
+
+    questions: list[QuestionOut]
+
+    @classmethod
+    def from_value(cls, view: CameraView) -> Self:
+        """The body of a camera, with the remarks of the registration form on it."""
+        says = judge_pose(view.intrinsics, view.prior_pose, typed_angles=True)
+        asked = [
+            QuestionOut.of(each) for each in says if each.kind in (Tone.CRITICAL, Tone.WARNING)
+        ]
+        return cls(**dict(CameraOut.from_value(view)), questions=asked)
+
+
 class CameraPage(BaseModel):
     """Some cameras; `next_cursor` leads to more."""
 
@@ -117,12 +166,17 @@ router = APIRouter(prefix="/cameras", tags=["cameras"])
 
 
 @router.post("", status_code=201)
-def register(body: CameraBody, state: StateDep, session: WriteDep, response: Response) -> CameraOut:
-    """Register a camera with its intrinsics and prior pose; queues its first training."""
+def register(
+    body: CameraBody, state: StateDep, session: WriteDep, response: Response
+) -> CameraAnswer:
+    """Register a camera with its intrinsics and prior pose; queues its first training.
+
+    `questions` names what may be a slip of the pen, such as millimetres for pixels.
+    """
     view = cameras.register_camera(session, state.queue, state.settings, body.to_spec())
     response.headers["Location"] = f"/cameras/{view.record.id}"
     response.headers["ETag"] = view.etag
-    return CameraOut.from_value(view)
+    return CameraAnswer.from_value(view)
 
 
 @router.get("")
@@ -154,7 +208,7 @@ def change(
     state: StateDep,
     session: WriteDep,
     response: Response,
-) -> CameraOut:
+) -> CameraAnswer:
     """Change a camera; another lens, prior pose or walking speed queues a training."""
     speed = body.walking_speed
     view = cameras.change_camera(
@@ -165,7 +219,7 @@ def change(
         etag,
         CameraChange(
             name=body.name,
-            intrinsics=None if body.intrinsics is None else body.intrinsics.to_value(),
+            intrinsics=body.lens_value(),
             prior_pose=None if body.prior_pose is None else body.prior_pose.to_value(),
             frame_rate_hz=body.frame_rate_hz,
             walking_speed_mean_mps=None if speed is None else speed.mean_mps,
@@ -174,7 +228,7 @@ def change(
         ),
     )
     response.headers["ETag"] = view.etag
-    return CameraOut.from_value(view)
+    return CameraAnswer.from_value(view)
 
 
 @router.delete("/{camera_id}", status_code=204)

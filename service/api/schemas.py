@@ -1,5 +1,6 @@
 """Fields, lenses and poses in their forms on the wire, and the classes that bodies are of."""
 
+import math
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Annotated, Any, Self
@@ -48,6 +49,10 @@ Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Text = Annotated[str, AfterValidator(_without_nul)]
 CameraId = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
 Who = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+PictureSide = Annotated[int, Field(gt=0, le=100_000)]
+FieldOfView = Annotated[Finite, Field(ge=1, le=170)]
+Millimetres = Annotated[Finite, Field(ge=0.1, le=10_000)]
+SensorSize = Annotated[list[Millimetres], Field(min_length=2, max_length=2)]
 FocalLength = Annotated[Finite, Field(ge=1, le=1e6)]
 Centre = Annotated[Finite, Field(ge=-1e6, le=1e6)]
 Tilt = Annotated[Finite, Field(ge=-90, le=90)]
@@ -91,8 +96,8 @@ class Out(BaseModel):
 class IntrinsicsBody(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3."""
 
-    width: int = Field(gt=0, le=100_000)
-    height: int = Field(gt=0, le=100_000)
+    width: PictureSide
+    height: PictureSide
     fx: FocalLength
     fy: FocalLength
     cx: Centre
@@ -104,6 +109,43 @@ class IntrinsicsBody(Body):
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
         return Intrinsics(**{**self.model_dump(), "distortion": tuple(self.distortion)})
+
+
+class LensBody(Body):
+    """A lens without distortion as installers know it: by its field of view, or by millimetres.
+
+    Either `hfov_deg`, from the left edge of the picture to the right, or `focal_mm` with
+    `sensor_mm`, the sensor's width and height.
+    """
+
+    width: PictureSide
+    height: PictureSide
+    hfov_deg: FieldOfView | None = None
+    focal_mm: Millimetres | None = None
+    sensor_mm: SensorSize | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        names = ("hfov_deg", "focal_mm", "sensor_mm")
+        given = [name for name in names if getattr(self, name) is not None]
+        if given not in (["hfov_deg"], ["focal_mm", "sensor_mm"]):
+            raise ValueError(
+                f"either hfov_deg or focal_mm and sensor_mm are needed; got {given or 'none'}"
+            )
+        _ = self.to_intrinsics()
+        return self
+
+    def to_intrinsics(self) -> IntrinsicsBody:
+        """The lens in pixels."""
+        size = {"width": self.width, "height": self.height}
+        if self.hfov_deg is not None:
+            lens = Intrinsics.of_view(**size, hfov_rad=math.radians(self.hfov_deg))
+        else:
+            assert self.focal_mm is not None
+            assert self.sensor_mm is not None
+            wide, tall = self.sensor_mm
+            lens = Intrinsics.of_sensor(**size, focal_mm=self.focal_mm, sensor_mm=(wide, tall))
+        return IntrinsicsBody.model_validate(asdict(lens))
 
 
 class PriorPoseBody(Body):

@@ -14,10 +14,14 @@ from service.api.schemas import (
     Body,
     CameraId,
     Centre,
+    FieldOfView,
     Finite,
     FocalLength,
     IntrinsicsBody,
+    LensBody,
+    Millimetres,
     PriorPoseBody,
+    SensorSize,
     Tilt,
     Triple,
 )
@@ -94,6 +98,24 @@ class TypedLens(IntrinsicsBody):
         return [*_numbers(1, 2, 3, 4, 5)(text), 0.0, 0.0, 0.0, 0.0][:5]
 
 
+class TypedView(LensBody):
+    """A lens by its field of view."""
+
+    hfov_deg: FieldOfView
+
+    _typed = field_validator("width", "height", "hfov_deg", mode="before")(_number)
+
+
+class TypedSensor(LensBody):
+    """A lens by its focal length and its sensor, in millimetres."""
+
+    focal_mm: Millimetres
+    sensor_mm: SensorSize
+
+    _typed = field_validator("width", "height", "focal_mm", mode="before")(_number)
+    _size = field_validator("sensor_mm", mode="before")(_numbers(2))
+
+
 class TypedAngles(PriorPoseBody):
     """A pose by height and angles."""
 
@@ -144,9 +166,10 @@ class ReadForm:
 
 
 class RegistrationForm(Body):
-    """The fields as they were typed; `form` says which of the two poses counts."""
+    """The fields as they were typed; `form` and `lens_form` say which of them count."""
 
     form: Literal["angles", "matrix"] = "angles"
+    lens_form: Literal["pixels", "view", "sensor"] = "pixels"
     name: Typed = ""
     id: Typed = ""
     width: Typed = ""
@@ -156,6 +179,9 @@ class RegistrationForm(Body):
     cx: Typed = ""
     cy: Typed = ""
     distortion: Typed = ""
+    hfov_deg: Typed = ""
+    focal_mm: Typed = ""
+    sensor_mm: Typed = ""
     height_m: Typed = ""
     tilt_deg: Typed = ""
     roll_deg: Typed = ""
@@ -170,7 +196,7 @@ class RegistrationForm(Body):
     def read(self) -> ReadForm:
         """Read it as far as that goes, and say what is wrong or missing."""
         errors: list[FieldError] = []
-        lens = self._read(TypedLens, errors)
+        lens = self._read_lens(errors)
         pose: PriorPoseBody | None = None
         if self.form == "angles":
             pose = self._read(TypedAngles, errors)
@@ -194,6 +220,13 @@ class RegistrationForm(Body):
             raise MalformedError(detail, read.errors)
         rest = read.rest.model_dump()
         return CameraBody.model_validate({"intrinsics": read.lens, "prior_pose": read.pose, **rest})
+
+    def _read_lens(self, errors: list[FieldError]) -> IntrinsicsBody | None:
+        if self.lens_form == "pixels":
+            return self._read(TypedLens, errors)
+        kind = TypedView if self.lens_form == "view" else TypedSensor
+        lens: LensBody | None = self._read(kind, errors)
+        return None if lens is None else lens.to_intrinsics()
 
     def _read(self, kind: type[Made], errors: list[FieldError]) -> Made | None:
         """A kind, made of those of its fields that are not empty."""

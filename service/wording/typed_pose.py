@@ -15,7 +15,9 @@ from models.geometry.rotation import Array
 _USUAL_MPS = 1.35
 _PLAUSIBLE_MPS = (0.95, 1.75)
 _POSSIBLE_MPS = (0.7, 2.0)  # beyond, a reference is doubted, too
-_LOW_M, _HIGH_M, _MILLIMETRES_M = 1.5, 60.0, 500.0
+_LOW_M, _HIGH_M = 1.5, 60.0
+_UNITS = {"centimetres": 100.0, "millimetres": 1000.0}  # that heights are read off plans in
+_WIDE, _NARROW = math.radians(150), math.radians(1)  # of what Brown's model is a lens
 _LEVEL = math.radians(45)
 
 
@@ -40,7 +42,11 @@ class Saying:
 
 def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[Saying]:
     """Remarks on a pose."""
-    found = [*_looking(lens, pose, typed_angles=typed_angles), *_standing(pose)]
+    found = [
+        *_through(lens),
+        *_looking(lens, pose, typed_angles=typed_angles),
+        *_standing(pose, typed_angles=typed_angles),
+    ]
     if not typed_angles:
         found.append(Saying(kind=Tone.INFO, text=f"R and t say: {pose_words(pose)}."))
     return found
@@ -137,13 +143,28 @@ def _looking(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[
     return [Saying(kind=Tone.INFO, text=f"{where}. Compare it with what the camera shows.")]
 
 
-def _standing(pose: CameraPose) -> list[Saying]:
+def _through(lens: Intrinsics) -> list[Saying]:
+    if _NARROW <= lens.hfov_rad <= _WIDE:
+        return []
+    said = f"fx = {lens.fx:g} pixels is a field of view of {math.degrees(lens.hfov_rad):.1f}°"
+    how = "Are these millimetres? A lens may be told by them, with the sensor's size."
+    if lens.hfov_rad < _NARROW:
+        how = "Is the picture's width that of the lens' calibration?"
+    return [Saying(kind=Tone.CRITICAL, text=f"{said}. {how}", field="fx")]
+
+
+def _standing(pose: CameraPose, *, typed_angles: bool) -> list[Saying]:
     found = []
-    if pose.height_m > _MILLIMETRES_M:
+    units = {name: pose.height_m / share for name, share in _UNITS.items()}
+    meant = {name: value for name, value in units.items() if _LOW_M <= value <= _HIGH_M}
+    if pose.height_m > _HIGH_M and meant:
         found.append(
             Saying(
                 kind=Tone.CRITICAL,
-                text=f"The camera would be {pose.height_m:,.0f} m high. Are these millimetres?",
+                text=f"The camera would be {pose.height_m:,.0f} m high. "
+                f"Are these {' or '.join(meant)}?",
+                field="height_m" if typed_angles else None,
+                value=f"{next(iter(meant.values())):g}" if typed_angles else None,
             )
         )
     elif not _LOW_M <= pose.height_m <= _HIGH_M:

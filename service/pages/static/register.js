@@ -33,7 +33,7 @@ function say({ kind, text, field, value }) {
   banner.className = `banner ${kind}`;
   banner.innerHTML = `<svg class="icon" aria-hidden="true"><use href="#${SHAPES[kind]}"/></svg><div><p></p></div>`;
   banner.querySelector("p").textContent = text;
-  if (field) {
+  if (value) {
     const mend = document.createElement("button");
     mend.type = "button";
     mend.textContent = `Make it ${value}`;
@@ -80,10 +80,11 @@ async function look() {
 
 const lookSoon = debounced(look, WAIT_MS);
 
+/** Of what is told in one of several ways, show the fields of the chosen one. */
 function showForm() {
-  const form_ = fields().form;
-  document.getElementById("angles").hidden = form_ !== "angles";
-  document.getElementById("matrix").hidden = form_ !== "matrix";
+  const chosen = fields();
+  for (const place of form.querySelectorAll("[data-of]"))
+    place.hidden = !place.dataset.of.split(" ").includes(chosen[place.dataset.choice]);
 }
 
 function fill(values) {
@@ -149,7 +150,7 @@ async function register() {
 form.addEventListener("input", (event) => {
   if (event.target.type === "file") return;
   delete refused[event.target.name];
-  if (event.target.name === "form") showForm();
+  if (event.target.type === "radio") showForm();
   sessionStorage.setItem(DRAFT, JSON.stringify(fields()));
   lookSoon();
 });

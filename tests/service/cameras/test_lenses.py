@@ -1,0 +1,120 @@
+"""Lenses as installers know them, and questions about slips of the pen."""
+
+import math
+
+import pytest
+
+from tests.conftest import CAMERA
+from tests.service.cameras.test_registration import ANGLES, preview
+from tests.service.conftest import problem
+
+SIZE = {"width": 1920, "height": 1080}
+POSE = {"height_m": 7.84, "tilt_deg": 20.0}
+
+
+def registered(http, lens, **others):
+    body = {"lens": {**SIZE, **lens}, "prior_pose": POSE, **others}
+    answer = http.post("/cameras", json=body)
+    assert answer.status_code == 201, answer.text
+    return answer.json()
+
+
+def focal_px(camera):
+    lens = camera["intrinsics"]
+    assert lens["fx"] == lens["fy"]
+    assert (lens["cx"], lens["cy"], lens["distortion"]) == (959.5, 539.5, [0.0] * 5)
+    return lens["fx"]
+
+
+def test_a_field_of_view_is_a_focal_length(http):
+    """Pin: 90 deg is as far ahead as half the picture is wide."""
+    camera = registered(http, {"hfov_deg": 90.0})
+    assert focal_px(camera) == pytest.approx(960.0)
+    assert camera["questions"] == []
+
+
+def test_millimetres_are_told_by_the_sensor(http):
+    """Pin: 4 mm before 5.76 mm of 1920 pixels, 0.003 mm each, are 1333.3 pixels."""
+    exact = registered(http, {"focal_mm": 4.0, "sensor_mm": [5.76, 3.24]})
+    assert focal_px(exact) == pytest.approx(4.0 / 0.003)
+    # A sensor of 4:3 gives 16:9 by its whole width.
+    cut = registered(http, {"focal_mm": 4.0, "sensor_mm": [5.76, 4.32]})
+    assert focal_px(cut) == pytest.approx(4.0 / 0.003)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        {},
+        {"focal_mm": 4.0},
+        {"hfov_deg": 90.0, "focal_mm": 4.0, "sensor_mm": [5.76, 3.24]},
+        {"hfov_deg": 180.0},
+        {"focal_mm": 4.0, "sensor_mm": [5.76]},
+    ],
+)
+def test_a_lens_is_told_in_one_way(http, lens):
+    body = {"lens": {**SIZE, **lens}, "prior_pose": POSE}
+    told = problem(http.post("/cameras", json=body), 422, "malformed")
+    assert told["errors"][0]["pointer"].startswith("/lens")
+
+
+def test_a_camera_has_one_lens(http):
+    neither = problem(http.post("/cameras", json={"prior_pose": POSE}), 422, "malformed")
+    assert "intrinsics or lens is needed" in neither["detail"]
+    both = {**CAMERA, "lens": {**SIZE, "hfov_deg": 90.0}}
+    assert "got both" in problem(http.post("/cameras", json=both), 422, "malformed")["detail"]
+
+
+def test_a_lens_is_changed_as_it_was_told(http):
+    made = registered(http, {"hfov_deg": 90.0}, id="c")
+    etag = http.get("/cameras/c").headers["etag"]
+    change = {"lens": {**SIZE, "hfov_deg": 60.0}}
+    answer = http.patch("/cameras/c", json=change, headers={"If-Match": etag})
+    assert focal_px(answer.json()) == pytest.approx(960 / math.tan(math.radians(30)))
+    assert made["intrinsics"] != answer.json()["intrinsics"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "words"),
+    [
+        ({"intrinsics": {**CAMERA["intrinsics"], "fx": 8, "fy": 8}}, "fx", "millimetres"),
+        ({"prior_pose": {"height_m": 784.0, "tilt_deg": 20.0}}, "height_m", "centimetres"),
+        ({"prior_pose": {"height_m": 7840.0, "tilt_deg": 20.0}}, "height_m", "millimetres"),
+        ({"prior_pose": {"height_m": 7.84, "tilt_deg": -20.0}}, "tilt_deg", "sign"),
+    ],
+)
+def test_what_may_be_a_slip_is_asked_and_stored(http, changes, field, words):
+    answer = http.post("/cameras", json={**CAMERA, **changes})
+    assert answer.status_code == 201
+    asked = {each["field"]: each["text"] for each in answer.json()["questions"]}
+    assert words in asked[field]
+    stored = http.get("/cameras/corner").json()
+    assert stored["intrinsics"]["fx"] == {**CAMERA, **changes}["intrinsics"]["fx"]
+
+
+def test_a_good_camera_draws_no_question(http):
+    assert http.post("/cameras", json=CAMERA).json()["questions"] == []
+
+
+def test_the_form_takes_lenses_in_each_way(http):
+    size = {"width": "1920", "height": "1080"}
+    view = preview(http, lens_form="view", hfov_deg="90°", **size, **ANGLES)
+    sensor = preview(
+        http, lens_form="sensor", focal_mm="2,88", sensor_mm="5.76 x 3.24", **size, **ANGLES
+    )
+    assert sensor["errors"]["sensor_mm"].startswith("2 numbers are needed")
+    sensor = preview(
+        http, lens_form="sensor", focal_mm="2,88", sensor_mm="5.76 3.24", **size, **ANGLES
+    )
+    assert view["errors"] == sensor["errors"] == {}
+    assert view["picture"] == sensor["picture"] != ""
+    body = {"lens_form": "view", "hfov_deg": "90", **size, **ANGLES, "id": "by-form"}
+    assert focal_px(http.post("/ui/register", json=body).json()) == pytest.approx(960.0)
+    missing = http.post("/ui/register", json={**body, "hfov_deg": ""})
+    assert problem(missing, 422, "malformed")["errors"][0]["pointer"] == "/hfov_deg"
+
+
+def test_centimetres_in_the_form_are_mended_by_a_button(http):
+    fields = {"width": "1920", "height": "1080", "fx": "1000", "tilt_deg": "20"}
+    worst = preview(http, **fields, height_m="784")["says"][0]
+    assert (worst["field"], worst["value"]) == ("height_m", "7.84")
