@@ -59,6 +59,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
             backlog=_BACKLOG,
             log_level="warning",
             access_log=False,
+            server_header=False,
             proxy_headers=False,  # whom to believe is the guard's to know
             timeout_graceful_shutdown=3,
         )

@@ -16,6 +16,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO
 
+from pydantic import TypeAdapter, ValidationError
+
 from models.regression.recipe import weights_path
 from service.data_dir import (
     DATABASE,
@@ -75,8 +77,13 @@ def read_manifest(data: bytes) -> Manifest:
                 f"backup: its format is {fields['format']}, this release reads up to {FORMAT}; "
                 "restore with the release that wrote it"
             )
-        members = [Member(**member) for member in fields.pop("members")]
-        return Manifest(**fields, members=members)
+        return TypeAdapter(Manifest).validate_json(data, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise StartError(
+            f"backup: its manifest cannot be read ({where}: {first['msg']})"
+        ) from error
     except (ValueError, KeyError, TypeError) as error:
         raise StartError(f"backup: its manifest cannot be read ({error!r})") from error
 

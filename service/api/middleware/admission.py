@@ -128,8 +128,9 @@ async def start_threads(number: int) -> None:
 
 
 _MB = 1024 * 1024
-_TRACKS = re.compile(r"/cameras/[^/]+/tracks|/ui/tracks")
-_SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot")
+# As the router has them: its patterns end with $, before which a line may end.
+_TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)\n?")
+_SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot\n?")
 
 
 class AdmissionMiddleware:

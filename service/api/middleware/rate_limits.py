@@ -11,7 +11,8 @@ from service.settings import Settings
 
 _MOST_KEYS = 10_000
 _BURST_S = 5.0  # of silence that may be made up for at once
-_CAMERA = re.compile(r"/cameras/([^/]+)/tracks")
+# As the router has it: its patterns end with $, before which a line may end.
+_CAMERA = re.compile(r"/cameras/([^/]+)/tracks\n?")
 _FREE = ("/healthz", "/readyz")
 
 

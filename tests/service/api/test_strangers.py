@@ -7,7 +7,7 @@ import pytest
 from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.store.engines.store import Store
-from tests.running import wait_for
+from tests.running import served, wait_for
 from tests.service.api.test_connections import everything, in_process
 
 FEW = {"auth": "on", "max_connections": 12, "connections_per_address": 0}
@@ -84,6 +84,11 @@ def test_a_stranger_sends_a_token_and_no_more(settings, bearer):
         whole = socket.create_connection(address, timeout=10)
         whole.sendall(LOGIN % (16 * 1024) + b"x" * (16 * 1024 - 6))
         assert whole.recv(65536).startswith(b"HTTP/1.1 401 ")
+
+
+def test_no_answer_tells_what_serves_it(tmp_path, migrated):
+    with served(tmp_path, migrated) as running:
+        assert "server" not in running.http.get("/healthz").headers
 
 
 def test_the_answer_to_a_body_too_large_is_read(settings, bearer):

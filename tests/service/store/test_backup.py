@@ -163,6 +163,12 @@ def out_of_the_folder(data):
     return json.dumps(manifest).encode()
 
 
+def wrong_types(data):
+    manifest = json.loads(data)
+    manifest["members"][0]["size"] = [1]
+    return json.dumps(manifest).encode()
+
+
 @pytest.mark.parametrize(
     ("name", "change", "told"),
     [
@@ -173,6 +179,11 @@ def out_of_the_folder(data):
         ("manifest.json", later_schema, "revision 2031_later, newer than this release"),
         ("manifest.json", out_of_the_folder, "'surefoot.sqlite' is not as its manifest"),
         ("manifest.json", lambda data: b"{}", "manifest cannot be read"),
+        (
+            "manifest.json",
+            wrong_types,
+            r"cannot be read .members.0.size: Input should be a valid int",
+        ),
         ("manifest.json", lambda data: None, "is no backup of surefoot"),
     ],
 )
