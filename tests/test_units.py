@@ -9,6 +9,7 @@ EDGES = (
     "service/api/",
     "service/commands/demo",  # a terminal
     "service/degrees.py",
+    "service/formats/",  # of others, who read degrees
     "service/pages/",
     "service/wording/",
 )

@@ -47,7 +47,7 @@ def test_the_charts_have_points_and_zoom_by_buttons(seen):
     seen.get_by_role("button", name="24 hours").click()
     expect(seen.get_by_role("button", name="24 hours")).to_have_attribute("aria-pressed", "true")
     seen.locator("#charts-table summary").click()
-    expect(seen.locator("#charts-values")).to_contain_text("26.99° ±0.34")
+    expect(seen.locator("#charts-values")).to_contain_text("26.99° ±0.36")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
