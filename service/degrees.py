@@ -15,6 +15,8 @@ def in_degrees(body: Mapping[str, Any]) -> dict[str, Any]:
 def _as_read(name: str, value: Any) -> tuple[str, Any]:
     if isinstance(value, Mapping):
         return name, in_degrees(value)
+    if isinstance(value, list) and value and all(isinstance(each, Mapping) for each in value):
+        return name, [in_degrees(each) for each in value]
     if not name.endswith(_RAD):
         return name, value
     if isinstance(value, list | tuple):

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.verdict import Drift, DriftLimits, judge, pose_after
+from models.monitoring.verdict import Drift, DriftLimits, judge
 from models.pose import (
     AlarmRate,
     PosePosterior,
     alarm_chart_result,
-    drift_of,
     estimate_pose,
     observe,
     since_alarm,
@@ -81,19 +80,17 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
     found = since_alarm(found, observed, model, chart)
-    posterior = found.posterior
-    offset = drift_of(posterior, found.fused)
-    verdict = judge(offset, _LIMITS, (), chart)
-    known = {name: _in_unit(name, offset) for name in offset.identifiable}
+    verdict = judge(found.drift, _LIMITS, (), chart)
+    known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
     return Result(
         moved=verdict.drifting,
-        probability=posterior.moved,
-        why=_why(offset, chart),
-        pose=Pose.of(pose_after(offset, model.prior)),
+        probability=found.posterior.moved,
+        why=_why(found.drift, chart),
+        pose=Pose.of(found.pose),
         estimated=tuple(_field(name) for name in known),
         sd={_field(name): sd for name, (_, sd) in known.items()},
         drift={_field(name): by for name, (by, _) in known.items()},
-        posterior=posterior,
+        posterior=found.posterior,
     )
 
 

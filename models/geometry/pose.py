@@ -114,7 +114,7 @@ def pose_from_centre(rotation: Array, centre_m: Array) -> CameraPose:
 
 
 PARAMETERS = ("tilt", "roll", "height", "heading")
-_FIELDS = {"tilt": "tilt_rad", "roll": "roll_rad", "height": "height_m", "heading": "heading_rad"}
+FIELDS = {"tilt": "tilt_rad", "roll": "roll_rad", "height": "height_m", "heading": "heading_rad"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +131,7 @@ class PoseParameters:
 
     def of(self, name: str) -> float:
         """A parameter by its name: in metres for height, else in radians."""
-        return float(getattr(self, _FIELDS[name]))
+        return float(getattr(self, FIELDS[name]))
 
     def __composite_values__(self) -> tuple[float, float, float, float]:
         """The values in the order of the fields, as the store keeps them."""

@@ -42,7 +42,7 @@ from models.pose.pose_fit import (
 )
 from models.pose.power import PEOPLE, smallest_told
 from models.pose.site import CameraSite, assume_site, learn_site
-from models.pose.states import WindowState, is_noticed, state_of
+from models.pose.states import WindowState, state_of
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -88,7 +88,6 @@ __all__ = [
     "count_walks",
     "drift_of",
     "estimate_pose",
-    "is_noticed",
     "learn_site",
     "link_pieces",
     "log_creep",

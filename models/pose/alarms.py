@@ -101,18 +101,14 @@ def since_alarm(
         return found
     if found.fused.paths_changed:  # who walks on none of the paths says nothing of the pose
         return found
-    later = of_tracks(tracks, np.arange(max(chart.track_idx, found.first), tracks.tracks))
+    first = max(chart.track_idx, found.first)
+    later = of_tracks(tracks, np.arange(first, tracks.tracks))
     if later.walkers < FEWEST_WALKERS:
         return found
     fit = pose_fit_of(later, site)
     odds = math.exp(config.CHART_EVIDENCE * (chart.statistic - chart.level))
-    since = replace(
-        found,
-        joint=fit.joint,
-        fused=fit.fused,
-        first=max(chart.track_idx, found.first),
-        moved_prior=raised(found.moved_prior, odds),
-    )
+    prior = raised(found.moved_prior, odds)
+    since = replace(found, joint=fit.joint, fused=fit.fused, first=first, moved_prior=prior)
     borne_out = since.posterior.moved >= LIKELY and not fit.fused.paths_differ
     return since if borne_out else found
 

@@ -65,7 +65,7 @@ class PoseFinding:
         """The posterior over what moved."""
         return pose_posterior(self.fused, self.joint.walking_groups, self.prior, self.moved_prior)
 
-    @property
+    @cached_property
     def drift(self) -> Drift:
         """The drift from the prior pose, with standard deviations."""
         return drift_of(self.posterior, self.fused)

@@ -190,14 +190,16 @@ def seen_parameters(fused: FusedEstimate, walking_groups: int) -> Mask:
     return np.array([enough and (fused.registered or n != "heading") for n in PARAMETERS])
 
 
-def alone_odds(
-    off_sd: Array, variances: Array, seen: Mask, walking_groups: Array, moved_prior: float
+def off_sd_at_odds(
+    log_odds: float, variances: Array, seen: Mask, walking_groups: Array, moved_prior: float
 ) -> Array:
-    """Log odds (S, N) of a near move in one parameter, by estimates that are so far off the prior.
+    """How far off (S, N) in one parameter alone an estimate is, for a near move to be so likely.
+
+    In standard deviations; infinite where none is far enough.
 
     Args:
-        off_sd: in standard deviations (S, N) of one that is off in nothing else.
-        variances: of them (S, N).
+        log_odds: of a move in that parameter against standing.
+        variances: of estimates (S, N).
         seen: of which parameters (4,) tracks say something: S of them.
         walking_groups: of the windows (N,).
         moved_prior: how likely it is, before any track, that the camera has moved.
@@ -206,9 +208,13 @@ def alone_odds(
     alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
     degrees, size = _degrees(walking_groups), int(seen.sum())
     wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
-    fits = np.log1p(off_sd**2 / degrees) - np.log1p(off_sd**2 / wider / degrees)
-    evidence = (degrees + size) / 2 * fits - np.log(wider) / 2
-    return np.asarray(alone[seen, None] - priors[0] + evidence)
+    # With x the squared offset by its degrees of freedom, the two t's are to each other as
+    # (1 + x) to (1 + x / wider): `ratio`, by the odds that are wanted.
+    evidence = log_odds - (alone[seen, None] - priors[0]) + np.log(wider) / 2
+    ratio = np.exp(2 * evidence / (degrees + size))
+    with np.errstate(divide="ignore"):
+        squared = degrees * np.maximum(ratio - 1, 0.0) / np.maximum(1 - ratio / wider, 0.0)
+    return np.asarray(np.sqrt(squared))
 
 
 def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:

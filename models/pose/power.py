@@ -1,5 +1,7 @@
 """The power of a site's tracks: the smallest moves that would be told of so many people."""
 
+import math
+
 import numpy as np
 from scipy.stats import norm
 
@@ -7,7 +9,7 @@ from models.geometry.pose import PARAMETERS
 from models.geometry.rotation import Array
 from models.monitoring.config import BORNE_OUT
 from models.pose import config
-from models.pose.hypotheses import alone_odds, seen_parameters
+from models.pose.hypotheses import off_sd_at_odds, seen_parameters
 from models.pose.pose_fit import FusedEstimate
 
 PEOPLE = np.array([60, 250, 800])
@@ -43,11 +45,7 @@ def smallest_told(
     groups = PEOPLE * walking_groups / people
     precision = np.diag(np.linalg.inv(fused.covariance[np.ix_(seen, seen)]))
     variances = shrunk / precision[:, None]
-    low, high = np.zeros(variances.shape), np.full(variances.shape, _MOST_SD)
-    for _ in range(40):
-        middle = (low + high) / 2
-        odds = alone_odds(middle, variances, seen, groups, moved_prior)
-        told = odds >= np.log(BORNE_OUT / (1 - BORNE_OUT))
-        low, high = np.where(told, low, middle), np.where(told, middle, high)
-    found[seen] = np.where(high < _MOST_SD, (high + _SHORT) * np.sqrt(variances), np.nan)
+    log_odds = math.log(BORNE_OUT / (1 - BORNE_OUT))
+    off_sd = off_sd_at_odds(log_odds, variances, seen, groups, moved_prior)
+    found[seen] = np.where(off_sd < _MOST_SD, (off_sd + _SHORT) * np.sqrt(variances), np.nan)
     return found

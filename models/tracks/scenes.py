@@ -14,8 +14,8 @@ from models.geometry.pose import CameraPose
 from models.geometry.upright import tops_of_boxes
 from models.tracks.trajectory import Trajectory
 
-# How WILDTRACK's notes say that a track's number is a person's and a running one.
 _POSE_FIELDS = ("height_m", "tilt_deg", "roll_deg", "heading_deg", "x_m", "y_m")
+# How WILDTRACK's notes say that a track's number is a person's and a running one.
 _PERSON_IN_HUNDREDS = "track_id//100 = personID"
 
 

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from service.alerts import alerts, silence
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
+    POSE_FIELDS,
     Body,
     Moment,
     Out,
@@ -170,18 +171,10 @@ class EvidenceOut(BaseModel):
     def from_value(cls, evidence: Mapping[str, Any]) -> Self:
         """The body of stored evidence."""
         body = in_degrees(evidence)
-        hypotheses = [in_degrees(each) for each in evidence["hypotheses"]]
-        for each in hypotheses:
-            each["moved"] = [name.replace("_rad", "_deg") for name in each["moved"]]
-        return cls.model_validate(
-            {
-                **body,
-                "from_": from_seconds(body["from_s"]),
-                "to": from_seconds(body["to_s"]),
-                "hypotheses": hypotheses,
-                "rivals": [in_degrees(each) for each in evidence["rivals"]],
-            }
-        )
+        for each in body["hypotheses"]:
+            each["moved"] = [POSE_FIELDS[name] for name in each["moved"]]
+        times = {"from_": from_seconds(body["from_s"]), "to": from_seconds(body["to_s"])}
+        return cls.model_validate(body | times)
 
 
 router = APIRouter(prefix="/alerts", tags=["alerts"])

@@ -18,6 +18,7 @@ from service.api.middleware.dependencies import (
     WriteDep,
 )
 from service.api.schemas import (
+    POSE_FIELDS,
     Body,
     Moment,
     Out,
@@ -41,8 +42,6 @@ from service.settings import Settings
 from service.store.access import name_in
 from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
 from service.wording.times import from_seconds
-
-_FIELDS = {"height": "height_m", "tilt": "tilt_deg", "roll": "roll_deg", "heading": "heading_deg"}
 
 
 class _DecisionBody(Body):
@@ -135,14 +134,12 @@ class ServedPoseOut(BaseModel):
             camera_id=status.camera_id,
             state=status.state,
             pose=PoseOut.from_value(view.pose),
-            estimated=[field for name, field in _FIELDS.items() if name in status.identifiable],
+            estimated=[field for name, field in POSE_FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             moved=None if estimate is None else estimate.moved,
             moved_parameters=_moved_parameters(estimate),
-            rivals=[]
-            if estimate is None
-            else [RivalOut.model_validate(in_degrees(each)) for each in estimate.rivals],
+            rivals=[] if estimate is None else in_degrees({"rivals": estimate.rivals})["rivals"],
             would_notice=_would_notice(estimate),
             since=SinceOut(
                 after=None if estimate is None else estimate.drift_after,
@@ -198,7 +195,7 @@ class History(BaseModel):
 def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None]:
     """The probability that each number of a pose changed; None where nothing is known."""
     shares = {} if estimate is None else estimate.moved_parameters
-    return {field: shares.get(name) for name, field in _FIELDS.items()}
+    return {field: shares.get(name) for name, field in POSE_FIELDS.items()}
 
 
 def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
@@ -208,7 +205,7 @@ def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float]
         field: None
         if known.get(field) is None
         else dict(zip(known["people"], known[field], strict=True))
-        for field in _FIELDS.values()
+        for field in POSE_FIELDS.values()
     }
 
 

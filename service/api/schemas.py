@@ -215,6 +215,13 @@ class PriorPoseBody(Body):
         )
 
 
+# Of each parameter of a pose.
+POSE_FIELDS = {
+    **{"height": "height_m", "tilt": "tilt_deg"},
+    **{"roll": "roll_deg", "heading": "heading_deg"},
+}
+
+
 class RivalOut(BaseModel):
     """Another pose that explains the tracks: its weight among all that do."""
 

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.pose import FIELDS, PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array
 from models.pose import PEOPLE, Hypothesis
 from service.estimation.finding import Finding
 
-_FIELDS = {name: f"{name}_{'m' if name == 'height' else 'rad'}" for name in PARAMETERS}
 _HYPOTHESES = 8
 
 
@@ -58,13 +57,13 @@ def would_notice(power: Array | None, prior: CameraPose) -> dict[str, Any]:
     found: dict[str, Any] = {"people": PEOPLE.tolist()}
     for name, row in zip(PARAMETERS, power, strict=True):
         smallest = prior.height_m * np.expm1(row) if name == "height" else row
-        found[_FIELDS[name]] = smallest.tolist() if np.isfinite(row).all() else None
+        found[FIELDS[name]] = smallest.tolist() if np.isfinite(row).all() else None
     return found
 
 
 def _hypothesis(each: Hypothesis, prior: CameraPose) -> dict[str, Any]:
     return {
-        "moved": [_FIELDS[name] for name in each.moved],
+        "moved": list(each.moved),
         "far": each.far,
         "weight": each.weight,
         "offset": _offset(each.offset, prior),

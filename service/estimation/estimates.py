@@ -101,8 +101,7 @@ def save_estimate(
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
-        kept = alert_evidence(finding, evidence.prior)
-        _update_alerts(session, settings, camera.id, drift, judgement, kept)
+        _update_alerts(session, settings, evidence, finding, drift, judgement)
     session.add(record)
     if finding.last is not None:
         session.merge(finding.last)
@@ -265,12 +264,13 @@ def _at(time_s: float | None) -> datetime | None:
 def _update_alerts(
     session: Session,
     settings: Settings,
-    camera_id: str,
+    evidence: Evidence,
+    finding: Finding,
     drift: Drift,
     judgement: Judgement,
-    evidence: dict[str, Any],
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
+    camera_id = evidence.camera_id
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
     if not verdict.drifting:
         unsure = judgement.state == PoseState.UNSURE
@@ -286,7 +286,7 @@ def _update_alerts(
                 identifiable_drift(drift),
                 None,
                 reasons=judgement.reasons,
-                evidence=evidence,
+                evidence=alert_evidence(finding, evidence.prior),
             )
         return
     # What was named a clock fault stays one until an angle has drifted too.
@@ -306,7 +306,7 @@ def _update_alerts(
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
             changed_after=judgement.after,
-            evidence=evidence,
+            evidence=alert_evidence(finding, evidence.prior),
         )
 
 

@@ -160,11 +160,10 @@ def compute_finding(
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)
-    found = replace(found, moved_prior=evidence.moved_prior)
-    if creep is not None and creep.moved:
-        raised = raised_by_creep(evidence.moved_prior, observed, evidence.alarms_a_year)
-        found = replace(found, moved_prior=raised)
-    found = since_alarm(found, observed, site, reading)
+    moved_prior = evidence.moved_prior
+    if crept:
+        moved_prior = raised_by_creep(moved_prior, observed, evidence.alarms_a_year)
+    found = since_alarm(replace(found, moved_prior=moved_prior), observed, site, reading)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     return Finding(

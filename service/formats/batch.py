@@ -1,12 +1,13 @@
 """Requests that carry tracks as JSON and NDJSON, and what all forms have in common."""
 
 import json
-import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from functools import partial
 from typing import Any
 
+from models.effort import EffortExceededError, check_effort, limited_effort
 from service.errors import FieldError, MalformedError, TooLargeError
 from service.formats.json_body import TrackTexts, read_document, read_track_text
 from service.formats.json_track import read_track
@@ -31,26 +32,23 @@ _LARGE_LINE = 64 * 1024  # bytes
 _MOST_ENDS = 4 * MAX_TRACKS  # of lines, blank ones among them
 
 
-class CpuBudget:
-    """The CPU that one body may take to be read, from now on and in this thread.
+@contextmanager
+def reading() -> Iterator[None]:
+    """Have what reads a body, and looks at `check_effort`, end once it has taken its CPU time.
 
     Counts are bounded before anything is read: this ends what nobody thought of.
+
+    Raises:
+        TooLargeError: it has.
     """
-
-    def __init__(self) -> None:
-        self._end_s = time.thread_time() + MAX_CPU_S
-
-    def check(self) -> None:
-        """Go on, if there is some left.
-
-        Raises:
-            TooLargeError: there is none.
-        """
-        if time.thread_time() > self._end_s:
-            raise TooLargeError(
-                f"body: at most {MAX_CPU_S:g} s of CPU are spent on reading one, got more; "
-                "post a part of the tracks at once"
-            )
+    try:
+        with limited_effort(MAX_CPU_S):
+            yield
+    except EffortExceededError as error:
+        raise TooLargeError(
+            f"body: at most {MAX_CPU_S:g} s of CPU are spent on reading one, got more; "
+            "post a part of the tracks at once"
+        ) from error
 
 
 def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
@@ -168,10 +166,16 @@ def collect(
     Raises:
         TooLargeError: reading them takes too long.
     """
+    with reading():
+        return _collected(items, left_out)
+
+
+def _collected(
+    items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int
+) -> Batch:
     tracks, rejections = [], []
-    budget = CpuBudget()
     for index, raw, read in items:
-        budget.check()
+        check_effort()
         try:
             tracks.append(read())
         except NoPersonError:

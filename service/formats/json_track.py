@@ -28,8 +28,8 @@ LARGEST = 2**53  # up to which floats tell whole numbers apart
 _NAMES = frozenset(
     ("person", "people", "pedestrian", "human", "walker", "man", "woman", "child", "adult")
 )
-# How many numbers a row has: of a point three, or five with its head.
 _LIST = (list, tuple)  # a row; of large bodies, tuples
+# How many numbers a row has: of a point three, or five with its head.
 _FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
 
 

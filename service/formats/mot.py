@@ -8,9 +8,10 @@ from io import BytesIO, TextIOWrapper
 
 import numpy as np
 
+from models.effort import check_effort
 from models.geometry.rotation import Array, Index
 from service.errors import MalformedError, TooLargeError
-from service.formats.batch import CpuBudget, check_count, collect, malformed
+from service.formats.batch import check_count, collect, malformed, reading
 from service.formats.track import (
     COCO_PEOPLE,
     MAX_ID_LENGTH,
@@ -78,7 +79,8 @@ def read_mot(
     """
     if clock.frame_rate_hz is None or clock.started_at_s is None:
         raise malformed("query: frame_rate_hz and started_at are needed with text/csv")
-    lines = _read_lines(body)
+    with reading():
+        lines = _read_lines(body)
     if lines.broken and not lines.tracks:
         raise malformed(f"not MOTChallenge text: {next(iter(lines.broken.values()))}")
     numbers = np.frombuffer(lines.numbers).reshape(-1, len(_NONE))
@@ -138,10 +140,9 @@ def _read_lines(body: bytes) -> _Lines:
         )
     lines = _Lines()
     text = TextIOWrapper(BytesIO(body), encoding="utf-8", errors="replace")
-    budget = CpuBudget()
     for line_no, line in enumerate(text, start=1):
         if line_no % _CHECKED_EVERY == 0:
-            budget.check()
+            check_effort()
         if line.isspace() or (line_no == 1 and line.lower().startswith("frame")):
             continue
         _read_line(lines, line_no, line)

@@ -85,7 +85,7 @@ def evidence_rows(evidence: Mapping[str, Any]) -> list[EvidenceRow]:
     rows = []
     for each in evidence["hypotheses"]:
         if each["weight"] >= _LEAST_WEIGHT:
-            named = [NAMES[name.rpartition("_")[0]] for name in each["moved"]]
+            named = [NAMES[name] for name in each["moved"]]
             what = f"{', '.join(named)} moved" if named else "it stands"
             rows.append(
                 EvidenceRow(

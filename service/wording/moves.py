@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from models.geometry.ground import Misplacement
-from models.geometry.pose import ANGLES, CameraPose, PoseParameters
+from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
 from service.store.estimates import EstimateRecord
@@ -172,7 +172,7 @@ def _height_words(estimate: EstimateRecord) -> str:
 def _least_told(estimate: EstimateRecord, name: str) -> float | None:
     """The smallest move of a number that `TOLD_BY` people would tell, as it is shown."""
     notice = estimate.would_notice
-    smallest = notice.get(f"{name}_{'m' if name == 'height' else 'rad'}")
+    smallest = notice.get(FIELDS[name])
     if smallest is None:
         return None
     return _shown(smallest[notice["people"].index(TOLD_BY)], name)

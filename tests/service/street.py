@@ -19,6 +19,7 @@ from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.estimate import run_estimate
 from studies.simulation.lanes import Lane, SiteConfig, draw_lanes, walk_site
+from tests.conftest import CAMERA
 
 LENS = Intrinsics(width=1280, height=720, fx=1100, fy=1100, cx=639.5, cy=359.5)
 PRIOR = CameraPose(
@@ -29,6 +30,15 @@ KNOCKED = CameraPose(
 )
 
 LANES = SiteConfig(aside_m=0.8, standing_share=0.0)
+
+
+def known_street(http: Any, settings: Any, people: int) -> "Street":
+    """A street of lanes whose reference has been learned of so many people."""
+    http.post("/cameras", json={**CAMERA, "reference_tracks": people}).raise_for_status()
+    street = Street(http, settings)
+    street.keep_to_lanes(PRIOR, people)
+    assert street.look()["reference"]["state"] == "ready"
+    return street
 
 
 def lately_s() -> float:

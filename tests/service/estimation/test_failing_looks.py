@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 
 import pytest
 from sqlalchemy import text, update
@@ -23,7 +24,7 @@ from service.training import begin_training, publish_model
 from service.workers.estimate import run_estimate
 from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA
-from tests.service.street import KNOCKED, PRIOR, Street
+from tests.service.street import KNOCKED, PRIOR, Street, known_street
 from tests.stores.queued import queued_cameras
 
 WANTED = 60
@@ -32,15 +33,7 @@ WANTED = 60
 @pytest.fixture
 def street(learned):
     """A camera whose reference is learned."""
-
-    def make(http, settings):
-        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-        street = Street(http, settings)
-        street.keep_to_lanes(PRIOR, WANTED)
-        assert street.look()["reference"]["state"] == "ready"
-        return street
-
-    return learned("failing-looks", make)
+    return learned("failing-looks", partial(known_street, people=WANTED))
 
 
 @pytest.fixture

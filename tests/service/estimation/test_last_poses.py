@@ -9,8 +9,7 @@ from models.pose import warm_start_from_bytes
 from service.estimation.evidence import load_evidence
 from service.estimation.finding import basis_of, begin_of, compute_finding
 from service.store.references import LastPoseRecord
-from tests.conftest import CAMERA
-from tests.service.street import KNOCKED, PRIOR, Street
+from tests.service.street import KNOCKED, PRIOR, known_street
 
 
 def evidence_of(street):
@@ -21,11 +20,7 @@ def evidence_of(street):
 @pytest.fixture
 def laned(http, settings):
     """A street with lanes whose reference is learned."""
-    http.post("/cameras", json={**CAMERA, "reference_tracks": 100}).raise_for_status()
-    street = Street(http, settings)
-    street.keep_to_lanes(PRIOR, 100)
-    assert street.look()["reference"]["state"] == "ready"
-    return street
+    return known_street(http, settings, 100)
 
 
 def test_the_next_estimate_begins_at_the_last_and_comes_to_the_same(laned):

@@ -1,5 +1,7 @@
 """A look that has too much to do goes on without the tracks that are to blame, and says so."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from sqlalchemy import update
@@ -12,8 +14,7 @@ from service.store.cameras import CameraRecord
 from service.store.look_budget import LookBudget, TrackSize
 from service.store.windows import WindowBounds
 from service.workers.estimate import run_estimate
-from tests.conftest import CAMERA
-from tests.service.street import KNOCKED, PRIOR, Street
+from tests.service.street import KNOCKED, known_street
 
 WANTED = 60
 
@@ -21,15 +22,7 @@ WANTED = 60
 @pytest.fixture
 def street(learned):
     """A camera whose reference is learned."""
-
-    def make(http, settings):
-        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-        street = Street(http, settings)
-        street.keep_to_lanes(PRIOR, WANTED)
-        assert street.look()["reference"]["state"] == "ready"
-        return street
-
-    return learned("look-budget", make)
+    return learned("look-budget", partial(known_street, people=WANTED))
 
 
 def linger(street, count):

@@ -11,8 +11,7 @@ from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.store import references
 from service.store.references import FlowMapRecord
-from tests.conftest import CAMERA
-from tests.service.street import PRIOR, Street
+from tests.service.street import PRIOR, known_street
 
 WANTED = 120
 
@@ -22,11 +21,7 @@ def street(learned):
     """A street of lanes whose reference and map are learned."""
 
     def make(http, settings):
-        http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
-        street = Street(http, settings.model_copy(update={"flow_unsure_tracks": 0}))
-        street.keep_to_lanes(PRIOR, WANTED)
-        assert street.look()["reference"]["state"] == "ready"
-        return street
+        return known_street(http, settings.model_copy(update={"flow_unsure_tracks": 0}), WANTED)
 
     return learned("paths", make)
 

@@ -7,8 +7,6 @@ import base64
 import os
 import pickle
 import re
-import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from service.commands.migrate import migrate
 from service.job_queue import JOBS_FORM
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
+from tests.service.workers.programs import ESTIMATES, run
 from tests.stores.databases import ask
 
 PLANT = (
@@ -44,57 +43,28 @@ def planted(path):
     return [statement.format(job) for statement in PLANT]
 
 
-PROGRAM = """
-import time
-from datetime import UTC, datetime
-
-from dbos import DBOS
-
-from service.job_queue import ESTIMATE_JOB, JobQueue, engine_config
-from service.settings import Settings
-from service.store.engines.store import Store
-
-settings = Settings()
-store = Store(settings)
-queue = JobQueue(store.engine)
-
-def ask(camera_id):
-    with store.write() as session:
-        queue.enqueue_estimate(session, camera_id, datetime.now(UTC))
-
+PROGRAM = (
+    ESTIMATES
+    + """
 def rest():
     while DBOS.list_workflows(status=["ENQUEUED", "PENDING"], load_input=False):
         time.sleep(0.05)
 
-ask("honest")
-DBOS(config=engine_config(settings, "w"))
-ran = []
-
-@DBOS.workflow(name=ESTIMATE_JOB)
-def estimate(camera_id):
-    ran.append(camera_id)
-
-DBOS.launch()
-DBOS.register_queue(ESTIMATE_JOB, worker_concurrency=1, polling_interval_sec=0.05)
+ask("honest", datetime.now(UTC))
+launch()
 rest()
-ask("corner")  # whose place the planted one held
+ask("corner", datetime.now(UTC))  # whose place the planted one held
 rest()
 print(ran, {one.workflow_id: one.status for one in DBOS.list_workflows()}["planted"])
 DBOS.destroy()
 """
+)
 
 
 def test_a_planted_pickle_is_not_read_and_holds_up_nobody(settings, tmp_path):
     for statement in planted(tmp_path / "pwned"):
         ask(settings, statement)
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
-        env=settings.as_environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = run(PROGRAM, settings)
     assert done.stdout == "['honest', 'corner'] ERROR\n", done.stderr
     assert "it is not read" in done.stderr
     assert not (tmp_path / "pwned").exists()
