@@ -1,0 +1,139 @@
+"""What adapters hand on: detections, ends and whole tracks, or the reason why there is none."""
+
+import math
+from array import array
+from typing import Any, NamedTuple, TypeAlias
+
+Box: TypeAlias = tuple[float, float, float, float]
+
+MAX_MESSAGE_BYTES = 1024 * 1024  # of one message of one source: 64 Frigate paths of an hour
+MAX_TEXT = 200  # characters of an id or a camera's name, as the service takes them
+NORMALISED = (1.0, 1.0)
+_FARTHEST = 1e9
+
+
+class MessageError(Exception):
+    """A message that is not what its source's format says; `code` is stable, `detail` for people.
+
+    Codes: `too_large`, `malformed`, `not_finite`.
+    """
+
+    def __init__(self, code: str, detail: str) -> None:
+        super().__init__(detail)
+        self.code = code
+        self.detail = detail
+
+
+class Detection(NamedTuple):
+    """One object in one frame: its box (x1, y1, x2, y2), y down, in a picture of that size.
+
+    `size` is (width, height) in pixels that count from 0 at the centre of the first, `NORMALISED`
+    where numbers are shares of the picture, None where the source does not say. `time_s` is since
+    the Unix epoch by the source's clock.
+    """
+
+    camera: str
+    time_s: float
+    track_id: str
+    label: str | None
+    box: Box
+    size: tuple[float, float] | None
+
+
+class Ended(NamedTuple):
+    """Word of a source that an object will not be seen again, or not by this id."""
+
+    camera: str
+    track_id: str
+
+
+class WholeTrack(NamedTuple):
+    """A track from its first to its last point, ready to be posted.
+
+    `rows` are flat, row after row: of `points` time, u, v of the foot; of `boxes` time and box.
+    """
+
+    camera: str
+    track_id: str
+    label: str | None
+    form: str
+    rows: "array[float]"
+    size: tuple[float, float] | None
+
+    @property
+    def columns(self) -> int:
+        """Numbers of a row."""
+        return 5 if self.form == "boxes" else 3
+
+    def to_json(self) -> dict[str, Any]:
+        """The track as it stands in a body of `POST /cameras/{id}/tracks`."""
+        step = self.columns
+        rows = [list(self.rows[at : at + step]) for at in range(0, len(self.rows), step)]
+        track: dict[str, Any] = {"id": self.track_id, self.form: rows}
+        return track if self.label is None else track | {"class": self.label}
+
+
+Found: TypeAlias = Detection | Ended | WholeTrack
+
+
+def body_of(tracks: list[WholeTrack], source: str) -> dict[str, Any]:
+    """The body of a post of tracks of one camera and one size."""
+    size = tracks[0].size
+    assert all(track[0] == tracks[0].camera and track.size == size for track in tracks)
+    body: dict[str, Any] = {"source": source, "tracks": [track.to_json() for track in tracks]}
+    if size == NORMALISED:
+        return body | {"normalised": True}
+    return body if size is None else body | {"size": list(size)}
+
+
+def number(value: Any, what: str) -> float:
+    """A finite number of a message; text of one, as XML and some JSON have it, counts.
+
+    Raises:
+        MessageError: it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise MessageError("malformed", f"{what}: a number is needed, got {value!r:.40}")
+    try:
+        found = float(value)
+    except (ValueError, OverflowError) as error:
+        raise MessageError("malformed", f"{what}: a number is needed, got {value!r:.40}") from error
+    if not math.isfinite(found) or abs(found) > 1e3 * _FARTHEST:
+        raise MessageError("not_finite", f"{what}: a finite number is needed, got {value!r:.40}")
+    return found
+
+
+def text(value: Any, what: str) -> str:
+    """A name or an id of a message, as text.
+
+    Raises:
+        MessageError: it is neither text of 1 to 200 characters nor a whole number.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise MessageError("malformed", f"{what}: text is needed, got {value!r:.40}")
+    if isinstance(value, int) and abs(value) > 2**64:
+        raise MessageError("malformed", f"{what}: a whole number of 64 bits at most is needed")
+    found = str(value)
+    if not 1 <= len(found) <= MAX_TEXT or "\0" in found or not _is_whole(found):
+        raise MessageError(
+            "malformed",
+            f"{what}: 1 to {MAX_TEXT} characters are needed, got {len(found)}: {found!r:.40}",
+        )
+    return found
+
+
+def check_size(message: bytes) -> None:
+    """Refuse a message that is too large to be looked at.
+
+    Raises:
+        MessageError: it is.
+    """
+    if len(message) > MAX_MESSAGE_BYTES:
+        raise MessageError(
+            "too_large",
+            f"at most {MAX_MESSAGE_BYTES} bytes a message are taken, got {len(message)}",
+        )
+
+
+def _is_whole(found: str) -> bool:
+    return not any("\ud800" <= character <= "\udfff" for character in found)

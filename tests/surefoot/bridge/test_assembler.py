@@ -1,0 +1,160 @@
+"""Frames in, whole tracks out: nothing lost, nothing twice, and no more memory than was said."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from surefoot.bridge.assembler import Assembler, FullError, StateError
+from surefoot.bridge.values import NORMALISED, Detection, Ended, body_of
+
+T0 = 1_700_000_000.0
+
+
+def seen(track_id="7", at=0.0, camera="yard", size=(1280.0, 720.0), label="person"):
+    box = (100.0 + at, 50.0, 140.0 + at, 200.0)
+    return Detection(camera, T0 + at, track_id, label, box, size)
+
+
+def walk(assembler, track_id="7", count=6, start=0.0, **others):
+    for n in range(count):
+        assembler.add(seen(track_id, start + n * 0.5, **others), T0 + start + n * 0.5)
+
+
+def test_an_end_finishes_a_track_and_a_body_says_it_as_the_service_takes_it():
+    assembler = Assembler()
+    walk(assembler)
+    assembler.add(Ended("yard", "7"), T0 + 3)
+    (track,) = assembler.waiting(100)
+    body = body_of([track], "axis")
+    assert body["size"] == [1280.0, 720.0]
+    assert body["tracks"][0]["class"] == "person"
+    assert body["tracks"][0]["boxes"][1] == [T0 + 0.5, 100.5, 50.0, 140.5, 200.0]
+    assert len(body["tracks"][0]["boxes"]) == 6
+    assembler.confirm([track])
+    assert assembler.waiting(100) == []
+
+
+def test_a_silence_finishes_by_the_clock_of_who_assembles_and_by_the_sources():
+    assembler = Assembler(silence_s=5)
+    walk(assembler)
+    assembler.tick(T0 + 7.4)
+    assert assembler.open_tracks == 1
+    assembler.tick(T0 + 7.5)
+    assert assembler.open_tracks == 0
+    # After an outage two people of one id come within a second of ours.
+    walk(assembler, "8")
+    assembler.add(seen("8", 3600), T0 + 3)
+    assert [len(track.rows) // 5 for track in assembler.waiting(9)] == [6, 6]
+    assert assembler.open_tracks == 1
+
+
+def test_what_comes_twice_or_out_of_turn_is_there_once_in_order():
+    assembler = Assembler()
+    for at in (0.0, 1.0, 0.5, 1.0, 1.5):
+        assembler.add(seen(at=at), T0)
+    assembler.finish_all()
+    (track,) = assembler.waiting(1)
+    assert track.rows[::5].tolist() == [T0, T0 + 0.5, T0 + 1, T0 + 1.5]
+
+
+def test_what_a_broker_sends_again_after_a_crash_makes_no_second_track():
+    assembler = Assembler()
+    walk(assembler)
+    assembler.add(Ended("yard", "7"), T0)
+    restarted = Assembler()
+    restarted.restore(assembler.state())
+    walk(restarted)
+    restarted.add(Ended("yard", "7"), T0)
+    assert restarted.open_tracks == 0
+    assert len(restarted.waiting(9)) == 1
+
+
+def test_a_stream_of_another_size_is_another_track():
+    assembler = Assembler()
+    walk(assembler)
+    walk(assembler, start=3, size=NORMALISED)
+    assembler.finish_all()
+    (first,) = assembler.waiting(9)
+    assembler.confirm([first])
+    (second,) = assembler.waiting(9)
+    assert body_of([second], "x")["normalised"] is True
+
+
+@pytest.mark.parametrize("bound", [{"max_tracks": 3}, {"max_points": 18}])
+def test_the_one_unheard_longest_is_finished_where_there_is_no_room(bound):
+    assembler = Assembler(**bound)
+    for track_id in "abc":
+        walk(assembler, track_id)
+    assembler.add(seen("a", 3.0), T0 + 3)  # heard of again: b is the longest unheard
+    assembler.add(seen("d", 3.0), T0 + 3)
+    assert [track.track_id for track in assembler.waiting(9)] == ["b"]
+
+
+def test_it_takes_nothing_while_too_much_waits_and_goes_on_once_that_is_confirmed():
+    assembler = Assembler(max_tracks=2)
+    for track_id in "ab":
+        walk(assembler, track_id)
+        assembler.add(Ended("yard", track_id), T0)
+    with pytest.raises(FullError, match=r"2 tracks of 12 points wait"):
+        assembler.add(seen("c"), T0)
+    assembler.confirm(assembler.waiting(1))
+    assembler.add(seen("c"), T0)
+    assert assembler.open_tracks == 1
+
+
+@pytest.mark.parametrize("saved", [b"", b"x", b"\x94\x01\x90\x91\x96", b"\x94\x02\x90\x90\x90"])
+def test_a_broken_state_is_refused_and_changes_nothing(saved):
+    assembler = Assembler()
+    walk(assembler)
+    with pytest.raises(StateError):
+        assembler.restore(saved)
+    assert assembler.open_tracks == 1
+
+
+_EVENTS = st.lists(
+    st.tuples(
+        st.sampled_from(("seen", "end", "tick", "restart", "post")),
+        st.sampled_from("abcd"),
+        st.sampled_from(("yard", "gate")),
+    ),
+    max_size=80,
+)
+
+
+@given(_EVENTS, st.integers(1, 4), st.integers(1, 12))
+def test_whatever_happens_each_detection_comes_out_once_and_the_bounds_hold(
+    events, max_tracks, max_points
+):
+    bounds = {"max_tracks": max_tracks, "max_points": max_points}
+    assembler, at, added, out = Assembler(**bounds), 0.0, set(), []
+
+    def post(most=3):
+        tracks = assembler.waiting(most)
+        out.extend(
+            (track.camera, track.track_id, time_s) for track in tracks for time_s in track.rows[::5]
+        )
+        assembler.confirm(tracks)
+        return tracks
+
+    for kind, track_id, camera in events:
+        at += 0.5
+        if kind == "seen" and not assembler.full:
+            assembler.add(seen(track_id, at, camera), T0 + at)
+            added.add((camera, track_id, T0 + at))
+        elif kind == "end" and not assembler.full:
+            assembler.add(Ended(camera, track_id), T0 + at)
+        elif kind == "tick":
+            assembler.tick(T0 + at)
+        elif kind == "restart":
+            saved = assembler.state()
+            assembler = Assembler(**bounds)
+            assembler.restore(saved)
+            assert assembler.state() == saved
+        elif kind == "post":
+            post()
+        assert assembler.open_tracks <= max_tracks
+    assembler.finish_all()
+    while post():
+        pass
+    assert len(out) == len(set(out))
+    assert set(out) == added
