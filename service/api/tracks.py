@@ -26,6 +26,7 @@ from service.errors import MalformedError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
+from service.formats.scaling import read_size
 from service.formats.track import Batch, Clock, Limits
 from service.store.cameras import Picture
 
@@ -36,6 +37,20 @@ def _rows(what: str, numbers: int) -> dict[str, Any]:
 
 
 # A track takes one of the four forms.
+_SIZE: dict[str, Any] = {
+    "size": {
+        "type": "array",
+        "items": {"type": "number", "exclusiveMinimum": 0},
+        "minItems": 2,
+        "maxItems": 2,
+        "description": "[width, height] of the picture that the numbers are of, "
+        "where that is not the camera's own",
+    },
+    "normalised": {
+        "type": "boolean",
+        "description": "true: the numbers are shares of the picture, 0 to 1",
+    },
+}
 DESCRIBED_TRACK: dict[str, Any] = {
     "type": "object",
     "required": ["id"],
@@ -53,6 +68,7 @@ DESCRIBED_TRACK: dict[str, Any] = {
             "type": ["string", "number", "null"],
             "description": "what it is of, by name or COCO's number: no person is left out",
         },
+        **_SIZE,
     },
 }
 
@@ -67,12 +83,17 @@ class RejectionOut(Out):
 
 
 class ReceiptOut(Out):
-    """What became of the posted tracks; where it stands, `left_out` of them were of no person."""
+    """What became of the posted tracks.
+
+    Where they stand, `left_out` of them were of no person, and `ignored` names unknown fields: of
+    a body over 1 MiB the first of its own and of each track.
+    """
 
     accepted: int
     duplicates: int
     rejected: list[RejectionOut] = Field(validation_alias="rejections")
     left_out: int = 0
+    ignored: list[str] = Field(default_factory=list)
 
 
 _LARGE = 256 * 1024  # bytes; several that are read at once would only keep each other up
@@ -89,6 +110,7 @@ _DESCRIBED_BODY = {
                         "source": {"type": "string"},
                         "frame_rate_hz": {"type": "number"},
                         "started_at": {"type": "string", "format": "date-time"},
+                        **_SIZE,
                         "tracks": {"type": "array", "items": DESCRIBED_TRACK},
                     },
                 }
@@ -110,6 +132,8 @@ class Posted:
     frame_rate_hz: float | None = None
     started_at: str | None = None
     classes: str | None = None
+    size: str | None = None
+    normalised: bool | None = None
 
 
 async def posted(
@@ -119,6 +143,10 @@ async def posted(
     frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
     started_at: str | None = None,
     classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
+    size: Annotated[
+        str | None, Query(description="width,height of the picture that the numbers are of")
+    ] = None,
+    normalised: Annotated[bool | None, Query(description="numbers are shares, 0 to 1")] = None,
 ) -> Posted:
     """A request, to be read in the route's own thread."""
     return Posted(
@@ -128,6 +156,8 @@ async def posted(
         frame_rate_hz=frame_rate_hz,
         started_at=started_at,
         classes=classes,
+        size=size,
+        normalised=normalised,
     )
 
 
@@ -146,6 +176,11 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         now_s=time.time(),
         max_ahead_s=state.settings.max_ahead_s,
     )
+    try:
+        size = None if came.size is None else read_size(came.size)
+        limits = limits.of_size(size, came.normalised)
+    except ValueError as error:
+        raise MalformedError.of_field(*str(error).split(": ", 1)) from error
     started_at_s = None
     if came.started_at is not None:
         started_at_s = formats.read_time(came.started_at)

@@ -137,6 +137,7 @@ class Receipt:
     duplicates: int
     rejections: tuple[Rejection, ...]
     left_out: int
+    ignored: tuple[str, ...]
 
 
 def receive_tracks(
@@ -207,6 +208,7 @@ def receive_tracks(
         duplicates=len(batch.tracks) - added,
         rejections=batch.rejections,
         left_out=batch.left_out,
+        ignored=batch.ignored,
     )
 
 

@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from models.effort import EffortExceededError, check_effort, limited_effort
 from service.errors import FieldError, MalformedError, TooLargeError
-from service.formats.json_body import TrackTexts, read_document, read_track_text
-from service.formats.json_track import read_track
+from service.formats.json_body import DOCUMENT_FIELDS, TrackTexts, read_document, read_track_text
+from service.formats.json_track import TRACK_FIELDS, read_track
 from service.formats.track import (
     MAX_ID_LENGTH,
     MAX_TRACKS,
@@ -27,6 +28,7 @@ from service.formats.track import (
 
 DEFAULT_SOURCE = "unnamed"
 _FAR_S = 1e12
+MOST_IGNORED = 20  # names of unknown fields that an answer says
 MAX_CPU_S = 10.0  # of reading one body: the largest honest ones take one or two
 _LARGE_LINE = 64 * 1024  # bytes
 _MOST_ENDS = 4 * MAX_TRACKS  # of lines, blank ones among them
@@ -54,6 +56,8 @@ def reading() -> Iterator[None]:
 def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
     """The tracks of `{"source", "tracks": [...], "frame_rate_hz"?, "started_at"?}`.
 
+    `size` and `normalised` in it are of every track that does not say its own.
+
     Args:
         body: the request's body.
         clock: what to use where the body does not say it.
@@ -80,9 +84,16 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
         started_at_s=clock.started_at_s if start is None else read_time(start),
     )
     try:
+        limits = limits.of_size(document.get("size"), document.get("normalised"))
+    except ValueError as error:
+        raise MalformedError.of_field(*str(error).split(": ", 1)) from error
+    try:
         return collect(
-            (index, raw, partial(read_track, raw, source, clock, limits))
-            for index, raw in enumerate(tracks)
+            (
+                (index, raw, partial(read_track, raw, source, clock, limits))
+                for index, raw in enumerate(tracks)
+            ),
+            ignored=[name for name in document if name not in DOCUMENT_FIELDS],
         )
     except (ValueError, RecursionError) as error:
         raise malformed(f"not JSON: {error}") from error
@@ -159,23 +170,33 @@ def read_time(value: Any) -> float:
 
 
 def collect(
-    items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int = 0
+    items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]],
+    left_out: int = 0,
+    ignored: Iterable[str] = (),
 ) -> Batch:
     """The batch of tracks, each given with its index, what it was and how to read it.
+
+    Fields of tracks that are unknown join those that are `ignored` already.
 
     Raises:
         TooLargeError: reading them takes too long.
     """
     with reading():
-        return _collected(items, left_out)
+        return _collected(items, left_out, ignored)
 
 
 def _collected(
-    items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]], left_out: int
+    items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]],
+    left_out: int,
+    ignored: Iterable[str],
 ) -> Batch:
     tracks, rejections = [], []
+    names = dict.fromkeys(islice(map(brief_name, ignored), MOST_IGNORED))
     for index, raw, read in items:
         check_effort()
+        if isinstance(raw, dict) and not raw.keys() <= TRACK_FIELDS:
+            unknown = islice(sorted(raw.keys() - TRACK_FIELDS), MOST_IGNORED - len(names))
+            names |= dict.fromkeys(f"tracks/*/{brief_name(name)}" for name in unknown)
         try:
             tracks.append(read())
         except NoPersonError:
@@ -192,7 +213,17 @@ def _collected(
                     detail=refused.detail,
                 )
             )
-    return Batch(tracks=tuple(tracks), rejections=tuple(rejections), left_out=left_out)
+    return Batch(
+        tracks=tuple(tracks),
+        rejections=tuple(rejections),
+        left_out=left_out,
+        ignored=tuple(names),
+    )
+
+
+def brief_name(name: str) -> str:
+    """The name of a field as far as an answer says it."""
+    return name[:80].encode(errors="replace").decode()
 
 
 def check_count(count: int) -> None:

@@ -23,6 +23,8 @@ MAX_TRACK_BYTES = 2 * 1024 * 1024  # more than the most points of a track need
 # body is taken apart, a number that no float holds stands for it.
 _STAND_INS = ((b"NaN", b"9e991"), (b"Infinity", b"9e992"))
 _ABSENT = Raw(b"")
+_SMALL_FIELDS = ("source", "frame_rate_hz", "started_at", "size", "normalised")
+DOCUMENT_FIELDS = frozenset((*_SMALL_FIELDS, "tracks"))
 _raw = partial(msgspec.field, default=_ABSENT)
 # An array that is read into a struct is skipped from where the struct ends; that of a list is not.
 _Tracks = msgspec.defstruct(
@@ -30,6 +32,7 @@ _Tracks = msgspec.defstruct(
 )
 _Rows = list[tuple[float, ...]] | UnsetType
 _Kind = TypeVar("_Kind")
+_UNKNOWN = re.compile(r"^Object contains unknown field `(.*)`$", re.DOTALL)
 _PLACE = re.compile(r" - at `\$\.?(.*)`$")
 
 
@@ -40,6 +43,12 @@ class _Document(msgspec.Struct):
     source: Raw = _raw()
     frame_rate_hz: Raw = _raw()
     started_at: Raw = _raw()
+    size: Raw = _raw()
+    normalised: Raw = _raw()
+
+
+class _KnownDocument(_Document, forbid_unknown_fields=True):
+    pass
 
 
 class _Named(msgspec.Struct):
@@ -52,6 +61,12 @@ class _Track(_Named, gc=False):
     boxes: _Rows = UNSET
     frames: _Rows = UNSET
     frame_boxes: _Rows = UNSET
+    size: tuple[float, float] | None = None
+    normalised: bool | None = None
+
+
+class _KnownTrack(_Track, gc=False, forbid_unknown_fields=True):
+    pass
 
 
 _FORMS = ("points", "boxes", "frames", "frame_boxes")
@@ -82,6 +97,8 @@ class TrackTexts:
 
 def read_document(body: bytes) -> Any:
     """The JSON value of a body; of a large object its known fields, `tracks` as a `TrackTexts`.
+
+    Of the unknown fields of a large object the first is there, too, without its value.
 
     Raises:
         ValueError: it is no JSON. Of `TrackTexts` each track may raise it, too.
@@ -123,11 +140,12 @@ def read_track_text(text: bytes | Raw, *, stand_ins: bool = False) -> Any:
         if size > MAX_TRACK_BYTES:
             words = f"a track of at most {MAX_TRACK_BYTES} bytes is taken, got {size}"
             return UnreadableTrack(id=name, code="too_many_points", detail=words)
-        track = _decode(text, _Track)
+        track, unknown = _decode_naming(text, _KnownTrack, _Track)
     except msgspec.ValidationError as error:
         return _unreadable(name, str(error))
     rows = {form: found for form in _FORMS if (found := getattr(track, form)) is not UNSET}
-    return {"id": name, "class": track.kind, **rows}
+    given = {"size": track.size, "normalised": track.normalised}
+    return {"id": name, "class": track.kind, **given, **rows, **unknown}
 
 
 def _decode(text: bytes | Raw, kind: type[_Kind]) -> _Kind:
@@ -137,6 +155,19 @@ def _decode(text: bytes | Raw, kind: type[_Kind]) -> _Kind:
         raise
     except msgspec.DecodeError as error:
         raise ValueError(str(error)) from error
+
+
+def _decode_naming(
+    text: bytes | Raw, strict: type[_Kind], lenient: type[_Kind]
+) -> tuple[_Kind, dict[str, Any]]:
+    """What a text says, and the first field of it that is unknown, without what it says."""
+    try:
+        return _decode(text, strict), {}
+    except msgspec.ValidationError as error:
+        found = _UNKNOWN.match(str(error))
+        if found is None:
+            raise
+        return _decode(text, lenient), {found[1]: None}
 
 
 def _unreadable(name: str | int | None, words: str) -> UnreadableTrack:
@@ -153,13 +184,12 @@ def _unreadable(name: str | int | None, words: str) -> UnreadableTrack:
 
 def _document(body: bytes, *, stand_ins: bool) -> dict[str, Any]:
     try:
-        found = _decode(body, _Document)
+        found, document = _decode_naming(body, _KnownDocument, _Document)
     except msgspec.ValidationError as error:
         if "$.tracks" not in str(error):
             return {}
         raise MalformedError.of_field("tracks", "a list of tracks is needed") from error
-    document: dict[str, Any] = {}
-    for name in ("source", "frame_rate_hz", "started_at"):
+    for name in _SMALL_FIELDS:
         raw = memoryview(getattr(found, name))
         if len(raw) > _MOST_OTHER:
             raise TooLargeError(f"{name}: at most {_MOST_OTHER} bytes are taken, got {len(raw)}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from models.geometry.rotation import Array
 from service.formats.json_body import UnreadableTrack
+from service.formats.scaling import FIELDS as SIZE_FIELDS
 from service.formats.track import (
     COCO_PEOPLE,
     FOOT_COLUMNS,
@@ -31,10 +32,13 @@ _NAMES = frozenset(
 _LIST = (list, tuple)  # a row; of large bodies, tuples
 # How many numbers a row has: of a point three, or five with its head.
 _FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
+TRACK_FIELDS = frozenset((*_FORMS, *SIZE_FIELDS, "id", "class"))
 
 
 def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
     """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
+
+    `size` or `normalised` in it is of it alone; else what its body says counts.
 
     Raises:
         TrackRejectedError: with a code, the field, the limit and the value received.
@@ -51,7 +55,11 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
             f"one of points, boxes, frames, frame_boxes is needed, got {given or 'none'}",
         )
     form = given[0]
-    rows = _numbers(form, raw[form], _FORMS[form])
+    try:
+        limits = limits.of_size(raw.get("size"), raw.get("normalised"))
+    except ValueError as error:
+        refuse(str(error))
+    rows = limits.in_picture(_numbers(form, raw[form], _FORMS[form]))
     if form.startswith("frame"):
         if clock.frame_rate_hz is None or clock.started_at_s is None:
             raise TrackRejectedError(

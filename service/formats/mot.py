@@ -64,13 +64,13 @@ def read_mot(
 ) -> Batch:
     """The tracks of MOTChallenge text: `frame,id,left,top,width,height,conf,...` a line.
 
-    Frames and pixels count from 1 there: a frame's time is `started_at + (frame - 1) /
-    frame_rate_hz`. Lines of 8 and 9 columns have a class in the eighth, -1 for none. Who is a
-    person: in ground truth (column 9 is a visibility, 0 to 1) classes 1 and 7, else class 0, as
-    detectors number them; with `classes`, those, however many columns there are. Lines of other
-    classes, and lines with conf 0, which that format marks "ignore", are left out and counted. A
-    line that cannot be read costs its own track and no other; a rejection's index is the place of
-    its track by first appearance.
+    Frames and pixels count from 1 there, shares of a picture from 0: a frame's time is
+    `started_at + (frame - 1) / frame_rate_hz`. Lines of 8 and 9 columns have a class in
+    the eighth, -1 for none. Who is a person: in ground truth (column 9 is a visibility, 0 to 1)
+    classes 1 and 7, else class 0, as detectors number them; with `classes`, those, however many
+    columns there are. Lines of other classes, and lines with conf 0, which that format marks
+    "ignore", are left out and counted. A line that cannot be read costs its own track and no other;
+    a rejection's index is the place of its track by first appearance.
 
     Raises:
         MalformedError: the rate or the start is missing, no line at all can be read, or none of a
@@ -91,7 +91,7 @@ def read_mot(
     kept = (cells <= _CONF + 1) | (numbers[:, _CONF] != 0)
     kept &= (found == _NONE_GIVEN) | np.isin(found, sorted(people))
     left_out = len(kept) - int(kept.sum())
-    boxes = _boxes(numbers[kept], clock)
+    boxes = _boxes(numbers[kept], clock, first=0 if limits.normalised else 1)
     of = np.frombuffer(lines.tracks, dtype=np.int64)[kept]
     ordered = np.lexsort((boxes[:, 0], of))
     boxes = boxes[ordered]
@@ -108,7 +108,7 @@ def read_mot(
     def read(track_id: str) -> IncomingTrack:
         if track_id in lines.broken:
             refuse(lines.broken[track_id])
-        return check_track(track_name(track_id), source, spans[track_id], limits)
+        return check_track(track_name(track_id), source, limits.in_picture(spans[track_id]), limits)
 
     return collect(
         (
@@ -187,13 +187,14 @@ def _classes_of(numbers: Array, cells: Index, *, given: bool) -> Array:
     return np.where(has, numbers[:, _CLASS], _NONE_GIVEN)
 
 
-def _boxes(numbers: Array, clock: Clock) -> Array:
-    """Times and boxes (N, 5), counted from 0."""
+def _boxes(numbers: Array, clock: Clock, *, first: int) -> Array:
+    """Times and boxes (N, 5), counted from 0 where pixels were counted from `first`."""
     assert clock.frame_rate_hz is not None
     assert clock.started_at_s is not None
     frame, left, top, width, height = numbers[:, : _LEAST_CELLS - 1].T
+    left, top = left - first, top - first
     time_s = clock.started_at_s + (frame - 1) / clock.frame_rate_hz
-    return np.column_stack([time_s, left - 1, top - 1, left - 1 + width, top - 1 + height])
+    return np.column_stack([time_s, left, top, left + width, top + height])
 
 
 def _nobody(classes: Array, people: frozenset[float]) -> MalformedError:

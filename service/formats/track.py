@@ -1,12 +1,13 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 import numpy as np
 
 from models.geometry.rotation import Array
 from models.tracks.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
+from service.formats.scaling import Scaling, read_scaling
 
 # Of detectors trained on COCO, BoxMOT's among them.
 COCO_PEOPLE = frozenset((0.0,))
@@ -54,11 +55,15 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """Tracks as read of a request; `left_out` lines or tracks of it were of no person."""
+    """Tracks as read of a request; `left_out` lines or tracks of it were of no person.
+
+    `ignored` names fields of it that nobody knows here.
+    """
 
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
     left_out: int = 0
+    ignored: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +76,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of tracks: the picture, and the time by our clock.
+    """Limits of tracks: the picture, and the time by our clock; how their numbers come into it.
 
     A track of later than now owns the camera's window, which is of the newest tracks, until that
     time comes: `max_ahead_s` is what clocks may differ by.
@@ -81,6 +86,27 @@ class Limits:
     height: int
     now_s: float
     max_ahead_s: float
+    scaling: Scaling | None = None
+
+    def of_size(self, size: Any, normalised: Any) -> "Limits":
+        """The limits of numbers of a picture as a request names it; the same where it does not.
+
+        Raises:
+            ValueError: with the field, what is needed and what came.
+        """
+        if size is None and normalised is None:
+            return self
+        scaling = read_scaling(size, normalised, (self.width, self.height))
+        return replace(self, scaling=scaling)
+
+    @property
+    def normalised(self) -> bool:
+        """True where numbers are shares of a picture."""
+        return self.scaling is not None and self.scaling.normalised
+
+    def in_picture(self, rows: Array) -> Array:
+        """Rows of time, u, v, u, v as given, in pixels of the picture."""
+        return rows if self.scaling is None else self.scaling.applied(rows)
 
 
 class NoPersonError(Exception):
