@@ -2,12 +2,16 @@
 
 import math
 from array import array
+from datetime import UTC, datetime
 from typing import Any, NamedTuple, TypeAlias
+
+import msgspec
 
 Box: TypeAlias = tuple[float, float, float, float]
 
 MAX_MESSAGE_BYTES = 1024 * 1024  # of one message of one source: 64 Frigate paths of an hour
 MAX_TEXT = 200  # characters of an id or a camera's name, as the service takes them
+MAX_DETAIL = 500  # characters
 NORMALISED = (1.0, 1.0)
 _FARTHEST = 1e9
 
@@ -15,13 +19,13 @@ _FARTHEST = 1e9
 class MessageError(Exception):
     """A message that is not what its source's format says; `code` is stable, `detail` for people.
 
-    Codes: `too_large`, `malformed`, `not_finite`.
+    Codes: `too_large`, `malformed`, `not_finite`, `unsupported`.
     """
 
     def __init__(self, code: str, detail: str) -> None:
-        super().__init__(detail)
         self.code = code
-        self.detail = detail
+        self.detail = detail[:MAX_DETAIL]
+        super().__init__(self.detail)
 
 
 class Detection(NamedTuple):
@@ -122,17 +126,66 @@ def text(value: Any, what: str) -> str:
     return found
 
 
-def check_size(message: bytes) -> None:
+def moment(value: Any, what: str) -> float:
+    """Seconds since the Unix epoch of an ISO 8601 time; many cameras leave out its zone, UTC.
+
+    Raises:
+        MessageError: it is no time of 1970 to 9998.
+    """
+    try:
+        found = datetime.fromisoformat(value)
+        if 1970 <= found.year <= 9998:
+            return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
+    except (TypeError, ValueError) as error:
+        raise MessageError("malformed", f"{what}: a time is needed, got {value!r:.60}") from error
+    raise MessageError("malformed", f"{what}: a time from 1970 on is needed, got {value!r:.60}")
+
+
+def parsed_json(message: bytes) -> Any:
+    """The value of a JSON message.
+
+    Raises:
+        MessageError: it is too large, or none.
+    """
+    check_size(message)
+    try:
+        return msgspec.json.decode(message)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise MessageError("malformed", f"no JSON: {error}") from error
+
+
+def listed(value: Any, what: str) -> list[Any]:
+    """A list of a message; nothing at all counts as an empty one.
+
+    Raises:
+        MessageError: it is something else.
+    """
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise MessageError("malformed", f"{what}: a list is needed, got {value!r:.40}")
+    return value
+
+
+def table(value: Any, what: str) -> dict[str, Any]:
+    """An object of a message.
+
+    Raises:
+        MessageError: it is none.
+    """
+    if not isinstance(value, dict):
+        raise MessageError("malformed", f"{what}: an object is needed, got {value!r:.40}")
+    return value
+
+
+def check_size(message: bytes, most: int = MAX_MESSAGE_BYTES) -> None:
     """Refuse a message that is too large to be looked at.
 
     Raises:
         MessageError: it is.
     """
-    if len(message) > MAX_MESSAGE_BYTES:
-        raise MessageError(
-            "too_large",
-            f"at most {MAX_MESSAGE_BYTES} bytes a message are taken, got {len(message)}",
-        )
+    if len(message) > most:
+        raise MessageError("too_large", f"at most {most} bytes are taken, got {len(message)}")
 
 
 def _is_whole(found: str) -> bool:
