@@ -9,6 +9,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     POSE_FIELDS,
@@ -177,7 +178,7 @@ class EvidenceOut(BaseModel):
         return cls.model_validate(body | times)
 
 
-router = APIRouter(prefix="/alerts", tags=["alerts"])
+router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
 
 
 @router.get("")

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from models.geometry.intrinsics import Intrinsics
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import EtagDep, ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     Body,
@@ -162,7 +163,7 @@ def slug(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:50]
 
 
-router = APIRouter(prefix="/cameras", tags=["cameras"])
+router = APIRouter(prefix="/cameras", tags=["cameras"], route_class=NamingRoute)
 
 
 @router.post("", status_code=201)

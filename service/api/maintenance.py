@@ -6,6 +6,7 @@ from typing import Self
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Moment, Out, Who
 from service.cameras import maintenance
@@ -64,7 +65,9 @@ class WindowList(BaseModel):
     items: list[WindowOut]
 
 
-router = APIRouter(prefix="/cameras/{camera_id}/maintenance", tags=["maintenance"])
+router = APIRouter(
+    prefix="/cameras/{camera_id}/maintenance", tags=["maintenance"], route_class=NamingRoute
+)
 
 
 @router.post("", status_code=201)

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import (
     AppState,
     ReadDep,
@@ -209,7 +210,7 @@ def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float]
     }
 
 
-router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"])
+router = APIRouter(prefix="/cameras/{camera_id}", tags=["pose"], route_class=NamingRoute)
 
 
 class _YamlResponse(PlainTextResponse):

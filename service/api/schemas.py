@@ -12,6 +12,8 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
     StringConstraints,
     field_validator,
     model_validator,
@@ -21,6 +23,7 @@ from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
+from service.api.ignored import note_ignored
 from service.degrees import in_degrees
 from service.reasons import CODES
 
@@ -71,9 +74,27 @@ ReasonValues = Annotated[
 
 
 class Body(BaseModel):
-    """A request body; unknown fields are refused, since they are mostly misspelt ones."""
+    """A request body; its answer names unknown fields, which are misspelt or a newer client's."""
 
-    model_config = ConfigDict(extra="forbid")
+    _ignored: list[str] = PrivateAttr(default_factory=list)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _name_unknown(cls, value: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        body = handler(value)
+        if isinstance(value, dict):
+            names = {field: info.alias or field for field, info in cls.model_fields.items()}
+            unknown = [name for name in value if name not in names.values()]
+            within = [
+                f"{name}/{inner}"
+                for field, name in names.items()
+                if isinstance(part := getattr(body, field), Body)
+                for inner in part._ignored
+            ]
+            body._ignored = unknown + within
+            if body._ignored:
+                note_ignored(body._ignored)
+        return body
 
     @field_validator("*")
     @classmethod

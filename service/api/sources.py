@@ -5,6 +5,7 @@ from datetime import datetime
 from fastapi import APIRouter
 from pydantic import BaseModel
 
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Out, Text, Who
 from service.cameras import sources
@@ -39,7 +40,7 @@ class SourceList(BaseModel):
     items: list[SourceOut]
 
 
-router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"])
+router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"], route_class=NamingRoute)
 
 
 @router.get("")

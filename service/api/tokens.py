@@ -15,8 +15,11 @@ from service.store import access
 from service.store.access import TokenRecord, name_in
 
 
-class TokenBody(Body):
-    """A token to make; it posts tracks for `cameras` and under `sources`, all if left out."""
+class TokenBody(Body, extra="forbid"):
+    """A token to make; it posts tracks for `cameras` and under `sources`, all if left out.
+
+    An unknown field is refused: were it a misspelt limit, the token could do more than was meant.
+    """
 
     name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
     scopes: Annotated[list[TokenScope], Field(min_length=1, max_length=4)]

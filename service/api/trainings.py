@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from service import training
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Out, Who
 from service.degrees import in_degrees
@@ -69,7 +70,7 @@ class TrainingList(BaseModel):
     items: list[TrainingOut]
 
 
-router = APIRouter(tags=["trainings"])
+router = APIRouter(tags=["trainings"], route_class=NamingRoute)
 
 
 @router.post("/cameras/{camera_id}/trainings", status_code=202)

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Self
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field, field_validator
 
+from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import Body, Out, ReasonCode
 from service.enums import AlertKind, DeliveryState, MessageType, WebhookFormat
@@ -129,7 +130,7 @@ class DeliveryList(BaseModel):
     items: list[DeliveryOut]
 
 
-router = APIRouter(tags=["webhooks"])
+router = APIRouter(tags=["webhooks"], route_class=NamingRoute)
 
 
 def checked_body(body: WebhookBody, state: StateDep) -> WebhookBody:

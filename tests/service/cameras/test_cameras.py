@@ -100,7 +100,6 @@ def test_every_form_of_a_pose_is_the_same_pose(http, pose, form):
         (("prior_pose",), {"height_m": 3.0, "tilt_deg": 100}, "/prior_pose/tilt_deg"),
         (("prior_pose",), {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "/prior_pose"),
         (("frame_rate_hz",), 0, "/frame_rate_hz"),
-        (("walking_sped",), {"mean_mps": 1.2}, "/walking_sped"),
     ],
 )
 def test_a_bad_field_is_named(http, path, value, pointer):
