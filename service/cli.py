@@ -122,6 +122,20 @@ def replay(
 
 
 @app.command()
+def bridge(
+    url: Annotated[str, typer.Option(help="The running service.")] = "http://127.0.0.1:8080",
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes read and ingest, if needed."),
+    ] = None,
+) -> None:
+    """Carry tracks from an MQTT broker to a service, states and alerts back, until SIGTERM."""
+    from service.commands.bridge import run_bridge
+
+    run_bridge(begin(), url, token)
+
+
+@app.command()
 def demo(
     port: Annotated[int, typer.Option(help="Port to serve on; 0: any free one.")] = 0,
     seed: Annotated[int, typer.Option(help="Seed of the street, the knock and the training.")] = 7,

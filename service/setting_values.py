@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import AfterValidator, ValidationError
 
-_SECRETS = ("secret_key", "proxy_secret", "database_url")
+_SECRETS = ("secret_key", "proxy_secret", "database_url", "mqtt_password")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
 _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
@@ -61,6 +61,34 @@ def read_key(text: str) -> bytes:
 def read_networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
     """The networks that a text names, with commas."""
     return tuple(ip_network(part.strip()) for part in text.split(",") if part.strip())
+
+
+def read_mqtt_url(text: str) -> str:
+    """The URL of a broker.
+
+    Raises:
+        ValueError: it is none.
+    """
+    parts = urlsplit(text)
+    if parts.scheme not in ("mqtt", "mqtts") or not parts.hostname or parts.username is not None:
+        raise ValueError("mqtt://host:port or mqtts://host:port is needed, users by MQTT_USER")
+    _ = parts.port  # raises where it is no number of one
+    return text
+
+
+def read_camera_names(text: str) -> dict[str, str]:
+    """Ids of cameras by the names that others have for them: `name=id`, with commas.
+
+    Raises:
+        ValueError: a part is not such a pair.
+    """
+    names = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, camera_id = (side.strip() for side in part.partition("="))
+        if not (name and equals and camera_id):
+            raise ValueError(f"name=camera-id, with commas, is needed, got {part!r:.80}")
+        names[name] = camera_id
+    return names
 
 
 def read_delays(text: str) -> tuple[float, ...]:

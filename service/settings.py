@@ -13,6 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from service import setting_values as values
 from service.data_dir import DATABASE, WEIGHTS
 
+_TOPIC = r"^[^+#\x00]+$"
 Networks = Annotated[str, values.readable(values.read_networks)]
 
 
@@ -178,6 +179,34 @@ class Settings(BaseSettings):
         30.0, gt=0, description="age at which ended deliveries are deleted"
     )
     public_url: str | None = Field(None, description="where people reach this service, for links")
+
+    mqtt_url: Annotated[str, values.readable(values.read_mqtt_url)] | None = Field(
+        None, description="mqtt://host:1883 or mqtts://host:8883: the broker of `surefoot bridge`"
+    )
+    mqtt_user: str | None = Field(None, description="its user at the broker")
+    mqtt_password: str | None = Field(None, repr=False, description="and the password")
+    mqtt_ca_file: Path | None = Field(
+        None, description="certificates that a broker's is checked by; unset: this machine's"
+    )
+    mqtt_client_id: str = Field(
+        "surefoot-bridge",
+        min_length=1,
+        description="by which the broker knows its session; no two bridges may share one",
+    )
+    mqtt_prefix: str = Field(
+        "surefoot", pattern=_TOPIC, description="what the topics of tracks, states, alerts begin by"
+    )
+    mqtt_frigate: str = Field(
+        "frigate", pattern=f"{_TOPIC}|^$", description="Frigate's topic_prefix; empty: no Frigate"
+    )
+    mqtt_cameras: Annotated[str, values.readable(values.read_camera_names)] = Field(
+        "", description="Frigate's names of cameras, where they are others: name=id, with commas"
+    )
+    mqtt_discovery: str = Field(
+        "homeassistant",
+        pattern=f"{_TOPIC}|^$",
+        description="prefix by which Home Assistant finds devices; empty: no discovery",
+    )
 
     max_connections: int = Field(1000, ge=1, description="open connections")
     connections_per_address: int = Field(

@@ -21,7 +21,7 @@ from tests.running import RunningService, free_port
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
-    "serve", "worker", "migrate", "replay", "demo", "backup", "restore", "check", "rotate-key",
+    "serve", "worker", "migrate", "bridge", "replay", "demo", "backup", "restore", "check", "rotate-key",
     "token", "migrate-data",
 )  # fmt: skip
 

@@ -1,0 +1,61 @@
+"""The bridge: a broker and a service, and what runs between them until it is told to stop."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from surefoot.bridge.broker import Address, Broker
+from surefoot.bridge.inward import Topics, carry
+from surefoot.bridge.outward import Outward
+from surefoot.bridge.service import Service
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bridge:
+    """What a bridge is between; `discovery` is Home Assistant's prefix, or None for none."""
+
+    address: Address
+    topics: Topics
+    url: str
+    token: str | None
+    discovery: str | None
+    version: str
+
+    def run(self, stopping: threading.Event) -> None:
+        """Carry tracks in, states and alerts out, until the event is set.
+
+        What is under way then is not acknowledged: the broker sends it again.
+        """
+        prefix = self.topics.prefix
+        availability = f"{prefix}/bridge/availability"
+        broker = Broker(self.address, self.topics.asked_for, availability)
+        outward = Outward(
+            say=broker.say,
+            prefix=prefix,
+            availability=availability,
+            discovery=self.discovery,
+            version=self.version,
+        )
+        failures: list[Exception] = []
+
+        def part(work: Callable[[Service], None]) -> None:
+            # One that fails must not leave the others as if all were well.
+            try:
+                work(Service(self.url, self.token))
+            except Exception as error:
+                failures.append(error)
+            finally:
+                stopping.set()
+
+        works: tuple[Callable[[Service], None], ...] = (
+            lambda service: carry(broker.inbox, self.topics, service, stopping),
+            lambda service: outward.tell(service, stopping),
+            lambda service: outward.listen(service, stopping),
+        )
+        broker.start()
+        for work in works:
+            threading.Thread(target=part, args=(work,), daemon=True).start()
+        stopping.wait()
+        broker.stop()
+        if failures:
+            raise failures[0]

@@ -1,0 +1,147 @@
+"""The service as the bridge asks it: posts of tracks, pictures' sizes, states, alerts, events."""
+
+import time
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import httpx
+
+_TIMEOUT_S = 60.0
+_SIZE_HOLDS_S = 60.0  # after which a camera's picture, or that there is no camera, is asked anew
+_HEARTBEATS_S = 30.0  # three of the service's: a stream that is silent for longer is none
+# Refusals that another token, or another hour, may end.
+_FOR_NOW = frozenset({401, 403, 408, 429})
+
+
+class LaterError(Exception):
+    """No answer, or a refusal for now: to be asked again, after `wait_s` where the service says."""
+
+    def __init__(self, reason: str, *, away: bool, wait_s: float | None = None) -> None:
+        super().__init__(reason)
+        self.away = away  # whatever else is asked for fares alike
+        self.wait_s = wait_s
+
+
+class RefusedError(Exception):
+    """A refusal for good, as its problem document tells it."""
+
+    def __init__(self, status: int, code: str, detail: str) -> None:
+        super().__init__(detail)
+        self.status, self.code, self.detail = status, code, detail
+
+
+class Event(NamedTuple):
+    """An event of the stream; `id` is what the next stream goes on from."""
+
+    id: str
+    kind: str
+    data: str
+
+
+class Service:
+    """A client of one service; for one thread."""
+
+    def __init__(self, url: str, token: str | None) -> None:
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT_S)
+        self._sizes: dict[str, tuple[float, tuple[float, float] | RefusedError]] = {}
+
+    def post_tracks(self, camera_id: str, body: bytes) -> dict[str, Any]:
+        """The receipt of a post.
+
+        Raises:
+            LaterError: nothing is stored yet.
+            RefusedError: nothing ever will be.
+        """
+        headers = {"Content-Type": "application/json"}
+        return self._ask("POST", f"/cameras/{camera_id}/tracks", content=body, headers=headers)
+
+    def get(self, path: str, **query: Any) -> dict[str, Any]:
+        """The document at a path.
+
+        Raises:
+            LaterError: there is none for now.
+            RefusedError: there is none.
+        """
+        return self._ask("GET", path, params=query)
+
+    def size_of(self, camera_id: str) -> tuple[float, float]:
+        """Width and height in pixels of a camera's picture, as asked a minute ago at most.
+
+        Raises:
+            LaterError: it cannot be told for now.
+            RefusedError: there is no such camera.
+        """
+        now_s = time.monotonic()
+        asked_s, size = self._sizes.get(camera_id, (-_SIZE_HOLDS_S, None))
+        if size is None or now_s - asked_s >= _SIZE_HOLDS_S:
+            try:
+                lens = self.get(f"/cameras/{camera_id}")["intrinsics"]
+                size = (float(lens["width"]), float(lens["height"]))
+            except RefusedError as error:
+                size = error
+            if len(self._sizes) >= 10_000:  # names of cameras are whatever a topic says
+                self._sizes.clear()
+            self._sizes[camera_id] = (now_s, size)
+        if isinstance(size, RefusedError):
+            raise size
+        return size
+
+    def events(self, after: str | None) -> Iterator[Event | None]:
+        """Events as they happen, from the one after that on; None at once and with heartbeats.
+
+        Raises:
+            LaterError: the stream has ended.
+        """
+        headers = {} if after is None else {"Last-Event-ID": after}
+        timeout = httpx.Timeout(_TIMEOUT_S, read=_HEARTBEATS_S)
+        try:
+            with self._http.stream("GET", "/events", headers=headers, timeout=timeout) as answer:
+                if answer.status_code != 200:
+                    answer.read()
+                    _check(answer)
+                yield from _parsed(answer.iter_lines())
+        except httpx.TransportError as error:
+            raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
+        raise LaterError("the stream has ended", away=True)
+
+    def _ask(self, method: str, path: str, **what: Any) -> dict[str, Any]:
+        try:
+            answer = self._http.request(method, path, **what)
+            _check(answer)
+            document: dict[str, Any] = answer.json()
+        except httpx.TransportError as error:
+            raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
+        except ValueError as error:  # a proxy's page
+            raise LaterError(f"an answer that is no JSON: {error}", away=True) from error
+        return document
+
+
+def _check(answer: httpx.Response) -> None:
+    if answer.is_success:
+        return
+    status = answer.status_code
+    is_problem = "json" in answer.headers.get("content-type", "")
+    problem = answer.json() if is_problem else {}
+    code, detail = problem.get("code", "unknown"), problem.get("detail", answer.text[:200])
+    # What does not speak as the service does stands before it, or in its place.
+    if 400 <= status < 500 and status not in _FOR_NOW and is_problem:
+        raise RefusedError(status, code, detail)
+    wait = answer.headers.get("retry-after", "")
+    wait_s = float(wait) if wait.isdecimal() else None
+    away = status not in (429, 500)  # too much of one camera; what one body trips over
+    raise LaterError(f"{status} {code}: {detail}", away=away, wait_s=wait_s)
+
+
+def _parsed(lines: Iterator[str]) -> Iterator[Event | None]:
+    """Server-Sent Events, as far as the service uses them; None for each comment."""
+    fields: dict[str, str] = {}
+    for line in lines:
+        if line.startswith(":"):
+            yield None
+        elif line:
+            name, _, value = line.partition(":")
+            fields[name] = value.removeprefix(" ")
+        elif "data" in fields:
+            yield Event(fields.get("id", ""), fields.get("event", ""), fields["data"])
+            fields = {}
