@@ -21,8 +21,8 @@ from tests.running import RunningService, free_port
 README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
-    "serve", "worker", "migrate", "bridge", "replay", "demo", "backup", "restore", "check", "rotate-key",
-    "token", "migrate-data",
+    "serve", "worker", "migrate", "replay", "demo", "backup", "restore", "check", "rotate-key",
+    "token", "migrate-data", "bridge",
 )  # fmt: skip
 
 

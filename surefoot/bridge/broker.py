@@ -2,6 +2,7 @@
 
 import logging
 import ssl
+import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ class Broker:
         self._topics, self._availability = topics, availability
         self._lock = threading.Lock()
         self._said: dict[str, str] = {}
-        self._connected = False
+        self._connected = self._resumed = False
         self._client = client = Client(
             CallbackAPIVersion.VERSION2,
             client_id=address.client_id,
@@ -66,7 +67,8 @@ class Broker:
             reconnect_on_failure=True,
         )
         client.on_connect, client.on_disconnect = self._on_connect, self._on_disconnect
-        client.on_message = self._on_message
+        client.on_subscribe, client.on_message = self._on_subscribe, self._on_message
+        client.on_connect_fail = self._on_connect_fail
         client.reconnect_delay_set(1, _LONGEST_S)
         client.will_set(availability, "offline", qos=1, retain=True)
         if address.user is not None:
@@ -112,7 +114,7 @@ class Broker:
         if reason.is_failure:
             log.warning("mqtt_refused", extra={"reason": str(reason)})
             return
-        log.info("mqtt_connected", extra={"session_present": flags.session_present})
+        self._resumed = flags.session_present
         self.inbox.begin()
         once = SubscribeOptions(qos=1, retainHandling=SubscribeOptions.RETAIN_SEND_IF_NEW_SUB)
         client.subscribe([(topic, once) for topic in self._topics])
@@ -120,6 +122,21 @@ class Broker:
             self._connected = True
             for topic, payload in self._said.items():
                 client.publish(topic, payload, qos=1, retain=True)
+
+    def _on_connect_fail(self, _: Client, __: Any) -> None:
+        reason = str(sys.exc_info()[1])  # paho calls from where it has caught it, and tells no more
+        log.warning("mqtt_away", extra={"url": self._address.url, "reason": reason})
+
+    def _on_subscribe(self, _: Client, __: Any, ___: int, reasons: list[Any], ____: Any) -> None:
+        """Tell that all is in place: what is published from here on is not lost."""
+        refused = {
+            topic: str(reason)
+            for topic, reason in zip(self._topics, reasons, strict=True)
+            if reason.is_failure
+        }
+        if refused:
+            log.error("mqtt_topics_refused", extra={"topics": refused})
+        log.info("mqtt_connected", extra={"session_present": self._resumed})
 
     def _on_disconnect(self, _: Client, __: Any, ___: Any, reason: Any, ____: Any) -> None:
         self.inbox.begin()  # from here on paho would acknowledge by the next connection

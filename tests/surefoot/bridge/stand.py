@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import threading
@@ -34,21 +35,27 @@ def broker(folder: Path, *extra: str) -> Iterator[int]:
     with (folder / "mosquitto.log").open("w") as log:
         process = subprocess.Popen([str(MOSQUITTO), "-c", str(config)], stdout=log, stderr=log)
     try:
+        wait_for(lambda: _listens(port), every_s=0.02)
         yield port
     finally:
         process.terminate()
         process.wait(10)
 
 
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 class RunningBridge:
     """A real `surefoot bridge`, which a test may kill and start again."""
 
-    def __init__(self, folder: Path, broker_port: int, url: str, **settings: str) -> None:
+    def __init__(self, folder: Path, broker_port: int, service_url: str, **settings: str) -> None:
         self.log = folder / "bridge.log"
-        mqtt = {"SUREFOOT_MQTT_URL": f"mqtt://127.0.0.1:{broker_port}"}
+        settings = {"url": f"mqtt://127.0.0.1:{broker_port}", **settings}
         given = {f"SUREFOOT_MQTT_{name.upper()}": value for name, value in settings.items()}
-        self._environment = os.environ | mqtt | given
-        self._command = [sys.executable, "-m", "service.cli", "bridge", "--url", url]
+        self._environment = os.environ | given
+        self._command = [sys.executable, "-m", "service.cli", "bridge", "--url", service_url]
         self.process: subprocess.Popen[bytes]
 
     def start(self) -> None:
@@ -57,7 +64,7 @@ class RunningBridge:
                 self._command, env=self._environment, stdout=log, stderr=log
             )
 
-    def wait_connected(self, times: int = 1) -> None:
+    def wait_connected(self, times: int) -> None:
         """Until it has connected so many times in all."""
         wait_for(lambda: self.log.read_text().count("mqtt_connected") >= times, every_s=0.02)
 
@@ -71,12 +78,14 @@ class RunningBridge:
 
 
 @contextmanager
-def bridged(folder: Path, port: int, url: str, **settings: str) -> Iterator[RunningBridge]:
-    """A bridge that has connected, until the end of the block."""
-    running = RunningBridge(folder, port, url, **settings)
+def bridged(
+    folder: Path, port: int, service_url: str, word: str = "mqtt_connected", **settings: str
+) -> Iterator[RunningBridge]:
+    """A bridge that has logged a word, until the end of the block."""
+    running = RunningBridge(folder, port, service_url, **settings)
     running.start()
     try:
-        running.wait_connected()
+        wait_for(lambda: word in running.log.read_text(), every_s=0.02)
         yield running
     finally:
         if running.process.poll() is None:

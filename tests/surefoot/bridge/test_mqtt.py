@@ -1,5 +1,7 @@
 """The bridge between a real mosquitto and a real service."""
 
+import shutil
+import subprocess
 import time
 
 import pytest
@@ -17,6 +19,7 @@ from tests.surefoot.bridge.stand import (
     paths_of,
 )
 
+PASSWD = shutil.which("mosquitto_passwd")
 pytestmark = [pytest.mark.slow, needs_mosquitto]
 PATH = [[[0.3 + 0.02 * n, 0.5 + 0.02 * n], 1_700_000_000.0 + n] for n in range(8)]
 
@@ -154,3 +157,29 @@ def test_no_track_is_lost_and_none_stored_twice(tmp_path, port, service):
         assert counts() == wanted
         assert len(people) > 300
     client.close()
+
+
+@pytest.mark.skipif(PASSWD is None, reason="mosquitto_passwd is not installed")
+def test_by_tls_with_a_user_and_not_without(tmp_path, corner):
+    key, certificate, passwords = (tmp_path / name for name in ("key", "crt", "passwords"))
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-keyout", key,
+         "-out", certificate, "-subj", "/CN=broker", "-addext", "subjectAltName=IP:127.0.0.1"],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    subprocess.run([PASSWD, "-b", "-c", passwords, "us", "right"], check=True, capture_output=True)
+    lines = [f"certfile {certificate}", f"keyfile {key}", f"password_file {passwords}"]
+    with broker(tmp_path, *lines, "allow_anonymous false") as port:
+        given = {"url": f"mqtts://127.0.0.1:{port}", "user": "us", "ca_file": str(certificate)}
+        with bridged(tmp_path, port, corner.url, **given, password="right"):
+            pass
+        wrong = {
+            "mqtt_refused": {**given, "password": "wrong"},
+            "mqtt_away": {**given, "password": "right", "url": f"mqtts://localhost:{port}"},
+        }
+        for number, (word, settings) in enumerate(wrong.items()):
+            folder = tmp_path / str(number)
+            folder.mkdir()
+            with bridged(folder, port, corner.url, word, **settings) as bridge:
+                log = bridge.log.read_text()
+                assert "Not authorized" in log or "CERTIFICATE_VERIFY_FAILED" in log
