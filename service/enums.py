@@ -8,8 +8,9 @@ from enum import StrEnum
 
 
 class PoseState(StrEnum):
-    """The state of a camera."""
+    """The state of a camera. It is unconnected until the first track for it is stored."""
 
+    UNCONNECTED = "unconnected"
     LEARNING = "learning"
     OK = "ok"
     UNSURE = "unsure"

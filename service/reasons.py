@@ -15,6 +15,7 @@ class ServiceCode(StrEnum):
     """Codes of the service's own reasons. They are kept by clients and in stores: they stay."""
 
     AS_SAID = "as_said"
+    NOBODY_POSTED = "nobody_posted"
     LEARNING_REFERENCE = "learning_reference"
     REFERENCE_TRACKS = "reference_tracks"
     TRACKS_SINCE = "tracks_since"

@@ -174,15 +174,17 @@ def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bo
 
 
 def wanted_tracks(reference: SiteReferenceRecord, settings: Settings) -> int:
-    """The number of tracks a reference is learned of: no more than are kept."""
+    """The number of people a reference is learned of: no more than tracks are kept."""
     return min(reference.wanted, settings.keep_tracks)
 
 
-def tracks_so_far(reference: SiteReferenceRecord, settings: Settings, counted: int) -> int:
-    """The number of wanted tracks that a reference has; as many as were counted while it learns."""
-    if reference.ready_at is not None:
-        return reference.tracks
-    return min(counted, wanted_tracks(reference, settings))
+def people_so_far(reference: SiteReferenceRecord, settings: Settings, tracks: int) -> int:
+    """The number of wanted people that a reference has, by its tracks and the pieces among them.
+
+    Until tracks are looked at, each counts as somebody.
+    """
+    people = max(tracks - reference.pieces, 0)
+    return people if reference.ready_at else min(people, wanted_tracks(reference, settings))
 
 
 def drift_limits(settings: Settings) -> DriftLimits:

@@ -152,7 +152,7 @@ table(
     *needed(String, "origin"),
     *optional(String, "source", "requested_by"),
     *optional(Double, "from_s", "to_s"),
-    *needed(NUMBER, "wanted", "tracks"),
+    *needed(NUMBER, "wanted", "tracks", "pieces", "hours"),
     *optional(LargeBinary, "data"),
     *optional(Double, "walking_speed_mps"),
     *needed(JSON, "doubts"),

@@ -91,10 +91,17 @@ class DriftOut(SdOut):
 
 
 class ReferenceOut(Out):
-    """How much of the reference period has been seen."""
+    """How much of the reference period has been seen.
+
+    `counted` of `wanted` people, each once: of `tracks`, `pieces` go on others' walks. They are of
+    so many different `hours` of date and time. Pieces and hours are those of the last look.
+    """
 
     state: ReferenceState
     tracks: int
+    counted: int
+    pieces: int
+    hours: int
     wanted: int
     walking_speed_mps: float | None
 

@@ -16,7 +16,7 @@ from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
-from service.references import tracks_so_far, wanted_tracks, window_beside
+from service.references import people_so_far, wanted_tracks, window_beside
 from service.settings import Settings
 from service.store import cameras, estimates, fleet, references, windows
 from service.store.estimates import EstimateRecord
@@ -26,10 +26,17 @@ from service.wording.reasons import in_words
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceView:
-    """The served part of a camera's reference."""
+    """The served part of a camera's reference.
+
+    `counted` of `wanted` people are there, by `tracks` of which `pieces` go on others' walks; they
+    are of so many different `hours` of date and time.
+    """
 
     ready: bool
     tracks: int
+    counted: int
+    pieces: int
+    hours: int
     wanted: int
     walking_speed_mps: float | None
 
@@ -63,22 +70,24 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     camera, prior, model_id = set_up
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
     record = status.reference
-    counts = {}
+    tracks = record.tracks
     if record.ready_at is None:
         attended = {camera_id: status.attended.spans}
-        counts = fleet.learning_counts(session, (camera_id,), attended)
-    so_far = tracks_so_far(record, settings, counts.get(camera_id, 0))
-    reasons = _reasons_of(session, settings, status, so_far)
+        tracks = fleet.learning_counts(session, (camera_id,), attended).get(camera_id, 0)
+    reference = ReferenceView(
+        ready=record.ready_at is not None,
+        tracks=tracks,
+        counted=people_so_far(record, settings, tracks),
+        pieces=record.pieces,
+        hours=record.hours,
+        wanted=record.wanted,
+        walking_speed_mps=record.walking_speed_mps,
+    )
+    reasons = _reasons_of(session, settings, status, reference)
     pose = prior.pose
     estimate = status.estimate
     if estimate is not None:
         pose = replace(pose, **asdict(estimate.pose))
-    reference = ReferenceView(
-        ready=record.ready_at is not None,
-        tracks=so_far,
-        wanted=record.wanted,
-        walking_speed_mps=record.walking_speed_mps,
-    )
     estimate_id = None if estimate is None else estimate.id
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
@@ -116,11 +125,10 @@ def pose_history(
     return estimates.thinned(session, camera_id, start, end, thinned)
 
 
-def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_far: int) -> Reasons:
-    """Reasons of a camera's state: what is missing, what was told, who is there.
-
-    `so_far` is how many tracks its reference has.
-    """
+def _reasons_of(
+    session: Session, settings: Settings, status: CameraStatus, learned: ReferenceView
+) -> Reasons:
+    """Reasons of a camera's state: what is missing, what was told, who is there."""
     now = datetime.now(UTC)
     found: list[Reason] = []
     if status.attended.under_way(now):
@@ -136,7 +144,7 @@ def _reasons_of(session: Session, settings: Settings, status: CameraStatus, so_f
         else:
             found += _of_alerts(status)
     if not status.judged:
-        found += _missing(session, settings, status, so_far)
+        found += _missing(session, settings, status, learned)
     silence = data_gap_of(session, settings, status.camera_id, now) if status.silent else None
     if silence is not None and status.state in (PoseState.NO_DATA, PoseState.DRIFTING):
         found += silence.reasons
@@ -153,12 +161,16 @@ def _of_alerts(status: CameraStatus) -> list[Reason]:
 
 
 def _missing(
-    session: Session, settings: Settings, status: CameraStatus, so_far: int
+    session: Session, settings: Settings, status: CameraStatus, learned: ReferenceView
 ) -> list[Reason]:
-    """The count of tracks that is missing until the camera is judged anew."""
+    """The count of people or tracks that is missing until the camera is judged anew."""
     reference = status.reference
+    if status.state == PoseState.UNCONNECTED:
+        return [Reason(code=ServiceCode.NOBODY_POSTED)]
     if reference.ready_at is None:
-        values = {"tracks": so_far, "wanted": wanted_tracks(reference, settings)}
+        wanted = wanted_tracks(reference, settings)
+        counts = {"counted": learned.counted, "tracks": learned.tracks, "pieces": learned.pieces}
+        values = counts | {"wanted": wanted}
         return [Reason(code=ServiceCode.REFERENCE_TRACKS, values=values)]
     bounds = window_beside(status.attended, reference, settings)
     since: dict[str, Value] = {

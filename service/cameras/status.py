@@ -112,6 +112,8 @@ def _status_of(
     if _holds(alerts):
         estimate = estimate if judged else last_identifiable
         state = PoseState.DRIFTING
+    elif reference.ready_at is None and reference.source is None:
+        state = PoseState.UNCONNECTED  # the first track to be stored gives it a source, for good
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
     elif silent:

@@ -72,12 +72,17 @@ MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked
 class Gathered:
     """Tracks, and whether there are `enough`: of as many people as were wanted.
 
-    `before` is the piece before each of a walk, as of `link_pieces`; None where nobody looked.
+    `before` is the piece before each of a walk, as of `link_pieces`.
     """
 
     records: Sequence[StoredTrack]
     enough: bool
-    before: npt.NDArray[np.int64] | None = None
+    before: npt.NDArray[np.int64]
+
+    @property
+    def pieces(self) -> int:
+        """The number of tracks that go on others' walks."""
+        return int((self.before >= 0).sum())
 
 
 def until_so_many(
@@ -112,16 +117,14 @@ def until_so_many(
         if limit > loaded:
             loaded = limit
             every = load(loaded)
-        if len(every) < limit:
-            return Gathered(records=every, enough=False)
-        records = every[-limit:] if newest else every[:limit]
+        all_there_are = len(every) < limit
+        records = every if all_there_are else every[-limit:] if newest else every[:limit]
         before = link_pieces(
             [unpacked.seen(record, intrinsics) for record in records], intrinsics, prior
         )
-        walks = int((before < 0).sum())
-        if walks >= wanted or limit == most:
-            return Gathered(records=records, enough=True, before=before)
-        missing = wanted - walks
+        missing = wanted - int((before < 0).sum())
+        if all_there_are or missing <= 0 or limit == most:
+            return Gathered(records=records, enough=not all_there_are, before=before)
         if rounds >= _EXACT_ROUNDS:
             missing = max(missing, round(_LARGE_ROUND * wanted))
         limit = min(limit + missing, most)

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
+from models.durations import HOUR_S
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -35,20 +36,34 @@ _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferencePeriod:
-    """The tracks of a reference, in the order of their ends, and what else it is learned of."""
+    """The tracks of a reference, in the order of their ends, and what else it is learned of.
+
+    There may not be `enough` yet. `pieces` of them go on others' walks; they ended in so many
+    different `hours` of date and time (UTC).
+    """
 
     reference_id: int
+    enough: bool
+    pieces: int
+    hours: int
     intrinsics: Intrinsics
     prior: CameraPose
     walk: WalkConfig
     trajectories: tuple[Trajectory, ...]
-    to_s: float
+
+    @property
+    def to_s(self) -> float:
+        """The end of the last track."""
+        return float(self.trajectories[-1].time_s[-1])
 
 
 def load_reference_period(
     session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
 ) -> ReferencePeriod | None:
-    """The tracks to learn a camera's reference of; None as long as there are not enough."""
+    """The tracks to learn a camera's reference of, as far as they are there.
+
+    None where nothing is to be learned now.
+    """
     unpacked = unpacked or Unpacked()
     camera = session.get(CameraRecord, camera_id)
     reference = references.newest_if_any(session, camera_id)
@@ -70,16 +85,16 @@ def load_reference_period(
         prior,
         unpacked,
     )
-    if not gathered.enough:
-        return None
     records = gathered.records
     return ReferencePeriod(
         reference_id=reference.id,
+        enough=gathered.enough,
+        pieces=gathered.pieces,
+        hours=len({record.ended_s // HOUR_S for record in records}),
         intrinsics=intrinsics,
         prior=prior,
         walk=walk_of(camera),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
-        to_s=records[-1].ended_s,
     )
 
 
@@ -90,6 +105,13 @@ def compute_reference(period: ReferencePeriod, seed: int) -> CameraSite | None:
         return learn_site(observed, period.intrinsics, period.prior, period.walk, seed=seed)
     except TooFewTrajectoriesError:
         return None
+
+
+def save_progress(session: Session, camera_id: str, period: ReferencePeriod) -> None:
+    """Keep how much of a reference there is, for those who wait for it."""
+    record = references.newest_if_any(session, camera_id)
+    if record is not None and record.id == period.reference_id and record.ready_at is None:
+        record.pieces, record.hours = period.pieces, period.hours
 
 
 def save_reference(
@@ -106,6 +128,7 @@ def save_reference(
     record = references.newest_if_any(session, camera_id)
     if record is None or record.id != period.reference_id or record.ready_at is not None:
         return
+    record.pieces, record.hours = period.pieces, period.hours
     if learned is None:
         record.wanted += max(record.wanted, 1)
         return

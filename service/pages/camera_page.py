@@ -106,7 +106,7 @@ class CameraPage:
             alerts=status.alerts,
             answered_by=status.reference.answered_by,
             ready=reference.ready,
-            learned=reference.tracks,
+            learned=reference.counted,
             wanted=reference.wanted,
             silence=None if silence is None else silence.reasons,
             silent_since_s=None if silence is None else silence.last_s,
@@ -188,6 +188,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         page=page,
         clock=clock,
         zone_name=state.settings.timezone,
+        people=camera_words.people_words(page.pose.reference.counted, page.pose.reference.hours),
         headline=camera_words.headline(page.facts, clock),
         drawings=draw_camera(page.camera, page.pose, page.tracks, page.misplaced, page.snapshot),
         parameters=moves.parameter_rows(

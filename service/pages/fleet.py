@@ -18,7 +18,7 @@ from service.api.schemas import Text
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, Severity
 from service.pages.drawings.sparkline import sparkline
-from service.references import drift_limits, tracks_so_far, wanted_tracks
+from service.references import drift_limits, people_so_far, wanted_tracks
 from service.settings import Settings
 from service.store import fleet, journal
 from service.store.alerts import AlertRecord
@@ -35,8 +35,9 @@ _RANKS = {
     PoseState.UNSURE: 3,
     PoseState.SUSPECTED: 5,
     PoseState.NO_DATA: 4,
-    PoseState.LEARNING: 6,
-    PoseState.OK: 7,
+    PoseState.UNCONNECTED: 6,
+    PoseState.LEARNING: 7,
+    PoseState.OK: 8,
 }
 
 
@@ -46,7 +47,7 @@ class FleetRow:
 
     `history` has the drift of its newest estimates in units of the limits, oldest first, None where
     nothing was identifiable. `drift` has only what is sure. `learned` and `wanted` are people of
-    the reference being learned.
+    the reference being learned; None where it is ready, or nobody has posted anybody.
     """
 
     now: datetime
@@ -105,7 +106,7 @@ class FleetRow:
 
     @property
     def share(self) -> int | None:
-        """Progress of the reference, in percent; None where it is ready."""
+        """Progress of the reference, in percent; None where none is being learned."""
         return None if self.learned is None else round(100 * self.learned / self.wanted)
 
     @property
@@ -115,7 +116,7 @@ class FleetRow:
 
     @property
     def rank(self) -> int:
-        """Urgency for a person: 0 at once, 7 not at all."""
+        """Urgency for a person: 0 at once, 8 not at all."""
         alerts = self.status.alerts
         if self.attended_until is not None:
             return 5
@@ -160,7 +161,9 @@ def list_fleet(
     names = dict(fleet.names(session, ids))
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
     learning = {
-        i: each.attended.spans for i, each in statuses.items() if each.reference.ready_at is None
+        i: each.attended.spans
+        for i, each in statuses.items()
+        if each.reference.ready_at is None and each.state != PoseState.UNCONNECTED
     }
     counts = fleet.learning_counts(session, ids, learning)
     trainings = fleet.unfinished_trainings(session, ids)
@@ -171,7 +174,7 @@ def list_fleet(
             status=each,
             drift=_sure_drift(each.estimate) if each.state != PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
-            learned=tracks_so_far(each.reference, settings, counts.get(camera_id, 0))
+            learned=people_so_far(each.reference, settings, counts.get(camera_id, 0))
             if camera_id in learning
             else None,
             wanted=wanted_tracks(each.reference, settings),

@@ -37,6 +37,10 @@ def _as_parameters(
     )
 
 
+# States of cameras without an estimate to say so.
+_OF_CAMERAS = (PoseState.UNCONNECTED, PoseState.NO_DATA)
+
+
 class EstimateRecord(Record):
     """The served pose at one time, and what is behind it.
 
@@ -94,7 +98,7 @@ class EstimateRecord(Record):
 
     __table_args__ = (
         # That nobody comes is no estimate's to say.
-        one_of("state", [state for state in PoseState if state != PoseState.NO_DATA]),
+        one_of("state", [state for state in PoseState if state not in _OF_CAMERAS]),
         Index(None, "camera_id", "id"),
     )
 

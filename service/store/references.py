@@ -37,9 +37,11 @@ from service.store.record import (
 class SiteReferenceRecord(Record):
     """The estimators' answers while a camera is known to be at its prior pose; the newest counts.
 
-    It is learned once, of `wanted` tracks that started at `from_s` or later; until then `ready_at`
-    is unset. It is of the tracks of one `source`, which counts: the first to post, where none is
-    said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
+    It is learned once, of the tracks of `wanted` people that started at `from_s` or later; until
+    then `ready_at` is unset. It is of the tracks of one `source`, which counts: the first to post,
+    where none is said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
+    As of the last look, `pieces` of its tracks go on others' walks, and they ended in so many
+    different `hours` of date and time (UTC).
     Later, `window_from_s` is when the first track after the newest change of the camera ended, and
     `changed_s` when it started. `answer` is what a person said last of how the camera stands:
     estimates of before `answered_at` say nothing of it any more.
@@ -57,6 +59,8 @@ class SiteReferenceRecord(Record):
     to_s: Mapped[float | None]
     wanted: Mapped[int]
     tracks: Mapped[int]
+    pieces: Mapped[int] = mapped_column(default=0)
+    hours: Mapped[int] = mapped_column(default=0)
     data: Mapped[bytes | None] = mapped_column(LargeBinary)
     walking_speed_mps: Mapped[float | None]
     doubts: Mapped[Reasons]

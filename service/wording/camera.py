@@ -20,9 +20,11 @@ STATES = {
     PoseState.UNSURE: "Unsure",
     PoseState.SUSPECTED: "Maybe moved",
     PoseState.NO_DATA: "No people",
+    PoseState.UNCONNECTED: "Unconnected",
     PoseState.LEARNING: "Learning",
     PoseState.OK: "Steady",
 }
+_FEW_HOURS = 6  # of date and time: fewer are a morning's people; of words alone
 # The alerts that a state speaks for; every other one is named.
 _SPOKEN_FOR = {
     PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
@@ -77,6 +79,8 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
             "Something changed: people walk on none of the paths that were learned. The camera was "
             "turned far, or people walk elsewhere; a look at its picture tells which."
         )
+    if state == PoseState.UNCONNECTED:
+        return "Nobody has posted anybody's track for this camera yet."
     if state == PoseState.LEARNING or estimate is None or not camera.judged:
         return _waiting(camera)
     if state == PoseState.NO_DATA:
@@ -120,6 +124,14 @@ def _waiting(camera: CameraFacts) -> str:
     return "Waiting for people: too few have come to tell how it stands."
 
 
+def people_words(people: int, hours: int) -> str:
+    """So many people; of how many hours, where they tell little of other times of day."""
+    of_all = f"{people} {'person' if people == 1 else 'people'}"
+    if not 0 < hours < _FEW_HOURS:
+        return of_all
+    return f"{of_all} of {'a single hour' if hours == 1 else f'{hours} different hours'}"
+
+
 def fleet_line(
     state: PoseState,
     kinds: Sequence[AlertKind],
@@ -145,6 +157,8 @@ def fleet_line(
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
     if kinds and kinds[0] == AlertKind.STALE:
         return "its estimate lacks tracks: the alert says which, and since when"
+    if state == PoseState.UNCONNECTED:
+        return "nobody has posted tracks for it yet: its page says how"
     if state == PoseState.LEARNING and learned is not None:
         return f"learning what is usual: {learned} of {wanted} people"
     if state == PoseState.LEARNING:

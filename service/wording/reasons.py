@@ -231,10 +231,15 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         "each of whom counts once"
     ),
     ServiceCode.AS_SAID: "{text}",
+    ServiceCode.NOBODY_POSTED: "no track of anybody has been posted for it yet",
     ServiceCode.LEARNING_REFERENCE: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: (
-        f"{v['tracks']} of {v['wanted']} reference tracks"
-        + ("; pieces of one walk count once" if v["tracks"] >= v["wanted"] else "")
+        f"{v['counted']} of {v['wanted']} people for the reference"
+        + (
+            f"; {v['pieces']} of {v['tracks']} tracks are pieces of others' walks"
+            if v["pieces"]
+            else ""
+        )
     ),
     ServiceCode.TRACKS_SINCE: _since,
     ServiceCode.LAST_IDENTIFIABLE: "when it was last told:",

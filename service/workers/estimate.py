@@ -20,7 +20,12 @@ from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.finding import PartialFailures, compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
-from service.estimation.learning import compute_reference, load_reference_period, save_reference
+from service.estimation.learning import (
+    compute_reference,
+    load_reference_period,
+    save_progress,
+    save_reference,
+)
 from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
@@ -118,10 +123,14 @@ def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
 
 
 def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
-    """Learn a camera's reference, once its tracks are there."""
+    """Learn a camera's reference, once its tracks are there; until then, count what is."""
     with context.store.read() as session:
         period = load_reference_period(session, context.settings, camera_id, unpacked)
     if period is None:
+        return
+    if not period.enough:
+        with context.store.write(camera_id) as session:
+            save_progress(session, camera_id, period)
         return
     learned = compute_reference(period, context.settings.seed)
     with context.store.write(camera_id) as session:

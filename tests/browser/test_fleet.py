@@ -135,7 +135,8 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     page.keyboard.type("nor")
     assert shown(page) == ["North door", "North stairs"]
     assert page.locator("#found").inner_text() == "2 cameras"
-    for _ in range(5):  # the chips of moved, unsure, maybe moved, no people, learning
+    # the chips of moved, unsure, maybe moved, no people, unconnected, learning
+    for _ in range(6):
         page.keyboard.press("Tab")
     page.keyboard.press("Space")
     assert shown(page) == ["North door"]
@@ -186,3 +187,17 @@ def test_the_browser_says_ages_as_the_service_does(page, fleet):
     words = [clock.ago(now - timedelta(seconds=age)) for age in ages]
     assert page.evaluate(said, ages) == words
     assert "2 hours ago" in words
+
+
+def test_cameras_that_nobody_posts_for_are_found_by_their_own_filter(page, fleet):
+    fleet.add("alpha", "Alpha", state="learning")
+    fleet.add("beta", "Beta", state="unconnected", tracks=0)
+    page.goto("/")
+    assert shown(page) == ["Beta", "Alpha"]  # who must do something before who must wait
+    page.locator(".chip.unconnected").click()
+    assert shown(page) == ["Beta"]
+    row = page.locator("#row-beta")
+    assert "nobody has posted tracks for it yet" in row.inner_text()
+    assert row.locator("progress").count() == 0
+    assert axe(page) == []
+    shoot(page, "fleet-unconnected")

@@ -66,7 +66,8 @@ class Fleet:
             silent_s = 26 * 3600 if state == "no_data" else self.random.uniform(2, 400)
             session.add_all(self._tracks(camera_id, tracks, self.now.timestamp() - silent_s))
             reference = references.newest(session, camera_id)
-            if state == "learning":
+            reference.source = "cam-" + camera_id if tracks else None
+            if state in ("learning", "unconnected"):
                 return
             begun = self.now - timedelta(hours=30)
             reference.ready_at, reference.data = begun, b"made up"

@@ -184,7 +184,8 @@ def test_a_camera_put_back_while_it_is_learned_is_learned_of_people_who_come_the
     assert bench.pose()["reference"]["tracks"] == 7
     by_button(bench)
     assert bench.pose()["reference"] | {"walking_speed_mps": 0} == {
-        "state": "learning", "tracks": 0, "wanted": 200, "walking_speed_mps": 0,
+        "state": "learning", "tracks": 0, "counted": 0, "pieces": 0, "hours": 0, "wanted": 200,
+        "walking_speed_mps": 0,
     }  # fmt: skip
 
 

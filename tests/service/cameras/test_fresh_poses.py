@@ -84,8 +84,8 @@ def test_a_window_that_begins_and_ends_by_the_clock_is_told(corner, clock):
     for hours in (0, 0, 1.5, 1.5, 2.5, 0):  # and back: clocks are set back, too
         clock.ahead = timedelta(hours=hours)
         codes.append(corner.get(URL).json()["reason_code"])
-    learning = "reference_tracks"
-    assert codes == [learning, learning, "maintenance", "maintenance", learning, learning]
+    nobody = "nobody_posted"
+    assert codes == [nobody, nobody, "maintenance", "maintenance", nobody, nobody]
 
 
 def test_silence_comes_by_the_clock_and_grows(bench, clock):

@@ -160,9 +160,10 @@ def test_nor_in_a_reference_that_is_being_learned(corner, settings, bench):
     put(bench.http, 6, 6, ago_h=0.6)
     begin(bench.http, from_h=0.7, to_h=0.55)
     begin(bench.http, from_h=0.58, to_h=0.5)  # overlapping ones are one
-    assert bench.pose()["reason"].startswith("6 of 10 reference tracks")
+    assert bench.pose()["reason"].startswith("6 of 10 people for the reference")
     with bench.store.read() as session:
-        assert load_reference_period(session, few, "corner") is None
+        period = load_reference_period(session, few, "corner")
+        assert (period.enough, len(period.trajectories)) == (False, 6)
     put(bench.http, 12, 4, ago_h=0.3)
     now = begin(bench.http)
     with bench.store.read() as session:

@@ -15,7 +15,7 @@ from tests.service.conftest import problem
 
 def test_before_there_is_an_estimate_the_prior_pose_is_served(corner):
     body = corner.get("/cameras/corner/pose").json()
-    assert body["state"] == "learning"
+    assert (body["state"], body["reason_code"]) == ("unconnected", "nobody_posted")
     assert body["estimated"] == []
     assert body["pose"]["tilt_deg"] == pytest.approx(22)
     assert (body["sd"], body["drift"], body["from"], body["to"]) == (None, None, None, None)
@@ -24,10 +24,25 @@ def test_before_there_is_an_estimate_the_prior_pose_is_served(corner):
         ("height_m", "tilt_deg", "roll_deg", "heading_deg")
     )
     assert body["since"] == {"after": None, "before": None}
-    assert body["reason"] == "0 of 200 reference tracks"
+    assert body["reason"] == "no track of anybody has been posted for it yet"
     assert body["reference"] == {
-        "state": "learning", "tracks": 0, "wanted": 200, "walking_speed_mps": None,
+        "state": "learning", "tracks": 0, "counted": 0, "pieces": 0, "hours": 0, "wanted": 200,
+        "walking_speed_mps": None,
     }  # fmt: skip
+
+
+def test_a_camera_is_unconnected_until_a_track_of_it_is_stored(corner):
+    def state():
+        return corner.get("/cameras/corner/pose").json()["state"]
+
+    bad = {**track("1"), "points": track("1")["points"][:2]}
+    for body, status in (({"tracks": []}, 202), ({"tracks": [bad]}, 422)):
+        assert corner.post("/cameras/corner/tracks", json=body).status_code == status
+        assert state() == "unconnected"
+    corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]}).raise_for_status()
+    assert state() == "learning"
+    corner.post("/cameras/corner/reference/reset").raise_for_status()
+    assert state() == "learning"  # somebody has posted, and is waited for
 
 
 def test_the_pose_is_the_estimate_and_heading_is_carried_over(bench):
@@ -47,7 +62,8 @@ def test_the_pose_is_the_estimate_and_heading_is_carried_over(bench):
     assert raw["tilt_deg"] == pytest.approx(23.9 + math.degrees(0.01))
     assert raw["tracks"] == body["tracks"] == 20
     assert body["reference"] == {
-        "state": "ready", "tracks": 200, "wanted": 200, "walking_speed_mps": 1.27,
+        "state": "ready", "tracks": 200, "counted": 200, "pieces": 0, "hours": 0, "wanted": 200,
+        "walking_speed_mps": 1.27,
     }  # fmt: skip
     assert body["model_id"] == bench.model_id
 
@@ -166,7 +182,9 @@ def test_accepting_makes_the_served_pose_the_prior_and_begins_a_reference(bench)
         bench.see(moved(tilt_deg=5.0))
     body = bench.http.post("/cameras/corner/pose/accept", json={"by": "Ada"}).json()
     assert body["state"] == "learning"
-    assert body["reason"] == "0 of 200 reference tracks"  # the tracks so far led to the new pose
+    assert (
+        body["reason"] == "0 of 200 people for the reference"
+    )  # the tracks so far led to the new pose
     assert body["reference"]["state"] == "learning"
     assert body["pose"]["tilt_deg"] == pytest.approx(27.0, abs=0.02)
     assert bench.alerts()[0]["outcome"] == "accepted"
@@ -174,7 +192,7 @@ def test_accepting_makes_the_served_pose_the_prior_and_begins_a_reference(bench)
     assert prior["tilt_deg"] == pytest.approx(27.0, abs=0.02)
     assert bench.trainings()[0]["state"] == "queued"
     bench.see(moved(tilt_deg=5.0), people=7)
-    assert bench.pose()["reason"] == "7 of 200 reference tracks"
+    assert bench.pose()["reason"] == "7 of 200 people for the reference"
     with bench.store.read() as session:
         reference = references.newest(session, "corner")
         assert (reference.origin, reference.requested_by) == ("accepted", "Ada")
@@ -198,10 +216,12 @@ def test_a_reset_takes_the_camera_to_be_back_at_its_prior_pose(bench):
 def test_the_number_of_reference_tracks_can_change_while_they_are_awaited(corner):
     batch = [track(str(n), start_s=1_700_000_000.0 + n) for n in range(9)]
     corner.post("/cameras/corner/tracks", json={"tracks": batch})
-    assert corner.get("/cameras/corner/pose").json()["reason"] == "9 of 200 reference tracks"
+    assert (
+        corner.get("/cameras/corner/pose").json()["reason"] == "9 of 200 people for the reference"
+    )
     change = {"reference_tracks": 50}
     corner.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
-    assert corner.get("/cameras/corner/pose").json()["reason"] == "9 of 50 reference tracks"
+    assert corner.get("/cameras/corner/pose").json()["reason"] == "9 of 50 people for the reference"
 
 
 def test_other_tracks_are_wanted_after_another_pose_but_not_after_another_speed(corner):
@@ -213,7 +233,7 @@ def test_other_tracks_are_wanted_after_another_pose_but_not_after_another_speed(
     ):
         corner.patch("/cameras/corner", json=change, headers={"If-Match": "*"}).raise_for_status()
         body = corner.get("/cameras/corner/pose").json()
-        assert body["reason"] == f"{left} of 200 reference tracks"
+        assert body["reason"] == f"{left} of 200 people for the reference"
 
 
 def test_history_is_a_series_between_two_times(bench):

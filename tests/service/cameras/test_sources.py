@@ -100,7 +100,7 @@ def test_another_source_moves_nothing_while_the_first_is_learned(http, settings)
     street.walk(PRIOR, 10)
     street.source = "stranger"
     street.walk(KNOCKED, WANTED)
-    assert street.look()["reason"] == f"10 of {WANTED} reference tracks"
+    assert street.look()["reason"] == f"10 of {WANTED} people for the reference"
 
 
 def test_an_update_of_the_detector_takes_over_once_the_old_one_is_silent(known):

@@ -98,3 +98,26 @@ def test_as_many_tracks_are_read_as_are_of_so_many_people(pieces):
         assert len(found.records) == walks.index(wanted)
     short = until_so_many(lambda limit: records[:limit], 10**6, LENS, PRIOR, Unpacked())
     assert (short.enough, len(short.records)) == (False, len(stored))
+
+
+def test_what_counts_is_said_while_the_reference_is_learned_and_after(pieces):
+    pieces.walk(PRIOR, 2 * REFERENCE)
+    everybody, posted = pieces.people, len(pieces.people) // 4
+    pieces.people = everybody[:posted]
+    pieces.play([posted])
+    counted = pieces.count(posted)
+    body = pieces.pose()
+    learned = body["reference"]
+    assert (learned["tracks"], learned["counted"]) == (posted, counted)
+    assert learned["pieces"] == posted - counted > 0
+    ends_s = [piece["points"][-1][0] for piece in pieces.people]
+    assert learned["hours"] == len({end_s // 3600 for end_s in ends_s})
+    assert body["reason"] == (
+        f"{counted} of {REFERENCE} people for the reference; "
+        f"{posted - counted} of {posted} tracks are pieces of others' walks"
+    )
+    pieces.people = everybody
+    pieces.play([len(everybody) - posted])
+    learned = pieces.pose()["reference"]
+    assert (learned["state"], learned["counted"]) == ("ready", REFERENCE)
+    assert learned["tracks"] == REFERENCE + learned["pieces"]

@@ -46,9 +46,9 @@ def test_a_reference_is_learned_of_the_first_tracks_without_any_model(street):
     street.walk(PRIOR, 40)
     body = street.look()
     assert body["state"] == "learning"
-    assert body["reason"] == "40 of 60 reference tracks"
+    assert body["reason"] == "40 of 60 people for the reference"
     assert body["reason_code"] == "reference_tracks"
-    assert body["reason_values"] == {"tracks": 40, "wanted": 60}
+    assert body["reason_values"] == {"counted": 40, "wanted": 60, "tracks": 40, "pieces": 0}
     assert served(body) == pytest.approx(numbers(PRIOR))
     assert (body["estimated"], body["sd"], body["drift"]) == ([], None, None)
     assert body["estimates"]["joint"]["tracks"] == 40  # under an assumed walking speed
@@ -151,7 +151,7 @@ def test_after_a_reset_the_next_tracks_make_the_reference(known):
     known.look()
     known.http.post("/cameras/corner/reference/reset").raise_for_status()
     body = known.look()
-    assert body["reason"] == "0 of 60 reference tracks"
+    assert body["reason"] == "0 of 60 people for the reference"
     known.clock_s += 60  # somebody climbs up and turns it back
     known.walk(PRIOR, WANTED)
     assert known.look()["reference"]["state"] == "ready"
@@ -252,7 +252,7 @@ def test_people_who_stand_make_no_reference(street):
         short["points"] = [[t, min(u, 2500.0), v] for t, u, v in short["points"]]
         street.http.post("/cameras/corner/tracks", json={"tracks": [short]}).raise_for_status()
     body = street.look()
-    assert body["reason"] == f"{WANTED} of {2 * WANTED} reference tracks"
+    assert body["reason"] == f"{WANTED} of {2 * WANTED} people for the reference"
     assert body["reference"]["state"] == "learning"
 
 
@@ -288,4 +288,4 @@ def test_an_estimate_that_a_reset_overtakes_is_dropped(known):
     with context.store.write() as session:
         stored = save_estimate(session, context.queue, context.settings, evidence, finding)
     assert stored is None
-    assert known.pose()["reason"] == "0 of 60 reference tracks"
+    assert known.pose()["reason"] == "0 of 60 people for the reference"

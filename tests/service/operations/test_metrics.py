@@ -40,7 +40,7 @@ def value(found, name, **labels):
 
 def test_an_empty_service_says_that_it_is_empty(http):
     found = scrape(http)
-    for state in ("learning", "ok", "drifting", "no_data"):
+    for state in ("unconnected", "learning", "ok", "drifting", "no_data"):
         assert value(found, "surefoot_cameras", state=state) == 0
     assert value(found, "surefoot_alerts_firing", kind="drift", severity="critical") == 0
     assert value(found, "surefoot_queue_lag_seconds") == 0

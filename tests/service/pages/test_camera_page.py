@@ -31,7 +31,7 @@ def headline(http):
 
 
 def test_a_new_camera_says_how_much_is_missing(corner):
-    assert headline(corner) == "Learning: 0 of 200 people."
+    assert headline(corner) == "Nobody has posted anybody's track for this camera yet."
     text = page(corner)
     assert "Nobody was seen yet" in text
     assert 'class="grid prior"' in text

@@ -84,8 +84,9 @@ def test_a_tracker_that_is_to_blame_has_one_banner(http, fleet, settings):
     for n in range(4):
         fleet.add(f"cam-{n}", state="drifting", tilt_deg=3.0)
     with fleet.store.write() as session:
-        for record in session.query(statements.TrackRecord):
-            record.source = "bytetrack"
+        for table in (statements.TrackRecord, statements.SiteReferenceRecord):
+            for record in session.query(table):
+                record.source = "bytetrack"
     for n in range(4):
         fleet.knock(f"cam-{n}")
     html = http.get("/").text

@@ -101,9 +101,11 @@ SAID = [
      "pose: the prior pose is wrong, or the camera had moved before"),
     (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
     (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
-    (S.REFERENCE_TRACKS, {"tracks": 40, "wanted": 60}, "40 of 60 reference tracks"),
-    (S.REFERENCE_TRACKS, {"tracks": 60, "wanted": 60},
-     "60 of 60 reference tracks; pieces of one walk count once"),
+    (S.NOBODY_POSTED, {}, "no track of anybody has been posted for it yet"),
+    (S.REFERENCE_TRACKS, {"counted": 40, "wanted": 60, "tracks": 40, "pieces": 0},
+     "40 of 60 people for the reference"),
+    (S.REFERENCE_TRACKS, {"counted": 98, "wanted": 133, "tracks": 133, "pieces": 35},
+     "98 of 133 people for the reference; 35 of 133 tracks are pieces of others' walks"),
     (S.TRACKS_SINCE, {"tracks": 3, "cause": "put_back", "least_walkers": 5},
      "3 tracks since the camera was put back; at least 5 of people who walk for a few seconds "
      "inside the image are needed"),
@@ -164,10 +166,12 @@ def test_every_code_has_words():
 def test_reasons_are_said_one_after_the_other():
     assert in_words(()) == ""
     changed = Reason(code=T.HEADING_UNIDENTIFIABLE, values={"heading_sd_rad": 0.1})
-    missing = Reason(code=S.REFERENCE_TRACKS, values={"tracks": 1, "wanted": 2})
+    missing = Reason(
+        code=S.REFERENCE_TRACKS, values={"counted": 1, "wanted": 2, "tracks": 1, "pieces": 0}
+    )
     assert in_words((Reason(code=S.LAST_IDENTIFIABLE), changed, missing)) == (
         "when it was last told: where people walk does not tell the heading (sd 5.7 deg); "
-        "1 of 2 reference tracks"
+        "1 of 2 people for the reference"
     )
     assert in_words(some(None, *as_said("far"), None)) == "far"
 

@@ -60,7 +60,7 @@ def test_tracks_in_a_worker_killed_in_training_one_pose_out_and_a_clean_stop(ser
     )
     assert body["tracks"] == 30
     assert {body["estimates"][name]["tracks"] for name in ("averaged", "joint")} == {30}
-    assert body["reason"] == "30 of 200 reference tracks"
+    assert body["reason"] == "30 of 200 people for the reference"
     time.sleep(3)  # some reconciles
     assert states(service) == ["succeeded"]  # it trained again, once
     training = service.http.get(url).json()["items"][0]
