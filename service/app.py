@@ -37,7 +37,7 @@ from service.api.middleware.problems import FORESEEN, ProblemMiddleware, answer_
 from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
-from service.pages import access, api_docs, camera_page, fleet, registration
+from service.pages import access, api_docs, camera_page, connecting, fleet, registration
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -99,6 +99,7 @@ def create_app(settings: Settings) -> FastAPI:
         api_docs,
         fleet,
         camera_page,
+        connecting,
         registration,
         tokens,
         access,

@@ -233,6 +233,7 @@ def change(
 
 
 @router.delete("/{camera_id}", status_code=204)
-def remove(camera_id: str, etag: EtagDep, session: WriteDep) -> None:
+def remove(camera_id: str, etag: EtagDep, state: StateDep, session: WriteDep) -> None:
     """Delete a camera with its tracks, models, estimates and alerts."""
     cameras.remove_camera(session, camera_id, etag)
+    state.posts.forget(camera_id)  # another may come under its id

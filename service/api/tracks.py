@@ -22,7 +22,7 @@ from service.api.middleware.dependencies import (
 )
 from service.api.schemas import Out
 from service.cameras import tracks
-from service.errors import MalformedError, UnsupportedMediaTypeError
+from service.errors import MalformedError, ServiceError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
@@ -203,18 +203,28 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
 
 def _take(state: AppState, camera_id: str, came: Posted, caller: Caller | None) -> Response:
     camera = state.pictures.of(state.store, camera_id)
+    try:
+        receipt = _stored(state, camera_id, camera, came, caller)
+    except ServiceError as error:
+        state.posts.note_error(camera_id, error)
+        raise
+    state.posts.note(camera_id, receipt.accepted, receipt.duplicates, receipt.rejections)
+    body = ReceiptOut.model_validate(receipt).model_dump_json(exclude_defaults=True)
+    return Response(body, 202, media_type="application/json")
+
+
+def _stored(
+    state: AppState, camera_id: str, camera: Picture, came: Posted, caller: Caller | None
+) -> tracks.Receipt:
     while True:
         try:
-            receipt = _store(state, camera_id, camera, came, caller)
-            break
+            return _store(state, camera_id, camera, came, caller)
         except (MalformedError, tracks.StalePictureError) as error:
             # It may be that the picture is another than when it was last asked for.
             now = state.pictures.again(state.store, camera_id)
             if now == camera and isinstance(error, MalformedError):
                 raise
             camera = now
-    body = ReceiptOut.model_validate(receipt).model_dump_json(exclude_defaults=True)
-    return Response(body, 202, media_type="application/json")
 
 
 def _store(

@@ -20,6 +20,7 @@ from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.enums import AlertState, PoseState
 from service.pages.camera_drawings import draw_camera
+from service.pages.connecting import how_to_connect
 from service.settings import Settings
 from service.store import cameras, journal, references, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
@@ -199,6 +200,9 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         misplaced=moves.misplaced_words(page.misplaced),
         flags=_flags(page, clock),
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],
+        connect=None
+        if page.pose.reference.ready
+        else how_to_connect(request, state.settings, camera_id),
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,

@@ -264,6 +264,29 @@ def arrivals(
     return [(received_at, ended_s) for received_at, ended_s in rows]
 
 
+def newest_arrivals(
+    session: Session, camera_id: str, limit: int
+) -> Sequence[tuple[datetime, float]]:
+    """The times at which the newest so many tracks to come were stored and ended, newest first."""
+    rows = session.execute(
+        select(TrackRecord.received_at, TrackRecord.ended_s)
+        .where(*counting(camera_id))
+        .order_by(TrackRecord.received_at.desc())
+        .limit(limit)
+    )
+    return [(received_at, ended_s) for received_at, ended_s in rows]
+
+
+def arrived_since(session: Session, camera_id: str, at: datetime) -> tuple[int, datetime | None]:
+    """The number of tracks stored from a time on, and when the first of them was."""
+    count, first_at = session.execute(
+        select(func.count(), func.min(TrackRecord.received_at)).where(
+            *counting(camera_id), TrackRecord.received_at >= at
+        )
+    ).one()
+    return count, first_at
+
+
 def count_ended(session: Session, camera_id: str, from_s: float, to_s: float) -> int:
     """The number of tracks that ended from one time to another."""
     ended_s = TrackRecord.ended_s

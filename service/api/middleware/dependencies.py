@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from service.access.tokens import Caller
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
+from service.cameras.post_log import PostLog
 from service.cameras.tracks import Pictures, Quota, Watched
 from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
@@ -39,6 +40,7 @@ class AppState:
     feed: Feed
     pictures: Pictures = field(default_factory=Pictures)
     watched: Watched = field(default_factory=Watched)
+    posts: PostLog = field(default_factory=PostLog)
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
     stills: Turns = field(default_factory=lambda: Turns("still images"))

@@ -41,6 +41,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /openapi.json",
         "GET /trainings/{training_id}",
         "GET /ui/cameras/{camera_id}",
+        "GET /ui/cameras/{camera_id}/posts",
         "GET /ui/fleet/banners",
         "GET /ui/fleet/rows",
         f"GET {CHARTS_URL}",

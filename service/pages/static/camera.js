@@ -50,6 +50,8 @@ subscribe(({ data }) => {
   if (data.camera_id === camera || data.camera_ids?.includes(camera)) soon();
 });
 
+document.addEventListener("camera-stale", soon);
+
 keepTimes(document.querySelector('[data-part="summary"]'));
 
 // --- Actions -----------------------------------------------------------------------------------

@@ -1,0 +1,150 @@
+// The panel of a camera that learns: what comes for it, live; a token, commands, a file to post.
+
+import { announce, call, guarded, Refused } from "./act.js";
+
+const panel = document.getElementById("connect");
+const live = document.getElementById("posts");
+const says = document.getElementById("drop-says");
+const EVERY_MS = 3000;
+const TYPES = {
+  json: "application/json",
+  ndjson: "application/x-ndjson",
+  jsonl: "application/x-ndjson",
+  csv: "text/csv",
+  txt: "text/csv",
+};
+
+let token = null;
+let timer = null;
+
+// --- Live --------------------------------------------------------------------------------------
+
+/** Exchange what is said of the posts; once the reference is there, the panel has done its work. */
+async function look() {
+  const camera = document.getElementById("camera").dataset.camera;
+  const answer = await fetch(`/ui/cameras/${encodeURIComponent(camera)}/posts`);
+  if (!answer.ok || answer.redirected) return;
+  const holder = document.createElement("template");
+  holder.innerHTML = await answer.text();
+  const before = live.querySelector(".posts")?.dataset.state;
+  const open = live.querySelector("details")?.open;
+  live.replaceChildren(holder.content);
+  live.removeAttribute("aria-busy");
+  if (open) live.querySelector("details")?.setAttribute("open", "");
+  const { state, ready } = live.querySelector(".posts").dataset;
+  if (before && before !== state) document.dispatchEvent(new CustomEvent("camera-stale"));
+  if (ready === "yes") finish();
+}
+
+function finish() {
+  clearInterval(timer);
+  announce("The reference is learned.");
+  document.dispatchEvent(new CustomEvent("camera-stale"));
+  panel.remove();
+}
+
+const lookAgain = () => document.hidden || look().catch(console.warn);
+
+// --- Commands ----------------------------------------------------------------------------------
+
+/** Put the tracker's name into the commands, as it may stand in them. */
+function showSource() {
+  const name = document.getElementById("tracker").value.trim() || "tracker";
+  for (const place of panel.querySelectorAll("[data-source]")) {
+    const text = place.closest("#csv") ? encodeURIComponent(name) : JSON.stringify(name).slice(1, -1);
+    place.textContent = text.replaceAll("'", place.closest("#csv") ? "%27" : "\\u0027");
+  }
+}
+
+async function makeToken() {
+  const camera = document.getElementById("camera").dataset.camera;
+  const body = { name: `tracks of ${camera}`, scopes: ["ingest"], cameras: [camera] };
+  token = (await call("POST", "/tokens", body)).token;
+  for (const place of panel.querySelectorAll("[data-token]")) place.textContent = token;
+  document.getElementById("made-token").hidden = false;
+  announce("The token is made, and stands in the commands.");
+}
+
+async function copy(name) {
+  const pre = document.getElementById(name);
+  try {
+    await navigator.clipboard.writeText(pre.textContent);
+    announce("Copied.");
+  } catch {
+    // Plain HTTP has no clipboard: what is to be copied is chosen, at least.
+    getSelection().selectAllChildren(pre);
+    announce("Chosen: copy it with the keyboard.");
+  }
+}
+
+// --- A file ------------------------------------------------------------------------------------
+
+function addressOf(type) {
+  const query = new URLSearchParams();
+  if (type !== TYPES.json) query.set("source", document.getElementById("tracker").value.trim() || "tracker");
+  if (type === TYPES.csv) {
+    const began = document.getElementById("began").value;
+    const rate = document.getElementById("rate").value.trim().replace(",", ".");
+    if (began) query.set("started_at", new Date(began).toISOString());
+    if (rate) query.set("frame_rate_hz", rate);
+  }
+  return panel.dataset.tracks + (query.size ? `?${query}` : "");
+}
+
+async function post(file) {
+  const type = TYPES[file.name.split(".").at(-1).toLowerCase()];
+  if (!type) throw refused(`${file.name}: a file that ends in .json, .ndjson, .csv or .txt is needed.`);
+  if (panel.dataset.posts === "no" && !token) {
+    throw refused("Who is logged in here may not post tracks: make a token first, or use a command.");
+  }
+  says.textContent = `Posting ${file.name}…`;
+  const headers = { Accept: "application/json", "Content-Type": type };
+  if (token) headers.Authorization = `Bearer ${token}`;
+  const answer = await fetch(addressOf(type), { method: "POST", headers, body: file });
+  const body = await answer.json();
+  if (!answer.ok) throw new Refused(body);
+  const { accepted, duplicates, rejected, left_out } = body;
+  const parts = [`${accepted} taken`, `${duplicates} known before`, `${rejected.length} refused`];
+  if (left_out) parts.push(`${left_out} of no person left out`);
+  says.textContent = `${file.name}: ${parts.join(", ")}.`;
+}
+
+const refused = (detail) => new Refused({ title: "Not posted", detail });
+
+async function send(file) {
+  if (!file) return;
+  says.classList.remove("wrong");
+  try {
+    await post(file);
+  } catch (error) {
+    says.classList.add("wrong");
+    const reasons = error.problem?.errors ?? [];
+    says.textContent = reasons.length === 1 ? reasons[0].reason : error.message;
+  }
+  await look();
+}
+
+if (panel) {
+  const input = document.getElementById("tracks-file");
+  const drop = document.getElementById("drop");
+  input.addEventListener("change", () => {
+    const [file] = input.files;
+    input.value = ""; // the same file again is news, too
+    guarded(input, () => send(file));
+  });
+  drop.addEventListener("submit", (event) => event.preventDefault());
+  for (const type of ["dragenter", "dragover", "dragleave", "drop"]) {
+    drop.addEventListener(type, (event) => {
+      event.preventDefault();
+      drop.classList.toggle("over", type === "dragenter" || type === "dragover");
+      if (type === "drop") guarded(null, () => send(event.dataTransfer.files[0]));
+    });
+  }
+  document.getElementById("tracker").addEventListener("input", showSource);
+  const make = document.getElementById("make-token");
+  make?.addEventListener("click", () => guarded(make, makeToken));
+  panel.addEventListener("click", ({ target }) => target.dataset.copy && copy(target.dataset.copy));
+  document.addEventListener("visibilitychange", lookAgain);
+  timer = setInterval(lookAgain, EVERY_MS);
+  lookAgain();
+}
