@@ -16,11 +16,16 @@ from tests.models.sites import KNOCKED, LENS, PRIOR, near, tracks_of
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-def code() -> str:
-    """The one example that there is: another needs a test of its own."""
-    pages = "".join(page.read_text() for page in sorted(DOCS.rglob("*.md")))
-    (found,) = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
+def code(page: str = "start.md") -> str:
+    """The example of a page."""
+    (found,) = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
     return found
+
+
+def test_each_example_has_a_test():
+    pages = {page for page in DOCS.rglob("*.md") if "```python" in page.read_text()}
+    tested = {"start.md": __file__, "guides/trackers.md": "tests/surefoot/test_client.py"}
+    assert {str(page.relative_to(DOCS)) for page in pages} == set(tested)
 
 
 def mot_lines(tracks) -> list[str]:

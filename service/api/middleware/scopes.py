@@ -14,6 +14,7 @@ Need = TokenScope | None
 _ROUTES: dict[Need, tuple[str, ...]] = {
     # `/readyz` tells an orchestrator whether to send work here; what is wrong, only who may read.
     None: (
+        "GET /client.py",
         "GET /healthz",
         "GET /readyz",
         "GET /ui/login",

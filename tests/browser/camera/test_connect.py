@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 import time
 from datetime import UTC, datetime
 
@@ -38,6 +39,18 @@ def run(command):
     """What a command prints that was copied from the page, as a shell runs it."""
     shell = ["bash", "-c", command]
     return json.loads(subprocess.run(shell, capture_output=True, check=True, timeout=30).stdout)
+
+
+def walk_by(program, folder):
+    """How a program of the page ends that sees one person walk."""
+    fetch, *lines = program.splitlines()
+    subprocess.run(["bash", "-c", fetch.lstrip("# ")], cwd=folder, check=True, timeout=30)
+    added = "client.add(track_id, (x1, y1, x2, y2))"
+    assert added in program
+    walk = "[client.add(7, (300 + n, 200, 360 + n, 400), 1.7e9 + n) for n in range(9)]"
+    program = "\n".join(lines).replace(added, walk)
+    alone = [sys.executable, "-S", "-c", program]
+    return subprocess.run(alone, cwd=folder, check=True, timeout=30).returncode
 
 
 def people(count, ended_ago_s=20):
@@ -164,6 +177,8 @@ def test_a_token_is_made_there_and_posts_for_this_camera_alone(browser, closed, 
         assert run(command.replace("/corner/", "/other/"))["code"] == "forbidden"
         page.locator("#tracks-file").set_input_files(tmp_path / "a.json")
         expect(page.locator("#drop-says")).to_contain_text("4 taken")
+        assert walk_by(page.locator("#python").inner_text(), tmp_path) == 0
+        expect(page.locator("#posted")).to_contain_text("5 taken")
         assert axe(page) == []
         shoot(page, "connect-token")
         (made,) = [each for each in server.http.get("/tokens").json()["items"] if each["cameras"]]

@@ -37,6 +37,8 @@ def test_a_new_camera_has_commands_with_its_address_id_and_size(corner):
     assert "curl -sS http://testserver/cameras/corner/tracks" in commands
     assert '"size": [1280, 720], "tracks": []' in commands
     assert "frame_rate_hz=25&started_at=" in commands
+    assert 'with Client("http://testserver", "corner",\n            source="tracker",' in commands
+    assert "size=(1280, 720)) as client:" in commands
     assert "Authorization" not in commands  # access is off
     assert "none yet" in posts(corner)
 
