@@ -45,12 +45,10 @@ function exchange(part, news) {
 
 const keyOf = (each) => [each.tagName, each.id, ...Object.values(each.dataset)].join(" ");
 
-const soon = debounced(() => refresh().catch(() => {}), 250);
+export const refreshSoon = debounced(() => refresh().catch(() => {}), 250);
 subscribe(({ data }) => {
-  if (data.camera_id === camera || data.camera_ids?.includes(camera)) soon();
+  if (data.camera_id === camera || data.camera_ids?.includes(camera)) refreshSoon();
 });
-
-document.addEventListener("camera-stale", soon);
 
 keepTimes(document.querySelector('[data-part="summary"]'));
 

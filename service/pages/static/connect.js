@@ -1,6 +1,7 @@
 // The panel of a camera that learns: what comes for it, live; a token, commands, a file to post.
 
 import { announce, call, guarded, Refused } from "./act.js";
+import { refreshSoon } from "./camera.js";
 
 const panel = document.getElementById("connect");
 const live = document.getElementById("posts");
@@ -26,20 +27,19 @@ async function look() {
   if (!answer.ok || answer.redirected) return;
   const holder = document.createElement("template");
   holder.innerHTML = await answer.text();
-  const before = live.querySelector(".posts")?.dataset.state;
   const open = live.querySelector("details")?.open;
   live.replaceChildren(holder.content);
   live.removeAttribute("aria-busy");
   if (open) live.querySelector("details")?.setAttribute("open", "");
   const { state, ready } = live.querySelector(".posts").dataset;
-  if (before && before !== state) document.dispatchEvent(new CustomEvent("camera-stale"));
+  if (document.querySelector(".summary").dataset.state !== state) refreshSoon();
   if (ready === "yes") finish();
 }
 
 function finish() {
   clearInterval(timer);
   announce("The reference is learned.");
-  document.dispatchEvent(new CustomEvent("camera-stale"));
+  refreshSoon();
   panel.remove();
 }
 

@@ -133,6 +133,7 @@ def test_the_panel_goes_once_the_reference_is_there(page, server, new, expect):
         reference.ready_at, reference.tracks, reference.hours = datetime.now(UTC), 200, 2
         reference.data, reference.walking_speed_mps = b"made up", 1.3
     expect(page.locator("#connect")).to_have_count(0)
+    expect(page.locator(".headline")).to_contain_text("Waiting for people")
     said = page.locator('[data-part="reference"]')
     expect(said).to_contain_text("Reference learned of 200 people of 2 different hours")
 
@@ -179,6 +180,7 @@ def test_a_token_is_made_there_and_posts_for_this_camera_alone(browser, closed, 
         expect(page.locator("#drop-says")).to_contain_text("4 taken")
         assert walk_by(page.locator("#python").inner_text(), tmp_path) == 0
         expect(page.locator("#posted")).to_contain_text("5 taken")
+        expect(page.locator(".headline")).to_have_text("Learning: 5 of 200 people.")
         assert axe(page) == []
         shoot(page, "connect-token")
         (made,) = [each for each in server.http.get("/tokens").json()["items"] if each["cameras"]]
