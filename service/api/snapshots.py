@@ -68,11 +68,7 @@ def show(
 ) -> Response:
     """The still image of a camera."""
     record = snapshots.show_snapshot(session, state.settings, camera_id)
-    headers = {
-        "ETag": f'"{record.sha256}"',
-        "Cache-Control": "private, no-cache",
-        "X-Content-Type-Options": "nosniff",
-    }
+    headers = {"ETag": f'"{record.sha256}"', "Cache-Control": "private, no-cache"}
     if if_none_match == headers["ETag"]:
         return Response(status_code=304, headers=headers)
     return Response(record.jpeg, media_type="image/jpeg", headers=headers)

@@ -36,7 +36,8 @@ def _refusal(status: HTTPStatus, code: str, detail: str) -> bytes:
     body = json.dumps({**problem, "detail": detail}, separators=(",", ":"))
     return (
         f"HTTP/1.1 {status} {title}\r\ncontent-type: application/problem+json\r\n"
-        f"content-length: {len(body)}\r\nretry-after: 2\r\nconnection: close\r\n\r\n{body}"
+        f"x-content-type-options: nosniff\r\ncontent-length: {len(body)}\r\n"
+        f"retry-after: 2\r\nconnection: close\r\n\r\n{body}"
     ).encode()
 
 

@@ -8,8 +8,8 @@ import socket
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.errors import ServiceError
 from service.settings import Settings
@@ -70,15 +70,8 @@ class OriginMiddleware:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-
-        async def isolated(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                # Neither pictures nor scripts of ours show in a page of another origin.
-                MutableHeaders(scope=message)["Cross-Origin-Resource-Policy"] = "same-origin"
-            await send(message)
-
         self._check(scope)
-        await self._app(scope, receive, isolated)
+        await self._app(scope, receive, send)
 
     def _check(self, scope: Scope) -> None:
         headers = Headers(scope=scope)

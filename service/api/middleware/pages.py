@@ -23,16 +23,12 @@ HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; object-src 'none'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
     "Referrer-Policy": "same-origin",
-    "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
 
 
 # Of what has a version in its path.
-_FOR_EVER = {
-    "Cache-Control": "public, max-age=31536000, immutable",
-    "X-Content-Type-Options": "nosniff",
-}
+_FOR_EVER = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 
 _PACKAGED: dict[str, tuple[str, str]] = {}  # files of installed packages, by URL

@@ -10,6 +10,7 @@ from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -28,13 +29,19 @@ FORESEEN = (
     RequestValidationError,
     HTTPException,
 )
+# Nothing of ours shows in a page of another origin, and no browser guesses at a type: JSON with
+# text that a tracker made up is no page.
+_OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = 80
 
 
 class ProblemMiddleware:
-    """Answers what nobody foresaw, or what other middlewares raise, with a problem document."""
+    """Answers what nobody foresaw, or what other middlewares raise, with a problem document.
+
+    It sees every answer, and says of each that a browser must not take it for anything else.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -48,7 +55,9 @@ class ProblemMiddleware:
 
         async def noting(message: Message) -> None:
             nonlocal begun
-            begun = begun or message["type"] == "http.response.start"
+            if message["type"] == "http.response.start":
+                begun = True
+                MutableHeaders(scope=message).update(_OF_ALL)
             await send(message)
 
         try:
@@ -59,7 +68,7 @@ class ProblemMiddleware:
             if begun:
                 raise
             answer = await answer_of(Request(scope, receive), error)
-            await answer(scope, receive, send)
+            await answer(scope, receive, noting)
 
 
 def problem(request: Request, error: ServiceError) -> Response:

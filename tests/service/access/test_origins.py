@@ -5,6 +5,7 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 
+from service.api.middleware.pages import STATIC_URL
 from service.api.middleware.scopes import NEEDS
 from service.app import create_app
 from service.store.record import Record
@@ -78,7 +79,19 @@ def test_what_is_asked_from_within_another_page_is_refused(corner):
     link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
     answer = corner.get("/ui/cameras/corner", headers={**link, "Sec-Fetch-Dest": "document"})
     assert answer.status_code == 200
-    assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+
+
+def test_no_answer_is_taken_for_anything_else_or_shown_elsewhere(corner):
+    foreign = {"Host": "elsewhere.example"}
+    asked = (
+        ("/cameras", {}, 200), ("/ui/register", {}, 200), (f"{STATIC_URL}/events.js", {}, 200),
+        ("/cameras/none", {}, 404), ("/nowhere", {}, 404), ("/cameras", foreign, 421),
+    )  # fmt: skip
+    for path, headers, status in asked:
+        answer = corner.get(path, headers=headers)
+        assert answer.status_code == status
+        assert answer.headers["X-Content-Type-Options"] == "nosniff", path
+        assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin", path
 
 
 @pytest.mark.parametrize(
