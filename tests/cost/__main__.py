@@ -1,6 +1,7 @@
-"""Fuzzing of cost: `python -m tests.cost --windows 2000` draws windows and prints the worst ten.
+"""Fuzzing of cost: `python -m tests.cost` draws bodies and windows, and prints the worst of each.
 
-Exits with 1 where one is beyond the budget of a look; Ctrl-C ends it early, with what it has.
+Exits with 1 where one is beyond its budget, of its size or of a look; Ctrl-C goes on to what comes
+next, with what it has.
 """
 
 import argparse
@@ -12,32 +13,83 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings, target
 
-from tests.cost.drawn import windows
+from tests.cost.bodies import MB, BodyCost, Drawn, bodies, read_cost, words_of
+from tests.cost.drawn import Crowd, windows
 from tests.cost.looks import LOOK_CPU_S, LOOK_MB, Cost, looker
 
 _WORST = 10
 
 
 def main() -> int:
-    """Draw, look, print."""
+    """Draw bodies, then windows; print the worst."""
     parser = argparse.ArgumentParser(prog="python -m tests.cost", description=__doc__)
+    parser.add_argument("--bodies", type=int, default=20_000)
+    parser.add_argument("--body-mb", type=float, default=32.0, help="MiB of the largest body")
     parser.add_argument("--windows", type=int, default=2_000)
     parser.add_argument("--points", type=int, default=400_000, help="most points of a crowd")
     parser.add_argument("--seed", type=int, default=0)
-    given_ = parser.parse_args()
-    costs: list[Cost] = []
-    with tempfile.TemporaryDirectory() as folder, looker(Path(folder) / "data") as found:
+    asked = parser.parse_args()
+    beyond = _bodies(asked.bodies, asked.body_mb, asked.seed) if asked.bodies else 0
+    beyond += _windows(asked.windows, asked.points, asked.seed) if asked.windows else 0
+    return 1 if beyond else 0
 
-        @seed(given_.seed)
-        @settings(
-            max_examples=given_.windows,
+
+def _drawing(examples: int, number: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The way in which a function's arguments are drawn: so often, and from costly to costlier."""
+
+    def drawing(test: Callable[..., None]) -> Callable[..., None]:
+        how = settings(
+            max_examples=examples,
             deadline=None,
             database=None,
             phases=(Phase.generate, Phase.target),
             suppress_health_check=list(HealthCheck),
         )
-        @given(windows(given_.points))
-        def look(window) -> None:  # type: ignore[no-untyped-def]
+        return seed(number)(how(test))
+
+    return drawing
+
+
+def _bodies(number: int, most_mb: float, seed_: int) -> int:
+    """How many bodies are beyond what they are worth."""
+    costs: list[BodyCost] = []
+
+    @_drawing(number, seed_)
+    @given(bodies(int(most_mb * MB)))
+    def read(drawn: Drawn) -> None:
+        cost = read_cost(drawn)
+        costs.append(cost)
+        target(cost.peak_mb / (cost.mb + 4), label="MB a MiB")
+        target(cost.cpu_s / (cost.mb + 4), label="CPU seconds a MiB")
+        if len(costs) % 1_000 == 0:
+            _say(f"{len(costs)} bodies")
+
+    with contextlib.suppress(KeyboardInterrupt):
+        read()
+    for title, key in (
+        ("CPU seconds", lambda cost: cost.cpu_s),
+        ("memory", lambda cost: cost.peak_mb),
+        ("CPU a MiB", lambda cost: cost.cpu_s / (cost.mb + 4)),
+        ("memory a MiB", lambda cost: cost.peak_mb / (cost.mb + 4)),
+    ):
+        _say(f"\nThe worst bodies by {title}:")
+        for cost in sorted(costs, key=key, reverse=True)[:_WORST]:
+            _say(words_of(cost))
+    beyond = [cost for cost in costs if cost.too_large or cost.too_slow]
+    _say(f"\n{len(costs)} bodies, {len(beyond)} beyond their budget")
+    for cost in beyond[:_WORST]:
+        _say(words_of(cost))
+    return len(beyond)
+
+
+def _windows(number: int, points: int, seed_: int) -> int:
+    """How many windows are beyond the budget of a look."""
+    costs: list[Cost] = []
+    with tempfile.TemporaryDirectory() as folder, looker(Path(folder) / "data") as found:
+
+        @_drawing(number, seed_)
+        @given(windows(points))
+        def look(window: tuple[list[Crowd], bool]) -> None:
             drawn, checked = window
             cost = found.look(drawn, checked=checked)
             costs.append(cost)
@@ -58,7 +110,7 @@ def main() -> int:
     _say(f"\n{len(costs)} windows, {_most(costs)}; {len(beyond)} beyond their budget")
     for cost in beyond[:_WORST]:
         _say(_words(cost))
-    return 1 if beyond else 0
+    return len(beyond)
 
 
 def _is_beyond(cost: Cost) -> bool:
