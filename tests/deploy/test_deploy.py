@@ -14,6 +14,7 @@ from service.settings import Settings
 from tests.conftest import ROOT
 
 UNIT = ROOT / "deploy" / "surefoot.service"
+WORKER_UNIT = ROOT / "deploy" / "surefoot-worker@.service"
 COMPOSE = ROOT / "deploy" / "compose.yaml"
 GUIDES = sorted((ROOT / "docs" / "guides").glob("*.md"))
 RETENTION = (ROOT / "docs" / "guides" / "backup.md").read_text().split("## Retention")[1]
@@ -22,7 +23,7 @@ OF_CLIENTS = {"SUREFOOT_TOKEN"}  # of replay, which is no part of the service
 
 
 def test_settings_exist():
-    for path in (UNIT, COMPOSE, *GUIDES):
+    for path in (UNIT, WORKER_UNIT, COMPOSE, *GUIDES):
         assert (
             set(re.findall(r"SUREFOOT_[A-Z_]*[A-Z]", path.read_text())) <= SETTINGS | OF_CLIENTS
         ), path
@@ -48,7 +49,7 @@ def test_limits_that_are_told_are_the_defaults():
 
 
 def test_commands_exist():
-    text = "".join(path.read_text() for path in (UNIT, *GUIDES))
+    text = "".join(path.read_text() for path in (UNIT, WORKER_UNIT, *GUIDES))
     commands = set(re.findall(r"(?:`|/bin/|    )surefoot ([a-z-]+)", text))
     assert {"serve", "backup", "restore", "check", "rotate-key"} <= commands
     for command in commands:
@@ -57,17 +58,22 @@ def test_commands_exist():
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd here")
-def test_systemd_takes_the_unit(tmp_path):
-    unit = tmp_path / "surefoot.service"
-    unit.write_text(UNIT.read_text().replace("/opt/surefoot/bin/surefoot", "/bin/true"))
+def test_systemd_takes_the_units(tmp_path):
+    for unit in (UNIT, WORKER_UNIT):
+        text = unit.read_text().replace("/opt/surefoot/bin/surefoot", "/bin/true")
+        (tmp_path / unit.name).write_text(text)
     checked = subprocess.run(
-        ["systemd-analyze", "verify", str(unit)], capture_output=True, text=True, check=False
+        ["systemd-analyze", "verify", str(tmp_path / UNIT.name)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (checked.returncode, checked.stderr) == (0, "")
 
 
-def test_the_unit_restarts_limits_and_hardens():
-    lines = set(UNIT.read_text().splitlines())
+@pytest.mark.parametrize("unit", [UNIT, WORKER_UNIT])
+def test_the_unit_restarts_limits_and_hardens(unit):
+    lines = set(unit.read_text().splitlines())
     assert {
         "Restart=always",
         "UMask=0077",
@@ -87,7 +93,9 @@ def test_what_is_compiled_has_a_place_that_can_be_written():
 
 
 def test_the_container_restarts_limits_and_is_watched():
-    service = yaml.safe_load(COMPOSE.read_text())["services"]["surefoot"]
+    services = yaml.safe_load(COMPOSE.read_text())["services"]
+    assert services["worker"]["volumes"] == services["surefoot"]["volumes"]
+    service = services["surefoot"]
     assert service["restart"] == "always"
     assert service["mem_limit"]
     assert service["pids_limit"]
