@@ -163,7 +163,9 @@ def compute_finding(
     moved_prior = evidence.moved_prior
     if crept:
         moved_prior = raised_by_creep(moved_prior, observed, evidence.alarms_a_year)
-    found = since_alarm(replace(found, moved_prior=moved_prior), observed, site, reading)
+    found = replace(found, moved_prior=moved_prior)
+    judged = partial(since_alarm, found, observed, site, reading)
+    found = failures.unless_failed("chart", judged) or found
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     return Finding(

@@ -14,7 +14,7 @@ KINDS = {
     AlertKind.CLOCK: "The clock looks wrong",
     AlertKind.UNSURE: "Something changed",
     AlertKind.NO_DATA: "No people come",
-    AlertKind.STALE: "Its estimate lacks tracks",
+    AlertKind.STALE: "Its estimate fails or lacks tracks",
     AlertKind.TRACKER: "Another tracker posts",
 }
 OUTCOMES = {

@@ -156,7 +156,7 @@ def fleet_line(
     if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
     if kinds and kinds[0] == AlertKind.STALE:
-        return "its estimate lacks tracks: the alert says which, and since when"
+        return "its estimate fails or lacks tracks: the alert says why, and since when"
     if state == PoseState.UNCONNECTED:
         return "nobody has posted tracks for it yet: its page says how"
     if state == PoseState.LEARNING and learned is not None:

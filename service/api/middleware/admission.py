@@ -128,9 +128,8 @@ async def start_threads(number: int) -> None:
 
 
 _MB = 1024 * 1024
-# As the router has them: its patterns end with $, before which a line may end.
-_TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)\n?")
-_SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot\n?")
+_TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)")
+_SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot")
 
 
 class AdmissionMiddleware:

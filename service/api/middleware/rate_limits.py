@@ -11,8 +11,7 @@ from service.settings import Settings
 
 _MOST_KEYS = 10_000
 _BURST_S = 5.0  # of silence that may be made up for at once
-# As the router has it: its patterns end with $, before which a line may end.
-_CAMERA = re.compile(r"/cameras/([^/]+)/tracks\n?")
+_CAMERA = re.compile(r"/cameras/([^/]+)/tracks")
 _FREE = ("/healthz", "/readyz")
 
 
