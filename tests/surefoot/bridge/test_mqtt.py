@@ -85,7 +85,7 @@ def test_states_and_alerts_go_out_and_home_assistant_finds_them(tmp_path, port, 
     heard = client.heard
     with bridged(tmp_path, port, service.url) as bridge:
         wait_for(lambda: "surefoot/corner/alert" in heard)
-        assert heard["surefoot/corner/state"]["state"] == "learning"
+        assert heard["surefoot/corner/state"]["state"] == "unconnected"
         assert heard["surefoot/corner/alert"] == {"firing": [], "alerts": []}
         wait_for(lambda: heard.get("surefoot/bridge/availability") == "online")
         config = heard["homeassistant/device/surefoot_corner/config"]
