@@ -8,9 +8,14 @@ from enum import StrEnum
 
 
 class PoseState(StrEnum):
-    """The state of a camera. It is unconnected until the first track for it is stored."""
+    """The state of a camera.
+
+    It is unconnected until the first track for it is stored, and uncalibrated until a person has
+    agreed to a prior pose.
+    """
 
     UNCONNECTED = "unconnected"
+    UNCALIBRATED = "uncalibrated"
     LEARNING = "learning"
     OK = "ok"
     UNSURE = "unsure"
@@ -36,8 +41,14 @@ class ReferenceState(StrEnum):
 
 
 class Origin(StrEnum):
-    """The beginning of a prior pose or a reference; prior poses know the first three."""
+    """The beginning of a prior pose or a reference; prior poses know the first five.
 
+    An assumed pose is nobody's word, but for what was measured of it; an agreed one was proposed of
+    the people before the camera.
+    """
+
+    ASSUMED = "assumed"
+    AGREED = "agreed"
     REGISTERED = "registered"
     CHANGED = "changed"
     ACCEPTED = "accepted"
@@ -199,6 +210,7 @@ class Activity(StrEnum):
     CAMERA_REGISTERED = "camera.registered"
     CAMERA_CHANGED = "camera.changed"
     CAMERA_REMOVED = "camera.removed"
+    POSE_AGREED = "pose.agreed"
     POSE_ACCEPTED = "pose.accepted"
     POSE_PUT_BACK = "pose.put_back"
     POSE_FALSE_ALARM = "pose.false_alarm"

@@ -16,6 +16,9 @@ class ServiceCode(StrEnum):
 
     AS_SAID = "as_said"
     NOBODY_POSTED = "nobody_posted"
+    POSE_UNKNOWN = "pose_unknown"
+    POSE_UNTOLD = "pose_untold"
+    POSE_PROPOSED = "pose_proposed"
     LEARNING_REFERENCE = "learning_reference"
     REFERENCE_TRACKS = "reference_tracks"
     TRACKS_SINCE = "tracks_since"

@@ -52,6 +52,7 @@ PUBLIC_MODELS = {
     "models.geometry.pose": "the pose, its parameters and their names",
     "models.geometry.rotation": "arrays; forms of a rotation that people register",
     "models.geometry.upright": "upper edges of boxes, as they are stored",
+    "models.geometry.usual_pose": "the pose of a camera that nobody has calibrated",
     "models.monitoring.arrivals": "rhythms of people, and silences",
     "models.monitoring.verdict": "the drift and its limits, without what estimates it",
     "models.pose": "a site, an estimate, an alarm: all that they take, give and keep",

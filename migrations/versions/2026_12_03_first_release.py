@@ -26,14 +26,14 @@ NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 ALERT_KINDS = "drift no_data clock unsure stale tracker"
 OUTCOMES = "put_back accepted false_alarm cleared camera_removed"
 ACTIVITY = (
-    "camera.registered camera.changed camera.removed pose.accepted pose.put_back pose.false_alarm "
-    "reference.reset reference.learned source.used source.removed alert.opened alert.escalated "
-    "alert.acknowledged alert.silenced alert.silence_ended alert.resolved maintenance.planned "
-    "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
-    "training.requested training.succeeded training.failed training.cancelled snapshot.kept "
-    "snapshot.removed webhook.added webhook.changed webhook.secret_changed webhook.removed "
-    "webhook.tested webhook.replayed token.added token.revoked session.began session.ended "
-    "login.refused"
+    "camera.registered camera.changed camera.removed pose.agreed pose.accepted pose.put_back "
+    "pose.false_alarm reference.reset reference.learned source.used source.removed alert.opened "
+    "alert.escalated alert.acknowledged alert.silenced alert.silence_ended alert.resolved "
+    "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
+    "maintenance.over training.requested training.succeeded training.failed training.cancelled "
+    "snapshot.kept snapshot.removed webhook.added webhook.changed webhook.secret_changed "
+    "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
+    "session.ended login.refused"
 )
 
 
@@ -109,9 +109,19 @@ table(
     *needed(Double, "height_m", "tilt_rad", "roll_rad", "heading_rad", "x_m", "y_m"),
     *needed(String, "origin"),
     *optional(String, "trusted_by"),
+    *needed(JSON, "given"),
+    *optional(JSON, "covariance"),
     *needed(DateTime, "created_at"),
-    one_of("origin", "registered changed accepted"),
+    one_of("origin", "registered changed accepted assumed agreed"),
     Index(None, "camera_id", "id"),
+)
+table(
+    "proposed_poses",
+    key("prior_pose_id", NUMBER, of("prior_poses.id")),
+    *needed(Double, "height_m", "tilt_rad", "roll_rad"),
+    *needed(JSON, "covariance", "identifiable"),
+    *needed(NUMBER, "tracks", "walking_groups", "newest_track_pk"),
+    *needed(DateTime, "created_at"),
 )
 table(
     "snapshots",
@@ -161,7 +171,7 @@ table(
     *optional(DateTime, "answered_at"),
     *needed(DateTime, "created_at"),
     *optional(DateTime, "ready_at"),
-    one_of("origin", "registered changed accepted reset put_back source"),
+    one_of("origin", "assumed agreed registered changed accepted reset put_back source"),
     one_of("answer", "put_back false_alarm"),
     Index(None, "camera_id", "id"),
 )

@@ -41,6 +41,7 @@ from models.pose.pose_fit import (
     warm_start_to_bytes,
 )
 from models.pose.power import PEOPLE, smallest_told
+from models.pose.self_calibration import SelfCalibration, self_calibrate
 from models.pose.site import CameraSite, assume_site, learn_site
 from models.pose.states import WindowState, state_of
 from models.simulation.walkers import WalkConfig
@@ -97,6 +98,8 @@ __all__ = [
     "Hypothesis",
     "PEOPLE",
     "Rival",
+    "SelfCalibration",
+    "self_calibrate",
     "since_alarm",
     "smallest_told",
     "state_of",

@@ -86,3 +86,12 @@ LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
 NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
 CHART_EVIDENCE = 0.1  # of a chart's log likelihood ratio beyond its level: days differ by the rest
 LEAST_FALSE = 0.02  # of windows of a camera that stands are told to creep, at least
+
+# A pose by people alone: tilt, roll (radians), log height.
+CALIBRATION_TILTS_RAD = np.radians(np.arange(0.0, 80.0, 4.0))
+CALIBRATION_ROLLS_RAD = np.radians(np.arange(-6.0, 7.0, 3.0))
+LEAST_TILT_RAD, MOST_TILT_RAD = math.radians(-15.0), math.radians(85.0)
+CALIBRATION_STARTS, CALIBRATION_ROUNDS = 4, 4
+CALIBRATED = 1e-3  # rad and log height of a round: less is the end
+LEAST_ACROSS = 0.05  # of steps go across the others' way; of directions that are 13 deg apart
+CALIBRATION_SD = np.array([math.radians(4.0), math.radians(4.0), 0.3])  # more is of no use

@@ -65,6 +65,17 @@ class Field:
         variance[0] = self.prior_variance[0]
         return replace(self, prior_variance=variance)
 
+    def level_alone(self) -> "Field":
+        """A field that is the same everywhere and in every direction."""
+        mean, variance = self.prior_mean[:1], self.prior_variance[:1]
+        return Field(
+            centres=np.empty((0, 2)),
+            length_m=self.length_m,
+            directional=False,
+            prior_mean=mean,
+            prior_variance=variance,
+        )
+
     def features(self, measured: Measured) -> Array:
         """The rows (M, P) that coefficients are multiplied by: 1, four of directions, the bumps."""
         exponents, pair = exponents_at(measured.place, self.centres, self.length_m)

@@ -20,7 +20,7 @@ moments less that noise, (M - N)^-1 M (M - N)^-1. What N is, and that at most 95
 noise, is ours.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +34,7 @@ from models.walking.measures import Measured
 from models.walking.mixed_model import (
     FISHER,
     Curvature,
+    Normal,
     VarianceComponents,
     Weights,
     composite_log_likelihoods,
@@ -90,18 +91,22 @@ class Fit:
         return FitStart(candidate=self.candidate, means=self.means, warm=True)
 
 
-def fit_pose(channels: Sequence[Channel], start: FitStart, prior: CameraPose) -> Fit:
+def fit_pose(channels: Sequence[Channel], start: FitStart, prior: CameraPose | Normal) -> Fit:
     """Tilt, roll and log height, together with the fields' coefficients.
 
-    A weak Gaussian around the prior pose holds what the tracks leave free, no more.
+    A weak Gaussian around a prior pose holds what the tracks leave free, no more; or the one that
+    is given.
     """
-    middle = plane_parameters_of(prior)
+    if isinstance(prior, CameraPose):
+        wide = np.diag(config.POSE_PRIOR_SD**2)
+        prior = Normal(mean=plane_parameters_of(prior), covariance=wide)
+    middle = prior.mean
     candidate = start.candidate.astype(np.float64)
     means: Sequence[Array] = start.means
     if len(means) != len(channels):
         means = [channel.learned.mean for channel in channels]
     precisions = [np.linalg.inv(channel.learned.covariance) for channel in channels]
-    pose_precision = np.diag(config.POSE_PRIOR_SD**-2.0)
+    pose_precision = np.asarray(np.linalg.inv(prior.covariance), dtype=np.float64)
     for _ in range(config.MOST_ROUNDS):
         # Given the pose, the fields are independent: each is eliminated by itself.
         matrix = pose_precision.copy()
@@ -134,7 +139,8 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: CameraPose) ->
             break
         if start.warm and share * share * float(move @ matrix @ move) < config.ROUGHLY**2:
             break
-    log_likelihood = -0.5 * float((((candidate - middle) / config.POSE_PRIOR_SD) ** 2).sum())
+    apart = candidate - middle
+    log_likelihood = -0.5 * float(apart @ pose_precision @ apart)
     for channel, mean in zip(channels, means, strict=True):
         log_likelihood += float(_log_likelihoods(channel, candidate, mean).sum())
     return Fit(
@@ -236,16 +242,28 @@ def information_of_noise(
 
 
 def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array]:
-    """The best few poses (3,) of a grid around a centre, at least 5 deg apart, and the centre.
+    """The best few poses (3,) of a grid around a centre, at least 5 deg apart, and the centre."""
+    offsets = np.linspace(-config.START_REACH_RAD, config.START_REACH_RAD, config.START_PLACES)
+    grid = [centre + (tilt, roll, 0.0) for tilt in offsets for roll in offsets]
+    return [*best_starts(channels, grid, count), centre]
+
+
+def best_starts(
+    channels: Sequence[Channel],
+    grid: Iterable[Array],
+    count: int,
+    log_prior: Callable[[Array], float] = lambda _: 0.0,
+) -> list[Array]:
+    """The best few poses (3,) of a grid, at least 5 deg apart.
 
     For each tilt and roll of the grid the log height is that which brings a middle quantile of the
     speeds to the site's usual one. Places and directions are not looked at: this is only a start.
     """
-    found = []
-    offsets = np.linspace(-config.START_REACH_RAD, config.START_REACH_RAD, config.START_PLACES)
-    for tilt in centre[0] + offsets:
-        for roll in centre[1] + offsets:
-            found += _at(channels, np.array([tilt, roll, centre[2]]))
+    found = [
+        (likely + log_prior(candidate), candidate)
+        for each in grid
+        for likely, candidate in _at(channels, each)
+    ]
     found.sort(key=lambda pair: -pair[0])
     chosen: list[Array] = []
     for _, candidate in found:
@@ -254,7 +272,7 @@ def starts(channels: Sequence[Channel], centre: Array, count: int) -> list[Array
         apart = [np.abs((candidate - other)[:2]).max() for other in chosen]
         if all(far > config.START_DISTANCE_RAD for far in apart):
             chosen.append(candidate)
-    return [*chosen, centre]
+    return chosen
 
 
 def _at(channels: Sequence[Channel], candidate: Array) -> list[tuple[float, Array]]:

@@ -178,6 +178,16 @@ def assumed_speed_reference(
     )
 
 
+def of_levels(reference: SpeedReference) -> SpeedReference:
+    """An assumed reference whose speeds and statures are the same all over the picture."""
+    levels = [
+        None if each is None else assumed(each.field.level_alone(), each.components)
+        for each in (reference.speeds, reference.statures)
+    ]
+    assert levels[0] is not None
+    return replace(reference, speeds=levels[0], statures=levels[1])
+
+
 def _judge_boxes(tops: Measured) -> tuple[bool, str]:
     """True if boxes measure statures, and why (not), in words."""
     owners = np.unique(tops.rows.owner_idx[tops.valid])

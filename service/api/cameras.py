@@ -24,7 +24,7 @@ from service.api.schemas import (
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
-from service.wording.typed_pose import Tone, judge_pose
+from service.wording.typed_pose import Tone, judge_lens, judge_pose
 
 CameraName = Annotated[str, StringConstraints(max_length=200)]
 FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
@@ -57,11 +57,14 @@ class _LensedBody(Body):
 
 
 class CameraBody(_LensedBody):
-    """A camera to register, by its `intrinsics` or its `lens`."""
+    """A camera to register, by its `intrinsics` or its `lens`.
+
+    Without a prior pose, or with what was measured of it, people tell the rest.
+    """
 
     id: CameraId | None = None
     name: CameraName | None = None
-    prior_pose: PriorPoseBody
+    prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
@@ -76,11 +79,14 @@ class CameraBody(_LensedBody):
         """A camera for the use case; its id is made of the name where none is given."""
         intrinsics = self.lens_value()
         assert intrinsics is not None
+        prior = self.prior_pose
+        measured = {} if prior is None else prior.measured
         return CameraSpec(
             camera_id=self.id or (slug(self.name) if self.name else None) or None,
             name=self.name or "",
             intrinsics=intrinsics,
-            prior_pose=self.prior_pose.to_value(),
+            prior_pose=None if prior is None or measured else prior.to_value(),
+            given=measured,
             frame_rate_hz=self.frame_rate_hz,
             walking_speed_mean_mps=self.walking_speed.mean_mps,
             walking_speed_sd_mps=self.walking_speed.sd_mps,
@@ -89,13 +95,19 @@ class CameraBody(_LensedBody):
 
 
 class CameraPatch(_LensedBody):
-    """What to change of a camera; fields left out stay."""
+    """What to change of a camera; fields left out stay. A prior pose has to be a whole one."""
 
     name: CameraName | None = None
     prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
+
+    @model_validator(mode="after")
+    def _whole_pose(self) -> Self:
+        if self.prior_pose is not None and self.prior_pose.measured:
+            raise ValueError("prior_pose: a whole one is needed to change it")
+        return self
 
 
 class QuestionOut(Out):
@@ -111,7 +123,7 @@ class CameraOut(Out):
     id: str
     name: str
     intrinsics: IntrinsicsBody
-    prior_pose: PoseOut
+    prior_pose: PoseOut | None
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
     reference_tracks: int
@@ -127,7 +139,7 @@ class CameraOut(Out):
         return cls.of(
             record,
             intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
-            prior_pose=PoseOut.from_value(view.prior_pose),
+            prior_pose=PoseOut.from_value(view.prior_pose) if view.calibrated else None,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
@@ -144,7 +156,9 @@ class CameraAnswer(CameraOut):
     @classmethod
     def from_value(cls, view: CameraView) -> Self:
         """The body of a camera, with the remarks of the registration form on it."""
-        says = judge_pose(view.intrinsics, view.prior_pose, typed_angles=True)
+        says = judge_lens(view.intrinsics)
+        if view.calibrated:
+            says = judge_pose(view.intrinsics, view.prior_pose, typed_angles=True)
         asked = [
             QuestionOut.of(each) for each in says if each.kind in (Tone.CRITICAL, Tone.WARNING)
         ]

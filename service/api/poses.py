@@ -34,13 +34,14 @@ from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
 from service.degrees import in_degrees
 from service.enums import PoseState, ReferenceState
-from service.errors import MalformedError
+from service.errors import ConflictError, MalformedError
 from service.formats.geojson import GeoOrigin
 from service.formats.pose_formats import MEDIA_TYPES, PoseFormat, pose_file
 from service.job_queue import JobQueue
 from service.reasons import code_of, values_of
 from service.settings import Settings
 from service.store.access import name_in
+from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
 from service.wording.times import from_seconds
 
@@ -52,6 +53,10 @@ class _DecisionBody(Body):
 
 class AcceptBody(_DecisionBody):
     """Who accepts the served pose as the new prior pose, and why."""
+
+
+class AgreeBody(_DecisionBody):
+    """Who agrees to the pose that people told of a camera without a prior pose."""
 
 
 class PutBackBody(_DecisionBody):
@@ -90,6 +95,30 @@ class DriftOut(SdOut):
         return cls(**in_degrees(identifiable_drift(drift))) if drift.identifiable else None
 
 
+class ProposedOut(BaseModel):
+    """The pose that people told of a camera without a prior pose, and standard deviations.
+
+    It can be `agreed` to where they tell enough. It is over the world's origin and has no heading.
+    """
+
+    pose: PoseOut
+    sd: SdOut
+    tracks: int
+    can_be_agreed: bool
+    updated_at: datetime
+
+    @classmethod
+    def from_record(cls, record: ProposedPoseRecord) -> Self:
+        """The body of a proposed pose."""
+        return cls(
+            pose=PoseOut.from_value(record.pose),
+            sd=SdOut(**in_degrees(record.sd), heading_deg=None),
+            tracks=record.tracks,
+            can_be_agreed=record.told,
+            updated_at=record.created_at,
+        )
+
+
 class ReferenceOut(Out):
     """How much of the reference period has been seen.
 
@@ -114,6 +143,7 @@ class ServedPoseOut(BaseModel):
     camera_id: str
     state: PoseState
     pose: PoseOut
+    proposed: ProposedOut | None
     estimated: list[str]
     sd: SdOut | None
     drift: DriftOut | None
@@ -142,6 +172,7 @@ class ServedPoseOut(BaseModel):
             camera_id=status.camera_id,
             state=status.state,
             pose=PoseOut.from_value(view.pose),
+            proposed=None if view.proposed is None else ProposedOut.from_record(view.proposed),
             estimated=[field for name, field in POSE_FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
@@ -272,6 +303,8 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
 
 def _file(session: Session, view: PoseView, kind: PoseFormat, origin: GeoOrigin | None) -> Response:
     camera_id, estimate = view.status.camera_id, view.status.estimate
+    if not view.calibrated:
+        raise ConflictError("pose: nobody has agreed to a prior pose yet")
     file = pose_file(
         kind,
         cameras.view_camera(session, camera_id).intrinsics,
@@ -315,6 +348,14 @@ def history(
         session, camera_id, from_, to, newest=limit or 1000, thinned=points
     )
     return History(items=[HistoryPoint.from_record(record) for record in records])
+
+
+@router.post("/pose/agree")
+def agree(
+    camera_id: str, state: StateDep, session: WriteDep, body: AgreeBody | None = None
+) -> ServedPoseOut:
+    """Make the pose that people told of a camera its prior pose, as sure as it is."""
+    return _decide(decisions.agree_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/accept")

@@ -169,8 +169,14 @@ class LensBody(Body):
         return IntrinsicsBody.model_validate(asdict(lens))
 
 
+_MEASURABLE = {"height_m", "tilt_deg", "roll_deg"}
+
+
 class PriorPoseBody(Body):
-    """A pose in one of four forms: angles, R and t, rvec and tvec, quaternion and position."""
+    """A pose in one of four forms: angles, R and t, rvec and tvec, quaternion and position.
+
+    Of a camera that is registered, what was measured of height, tilt and roll is enough.
+    """
 
     height_m: Finite | None = None
     tilt_deg: Tilt | None = None
@@ -194,6 +200,8 @@ class PriorPoseBody(Body):
             {"quaternion_wxyz", "position_m"},
         ]
         given = {name for name in self.model_fields_set if getattr(self, name) is not None}
+        if self.measured:
+            return self
         needed = [{"height_m", "tilt_deg"}, *forms[1:]]
         if not any(need <= given <= form for need, form in zip(needed, forms, strict=True)):
             raise ValueError(
@@ -211,8 +219,24 @@ class PriorPoseBody(Body):
                 raise ValueError(f"{name}: at most {limit:g} m are taken, got {value:g}")
         return self
 
+    @property
+    def measured(self) -> dict[str, float]:
+        """What was measured of a pose that is not whole, in metres and radians; else nothing."""
+        given = {name for name in self.model_fields_set if getattr(self, name) is not None}
+        if not given or not given < _MEASURABLE or {"height_m", "tilt_deg"} <= given:
+            return {}
+        found = {name: float(getattr(self, name)) for name in given}
+        if not 0 < found.get("height_m", 1.0) <= _HIGHEST_M:
+            raise ValueError(
+                f"height_m: above 0 and at most {_HIGHEST_M:g} m are taken, got {self.height_m:g}"
+            )
+        return {
+            name.replace("_deg", "_rad"): math.radians(value) if name.endswith("_deg") else value
+            for name, value in found.items()
+        }
+
     def to_value(self) -> CameraPose:
-        """The pose as a value."""
+        """The pose as a value, where it is whole."""
         if self.rotation is not None:
             rotation = nearest_rotation(self.rotation)
             return pose_from_matrices(rotation, np.array(self.translation_m))

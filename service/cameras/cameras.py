@@ -1,7 +1,8 @@
 """Register, change and remove cameras."""
 
 import secrets
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from typing import Any
 
@@ -9,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
 from service.enums import Activity, AlertState, Origin, Outcome
@@ -33,12 +35,13 @@ _MANY = 1000  # more alerts than a camera has kinds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSpec:
-    """A camera as an integrator registers it."""
+    """A camera as an integrator registers it; `given` is all that is known without a prior pose."""
 
     camera_id: str | None
     name: str
     intrinsics: Intrinsics
-    prior_pose: CameraPose
+    prior_pose: CameraPose | None
+    given: Mapping[str, float] = field(default_factory=dict)
     frame_rate_hz: float | None
     walking_speed_mean_mps: float
     walking_speed_sd_mps: float
@@ -60,11 +63,12 @@ class CameraChange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraView:
-    """A camera as clients see it."""
+    """A camera as clients see it; `calibrated` once somebody has said or agreed to a prior pose."""
 
     record: CameraRecord
     intrinsics: Intrinsics
     prior_pose: CameraPose
+    calibrated: bool
     tracks: int
     model_id: str | None
 
@@ -108,9 +112,15 @@ def register_camera(
     )
     session.add(record)
     session.flush()
-    add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
-    begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
-    train_by_itself(session, queue, settings, camera_id)
+    if spec.prior_pose is None:
+        pose = usual_pose(spec.given)
+        given = list(spec.given)
+        add_prior_pose(session, camera_id, pose, Origin.ASSUMED, None, given=given)
+        begin_reference(session, camera_id, Origin.ASSUMED, from_s=None)
+    else:
+        add_prior_pose(session, camera_id, spec.prior_pose, Origin.REGISTERED, None)
+        begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
+        train_by_itself(session, queue, settings, camera_id)
     note(session, Activity.CAMERA_REGISTERED, by=None, camera_id=camera_id)
     return view_camera(session, camera_id)
 
@@ -170,9 +180,12 @@ def change_camera(
         from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
-        pose = change.prior_pose or view.prior_pose
+        pose, origin = change.prior_pose or view.prior_pose, Origin.CHANGED
+        given: Sequence[str] = ()
+        if change.prior_pose is None and not view.calibrated:
+            origin, given = Origin.ASSUMED, cameras.prior_pose(session, camera_id).given
         renew_prior_pose(
-            session, queue, settings, camera_id, pose, Origin.CHANGED, from_s=from_s, by=None
+            session, queue, settings, camera_id, pose, origin, from_s=from_s, by=None, given=given
         )
     details = {"fields": list(changed)}
     note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
@@ -225,20 +238,30 @@ def renew_prior_pose(
     *,
     from_s: float | None,
     by: str | None,
+    given: Sequence[str] = (),
+    covariance: list[list[float]] | None = None,
 ) -> None:
     """Make a pose the prior pose, with a reference of the tracks that start at or after a time.
 
-    It is trained at, instead of whatever training is under way.
+    It is trained at, instead of whatever training is under way; but one that is assumed is not.
     """
-    add_prior_pose(session, camera_id, pose, origin, by)
+    add_prior_pose(session, camera_id, pose, origin, by, given=given, covariance=covariance)
     begin_reference(session, camera_id, origin, from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)
     stop_trainings(session, camera_id)
-    train_by_itself(session, queue, settings, camera_id)
+    if origin != Origin.ASSUMED:
+        train_by_itself(session, queue, settings, camera_id)
 
 
 def add_prior_pose(
-    session: Session, camera_id: str, pose: CameraPose, origin: Origin, by: str | None
+    session: Session,
+    camera_id: str,
+    pose: CameraPose,
+    origin: Origin,
+    by: str | None,
+    *,
+    given: Sequence[str] = (),
+    covariance: list[list[float]] | None = None,
 ) -> None:
     """Make a pose the prior pose; the earlier ones stay as history."""
     session.add(
@@ -247,6 +270,8 @@ def add_prior_pose(
             **asdict(pose),
             origin=origin,
             trusted_by=name_in(session, by),
+            given=list(given),
+            covariance=covariance,
             created_at=datetime.now(UTC),
         )
     )
@@ -255,10 +280,12 @@ def add_prior_pose(
 
 def _view(session: Session, record: CameraRecord) -> CameraView:
     model = trainings.newest_model(session, record.id)
+    prior = cameras.prior_pose(session, record.id)
     return CameraView(
         record=record,
         intrinsics=record.intrinsics,
-        prior_pose=cameras.prior_pose(session, record.id).pose,
+        prior_pose=prior.pose,
+        calibrated=prior.origin != Origin.ASSUMED,
         tracks=tracks.count(session, record.id),
         model_id=None if model is None else model.id,
     )

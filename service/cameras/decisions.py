@@ -1,4 +1,4 @@
-"""Answers of a person: a camera's pose is accepted, it was put back, it never moved.
+"""Answers of a person: a camera's pose is agreed to, accepted, it was put back, it never moved.
 
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
@@ -55,6 +55,40 @@ def accept_pose(
         by=decision.by,
     )
     return view_pose(session, settings, decision.camera_id)
+
+
+def agree_pose(
+    session: Session, queue: JobQueue, settings: Settings, decision: Decision
+) -> PoseView:
+    """Make the pose that people told of a camera its prior pose, as sure as it is.
+
+    Whoever was seen so far was seen from there: the reference begins with them.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        ConflictError: it has a prior pose, or people do not tell one yet.
+    """
+    camera_id = decision.camera_id
+    view = view_pose(session, settings, camera_id)
+    proposed = view.proposed
+    if view.calibrated or proposed is None or not proposed.told:
+        why = "it has a prior pose already" if view.calibrated else view.reason
+        raise ConflictError(f"pose: there is nothing to agree to: {why}")
+    note_activity(
+        session, Activity.POSE_AGREED, by=decision.by, camera_id=camera_id, text=decision.note
+    )
+    renew_prior_pose(
+        session,
+        queue,
+        settings,
+        camera_id,
+        proposed.pose,
+        Origin.AGREED,
+        from_s=view.status.reference.from_s,
+        by=decision.by,
+        covariance=proposed.covariance,
+    )
+    return view_pose(session, settings, camera_id)
 
 
 def put_back(session: Session, queue: JobQueue, settings: Settings, decision: Decision) -> PoseView:

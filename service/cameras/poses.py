@@ -13,12 +13,13 @@ from models.walking.config import FEWEST_WALKERS
 from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
 from service.cameras.status import CameraStatus, camera_statuses
-from service.enums import PoseState
+from service.enums import Origin, PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import people_so_far, wanted_tracks, window_beside
 from service.settings import Settings
 from service.store import cameras, estimates, fleet, references, windows
+from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
@@ -43,9 +44,15 @@ class ReferenceView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseView:
-    """The served pose of a camera, and its status."""
+    """The served pose of a camera, and its status.
+
+    `calibrated` once somebody has said or agreed to a prior pose; until then `proposed` is what
+    people told of it, and None where there were too few.
+    """
 
     status: CameraStatus
+    calibrated: bool
+    proposed: ProposedPoseRecord | None
     reasons: Reasons
     pose: CameraPose
     reference: ReferenceView
@@ -83,8 +90,11 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         wanted=record.wanted,
         walking_speed_mps=record.walking_speed_mps,
     )
-    reasons = _reasons_of(session, settings, status, reference)
-    pose = prior.pose
+    pose, calibrated = prior.pose, prior.origin != Origin.ASSUMED
+    proposed = None if calibrated else cameras.proposed_pose(session, prior.id)
+    reasons = _reasons_of(session, settings, status, reference, proposed)
+    if proposed is not None:
+        pose = proposed.pose
     estimate = status.estimate
     if estimate is not None:
         pose = replace(pose, **asdict(estimate.pose))
@@ -95,6 +105,8 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
     return PoseView(
         status=status,
+        calibrated=calibrated,
+        proposed=proposed,
         reasons=reasons,
         pose=pose,
         reference=reference,
@@ -126,7 +138,11 @@ def pose_history(
 
 
 def _reasons_of(
-    session: Session, settings: Settings, status: CameraStatus, learned: ReferenceView
+    session: Session,
+    settings: Settings,
+    status: CameraStatus,
+    learned: ReferenceView,
+    proposed: ProposedPoseRecord | None,
 ) -> Reasons:
     """Reasons of a camera's state: what is missing, what was told, who is there."""
     now = datetime.now(UTC)
@@ -143,7 +159,9 @@ def _reasons_of(
             found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
         else:
             found += _of_alerts(status)
-    if not status.judged:
+    if status.state == PoseState.UNCALIBRATED:
+        found.append(_why_uncalibrated(status, learned, proposed))
+    elif not status.judged:
         found += _missing(session, settings, status, learned)
     silence = data_gap_of(session, settings, status.camera_id, now) if status.silent else None
     if silence is not None and status.state in (PoseState.NO_DATA, PoseState.DRIFTING):
@@ -158,6 +176,20 @@ def _of_alerts(status: CameraStatus) -> list[Reason]:
         if alert.reasons not in different:
             different.append(alert.reasons)
     return [reason for reasons in different for reason in reasons]
+
+
+def _why_uncalibrated(
+    status: CameraStatus, learned: ReferenceView, proposed: ProposedPoseRecord | None
+) -> Reason:
+    """What is missing until somebody can agree to a pose, or that somebody has to."""
+    if proposed is None:
+        seen = {"tracks": learned.tracks, "least_walkers": FEWEST_WALKERS}
+        return Reason(code=ServiceCode.POSE_UNKNOWN, values=seen)
+    people: dict[str, Value] = {"tracks": proposed.tracks, "groups": proposed.walking_groups}
+    code = ServiceCode.POSE_PROPOSED if proposed.told else ServiceCode.POSE_UNTOLD
+    tilt, roll, height = (proposed.sd[name] for name in ("tilt_rad", "roll_rad", "height_m"))
+    sd = {"tilt_sd_rad": tilt, "roll_sd_rad": roll, "height_sd_m": height}
+    return Reason(code=code, values=people | sd)
 
 
 def _missing(

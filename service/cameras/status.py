@@ -114,6 +114,8 @@ def _status_of(
         state = PoseState.DRIFTING
     elif reference.ready_at is None and reference.source is None:
         state = PoseState.UNCONNECTED  # the first track to be stored gives it a source, for good
+    elif newest.assumed:
+        state = PoseState.UNCALIBRATED
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
     elif silent:

@@ -16,6 +16,12 @@ from service.pages.drawings.picture import Overlay, ground_of, horizon_path, pic
 from service.store.cameras import SnapshotRecord
 
 _POINTS = 24
+_OF = {
+    (): "no pose, which nobody knows",
+    ("prior",): "the prior",
+    ("served",): "the proposed pose",
+    ("prior", "served"): "the prior pose, dashed, and the served pose, solid",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,19 +45,18 @@ def draw_camera(
 ) -> CameraDrawings:
     """The picture plane and the ground from above, with the newest tracks.
 
-    The served pose is drawn where the tracks tell one; until then there is the prior pose alone.
+    The served pose is drawn where the tracks tell one; until then there is the prior pose alone, or
+    the one that is proposed.
     """
     lens = camera.intrinsics
-    overlays = [Overlay(pose=camera.prior_pose, kind="prior")]
-    if served.status.identifiable:
+    overlays = [Overlay(pose=camera.prior_pose, kind="prior")] if camera.calibrated else []
+    if served.status.identifiable or served.proposed is not None:
         overlays.append(Overlay(pose=served.pose, kind="served"))
     # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
-    ground = ground_of(lens, overlays[-1].pose)
+    ground = ground_of(lens, overlays[-1].pose) if overlays else None
     feet = [_fewer(track.uv) for track in tracks]
     people = f"the feet of {len(feet)} people" if feet else "nobody yet"
-    both = (
-        "the prior pose, dashed, and the served pose, solid" if len(overlays) > 1 else "the prior"
-    )
+    both = _OF[tuple(each.kind for each in overlays)]
     snapshot = None
     if still is not None:
         snapshot = f"/cameras/{camera.record.id}/snapshot?v={still.sha256[:12]}"
@@ -70,7 +75,9 @@ def draw_camera(
             feet,
             misplaced,
             label=f"The ground from above with {people} and what the camera sees of it by {both}.",
-        ),
+        )
+        if overlays
+        else Markup(""),
         spacing_m=None if ground is None else ground.spacing_m,
         people=len(feet),
         two_poses=len(overlays) > 1,

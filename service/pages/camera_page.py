@@ -192,6 +192,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         people=camera_words.people_words(page.pose.reference.counted, page.pose.reference.hours),
         headline=camera_words.headline(page.facts, clock),
         drawings=draw_camera(page.camera, page.pose, page.tracks, page.misplaced, page.snapshot),
+        proposed=None if page.pose.proposed is None else moves.proposed_rows(page.pose.proposed),
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate
         ),

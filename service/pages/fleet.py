@@ -35,9 +35,10 @@ _RANKS = {
     PoseState.UNSURE: 3,
     PoseState.SUSPECTED: 5,
     PoseState.NO_DATA: 4,
-    PoseState.UNCONNECTED: 6,
-    PoseState.LEARNING: 7,
-    PoseState.OK: 8,
+    PoseState.UNCALIBRATED: 6,
+    PoseState.UNCONNECTED: 7,
+    PoseState.LEARNING: 8,
+    PoseState.OK: 9,
 }
 
 
@@ -163,7 +164,8 @@ def list_fleet(
     learning = {
         i: each.attended.spans
         for i, each in statuses.items()
-        if each.reference.ready_at is None and each.state != PoseState.UNCONNECTED
+        if each.reference.ready_at is None
+        and each.state not in (PoseState.UNCONNECTED, PoseState.UNCALIBRATED)
     }
     counts = fleet.learning_counts(session, ids, learning)
     trainings = fleet.unfinished_trainings(session, ids)

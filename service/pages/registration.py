@@ -103,7 +103,7 @@ def preview(body: PreviewBody) -> PreviewOut:
     wrong = {error.pointer[1:]: error.reason for error in read.errors}
     # What is needed and not there yet is no error while the form is filled in.
     errors = {name: reason for name, reason in wrong.items() if typed[name].strip()}
-    if read.lens is None or read.pose is None:
+    if read.lens is None or read.pose is None or read.pose.measured:
         return PreviewOut(picture="", ground="", says=[], errors=errors)
     lens, pose = read.lens.to_value(), read.pose.to_value()
     tracks = [np.array(track) for track in body.tracks if len(track) > 1]

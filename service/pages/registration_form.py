@@ -127,6 +127,31 @@ class TypedAngles(PriorPoseBody):
     )(_number)
 
 
+class TypedMeasured(Body):
+    """What was measured of a pose that nobody knows."""
+
+    measured_height_m: Finite | None = None
+    measured_tilt_deg: Tilt | None = None
+    measured_roll_deg: Annotated[Finite, Field(ge=-180, le=180)] | None = None
+
+    _typed = field_validator(
+        "measured_height_m", "measured_tilt_deg", "measured_roll_deg", mode="before"
+    )(_number)
+
+    def to_body(self, errors: list[FieldError]) -> PriorPoseBody | None:
+        """The body of the pose; None where nothing was measured."""
+        given = {name.removeprefix("measured_"): value for name, value in self if value is not None}
+        if not given:
+            return None
+        wrong: list[FieldError] = []
+        made = _made(PriorPoseBody, given, wrong)
+        errors += [
+            FieldError(pointer=f"/measured_{error.pointer[1:]}", reason=error.reason)
+            for error in wrong
+        ]
+        return made
+
+
 class TypedMatrix(Body):
     """A pose by R, or a Rodrigues vector, and t."""
 
@@ -168,7 +193,7 @@ class ReadForm:
 class RegistrationForm(Body):
     """The fields as they were typed; `form` and `lens_form` say which of them count."""
 
-    form: Literal["angles", "matrix"] = "angles"
+    form: Literal["angles", "matrix", "people"] = "angles"
     lens_form: Literal["pixels", "view", "sensor"] = "pixels"
     name: Typed = ""
     id: Typed = ""
@@ -184,6 +209,9 @@ class RegistrationForm(Body):
     sensor_mm: Typed = ""
     height_m: Typed = ""
     tilt_deg: Typed = ""
+    measured_height_m: Typed = ""
+    measured_tilt_deg: Typed = ""
+    measured_roll_deg: Typed = ""
     roll_deg: Typed = ""
     heading_deg: Typed = ""
     x_m: Typed = ""
@@ -200,6 +228,9 @@ class RegistrationForm(Body):
         pose: PriorPoseBody | None = None
         if self.form == "angles":
             pose = self._read(TypedAngles, errors)
+        elif self.form == "people":
+            measured = self._read(TypedMeasured, errors)
+            pose = None if measured is None else measured.to_body(errors)
         elif (matrix := self._read(TypedMatrix, errors)) is not None:
             wrong: list[FieldError] = []
             pose = _made(PriorPoseBody, matrix.to_fields(), wrong)

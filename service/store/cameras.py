@@ -1,5 +1,6 @@
 """Cameras, their prior poses, arrival models and still images."""
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -33,6 +34,7 @@ from service.store.record import (
     Record,
     camera_key,
     delete_some,
+    foreign_key,
     newest_first,
     one_of,
     surplus,
@@ -92,8 +94,17 @@ class CameraRecord(Record):
         )
 
 
+_ORIGINS = (
+    Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED, Origin.ASSUMED, Origin.AGREED
+)  # fmt: skip
+
+
 class PriorPoseRecord(Record):
-    """A pose that was trusted from a time on; the newest of a camera is its prior pose."""
+    """A pose that was trusted from a time on; the newest of a camera is its prior pose.
+
+    One that is assumed was trusted by nobody; `given` names what was measured of it, in the words
+    of `CameraPose`. `covariance` (3, 3) is of tilt, roll and log height, where people told them.
+    """
 
     __tablename__ = "prior_poses"
 
@@ -107,10 +118,12 @@ class PriorPoseRecord(Record):
     y_m: Mapped[float]
     origin: Mapped[Origin] = mapped_column(vocabulary(Origin, checked=False))
     trusted_by: Mapped[str | None]
+    given: Mapped[list[str]] = mapped_column(JSON, default=list)
+    covariance: Mapped[list[list[float]] | None] = mapped_column(JSON)
     created_at: Mapped[datetime]
 
     __table_args__ = (
-        one_of("origin", (Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED)),
+        one_of("origin", _ORIGINS),
         Index(None, "camera_id", "id"),
     )
 
@@ -125,6 +138,50 @@ class PriorPoseRecord(Record):
             x_m=self.x_m,
             y_m=self.y_m,
         )
+
+    @property
+    def measured(self) -> dict[str, float]:
+        """What was measured of a pose that is assumed."""
+        return {name: getattr(self, name) for name in self.given}
+
+
+class ProposedPoseRecord(Record):
+    """The pose that people told of a camera whose prior pose is assumed; the newest look's.
+
+    `covariance` (3, 3) is of tilt, roll and log height; `identifiable` names those of the three
+    that are known well enough to be agreed to.
+    """
+
+    __tablename__ = "proposed_poses"
+
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", primary_key=True)
+    height_m: Mapped[float]
+    tilt_rad: Mapped[float]
+    roll_rad: Mapped[float]
+    covariance: Mapped[list[list[float]]] = mapped_column(JSON)
+    identifiable: Mapped[list[str]] = mapped_column(JSON)
+    tracks: Mapped[int]
+    walking_groups: Mapped[int]
+    newest_track_pk: Mapped[int]
+    created_at: Mapped[datetime]
+
+    @property
+    def pose(self) -> CameraPose:
+        """As a value, over the world's origin and with no heading: people tell neither."""
+        return CameraPose(height_m=self.height_m, tilt_rad=self.tilt_rad, roll_rad=self.roll_rad)
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviations, in radians and metres."""
+        tilt, roll, log_height = (
+            math.sqrt(row[place]) for place, row in enumerate(self.covariance)
+        )
+        return {"height_m": self.height_m * log_height, "tilt_rad": tilt, "roll_rad": roll}
+
+    @property
+    def told(self) -> bool:
+        """True where there is enough to agree to."""
+        return len(self.identifiable) == len(self.covariance)
 
 
 def newest_of(
@@ -225,6 +282,11 @@ def count(session: Session) -> int:
 def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
     """The pose that a camera is trusted to have had last."""
     return session.scalars(_PRIOR_POSE, {"camera": camera_id}).one()
+
+
+def proposed_pose(session: Session, prior_pose_id: int) -> ProposedPoseRecord | None:
+    """The pose that people told instead of one that is assumed; None where they did not yet."""
+    return session.get(ProposedPoseRecord, prior_pose_id)
 
 
 def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:

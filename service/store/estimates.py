@@ -38,7 +38,7 @@ def _as_parameters(
 
 
 # States of cameras without an estimate to say so.
-_OF_CAMERAS = (PoseState.UNCONNECTED, PoseState.NO_DATA)
+_OF_CAMERAS = (PoseState.UNCONNECTED, PoseState.UNCALIBRATED, PoseState.NO_DATA)
 
 
 class EstimateRecord(Record):

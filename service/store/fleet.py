@@ -27,9 +27,9 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, defer
 
 from models.monitoring.verdict import DriftLimits
-from service.enums import AlertState
+from service.enums import AlertState, Origin
 from service.store.alerts import AlertRecord
-from service.store.cameras import CameraRecord, RhythmRecord, newest_of
+from service.store.cameras import CameraRecord, PriorPoseRecord, RhythmRecord, newest_of
 from service.store.engines.dialects import as_json, contains_word, largest
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
@@ -48,7 +48,8 @@ class Newest:
 
     The reference that counts comes without the site itself, and of several cameras the estimate
     without what is behind it. `last_track_s` is when the newest track ended of those that count.
-    `fires` says that an alert does, `attended` that there are maintenance windows.
+    `fires` says that an alert does, `attended` that there are maintenance windows, `assumed` that
+    nobody has agreed to its prior pose.
     """
 
     reference: SiteReferenceRecord
@@ -57,6 +58,7 @@ class Newest:
     rhythm: dict[str, Any] | None
     fires: bool
     attended: bool
+    assumed: bool
 
 
 def newest(session: Session, ids: Ids = None) -> dict[str, Newest]:
@@ -70,9 +72,10 @@ def newest(session: Session, ids: Ids = None) -> dict[str, Newest]:
             rhythm=profile or None,
             fires=bool(fires),
             attended=bool(attended),
+            assumed=origin == Origin.ASSUMED,
         )
-        for camera_id, reference, estimate, ended_s, profile, fires, attended in session.execute(
-            query, given(ids)
+        for camera_id, reference, estimate, ended_s, profile, fires, attended, origin in (
+            session.execute(query, given(ids))
         )
     }
 
@@ -120,9 +123,11 @@ def _newest(*, some: bool, whole: bool) -> Select[Any]:
             RhythmRecord.profile,
             fires.correlate(CameraRecord),
             attended.correlate(CameraRecord),
+            PriorPoseRecord.origin,
         )
         .select_from(CameraRecord)
         .join(SiteReferenceRecord, SiteReferenceRecord.id == reference)
+        .join(PriorPoseRecord, PriorPoseRecord.id == SiteReferenceRecord.prior_pose_id)
         .outerjoin(EstimateRecord, EstimateRecord.id == estimate)
         .outerjoin(RhythmRecord, RhythmRecord.camera_id == CameraRecord.id)
         .where(among_given(CameraRecord.id, some=some))

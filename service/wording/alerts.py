@@ -35,6 +35,7 @@ _DONE = {
     Activity.CAMERA_REGISTERED: "registered the camera",
     Activity.CAMERA_CHANGED: "changed what is said of the camera",
     Activity.CAMERA_REMOVED: "removed the camera",
+    Activity.POSE_AGREED: "agreed to the pose that people told",
     Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
     Activity.POSE_PUT_BACK: "said that the camera is back at its prior pose",
     Activity.POSE_FALSE_ALARM: "said that the camera never moved",

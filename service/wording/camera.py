@@ -21,6 +21,7 @@ STATES = {
     PoseState.SUSPECTED: "Maybe moved",
     PoseState.NO_DATA: "No people",
     PoseState.UNCONNECTED: "Unconnected",
+    PoseState.UNCALIBRATED: "Uncalibrated",
     PoseState.LEARNING: "Learning",
     PoseState.OK: "Steady",
 }
@@ -81,6 +82,11 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
         )
     if state == PoseState.UNCONNECTED:
         return "Nobody has posted anybody's track for this camera yet."
+    if state == PoseState.UNCALIBRATED:
+        return (
+            "Nobody has said how high it hangs and where it looks. The people before it tell: see "
+            "below, and agree once it looks right."
+        )
     if state == PoseState.LEARNING or estimate is None or not camera.judged:
         return _waiting(camera)
     if state == PoseState.NO_DATA:
@@ -159,6 +165,8 @@ def fleet_line(
         return "its estimate fails or lacks tracks: the alert says why, and since when"
     if state == PoseState.UNCONNECTED:
         return "nobody has posted tracks for it yet: its page says how"
+    if state == PoseState.UNCALIBRATED:
+        return "its pose is found by the people before it: its page has it, to be agreed to"
     if state == PoseState.LEARNING and learned is not None:
         return f"learning what is usual: {learned} of {wanted} people"
     if state == PoseState.LEARNING:

@@ -8,6 +8,7 @@ from models.geometry.ground import Misplacement
 from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
+from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord
 
 # Operators say pan. Height is told apart.
@@ -72,6 +73,21 @@ def moved_words(estimate: EstimateRecord, since: str = "") -> str:
         return f"is {height} than it should be{since and ', since'}{since}"
     parts = [f"{turn}{since}" if turn else "", f"is {height}" if height else ""]
     return " and ".join(part for part in parts if part)
+
+
+def proposed_rows(proposed: ProposedPoseRecord) -> list[tuple[str, str, str]]:
+    """Name, value and half the 90 % interval of each number of a proposed pose."""
+    pose, sd = proposed.pose, proposed.sd
+    return [
+        ("Height", f"{pose.height_m:.1f} m", f"±{Z90 * sd['height_m']:.1f} m"),
+        *(
+            (name, f"{math.degrees(value):.1f}°", f"±{math.degrees(Z90 * sd_rad):.1f}°")
+            for name, value, sd_rad in (
+                ("Tilt", pose.tilt_rad, sd["tilt_rad"]),
+                ("Roll", pose.roll_rad, sd["roll_rad"]),
+            )
+        ),
+    ]
 
 
 def sure_words(estimate: EstimateRecord) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from models.durations import HOUR_S
 from models.geometry.pose import PARAMETERS
+from models.quantiles import Z90
 from models.reasons import Reason, TracksCode
 from service.degrees import in_degrees
 from service.enums import Cause
@@ -145,6 +146,14 @@ def _since(v: _Values) -> str:
     )
 
 
+def _sure_of_pose(v: _Values) -> str:
+    """How sure a proposed pose is: nine cases of ten are within that."""
+    return (
+        f"sure to {Z90 * v['tilt_sd_deg']:.1f}° in tilt, {Z90 * v['roll_sd_deg']:.1f}° in roll, "
+        f"{Z90 * v['height_sd_m']:.1f} m in height"
+    )
+
+
 def _maintenance(v: _Values) -> str:
     until = f"maintenance is under way until {datetime.fromisoformat(v['until']):%Y-%m-%d %H:%M}Z"
     return f"{until} ({v['note']})" if v.get("note") else until
@@ -232,6 +241,17 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ),
     ServiceCode.AS_SAID: "{text}",
     ServiceCode.NOBODY_POSTED: "no track of anybody has been posted for it yet",
+    ServiceCode.POSE_UNKNOWN: lambda v: (
+        f"its pose is found by the people before it: {v['tracks']} tracks so far, of "
+        f"{v['least_walkers']} or more that walk"
+    ),
+    ServiceCode.POSE_UNTOLD: lambda v: (
+        f"{v['tracks']} tracks of {v['groups']} people or groups do not tell its pose yet"
+        f" ({_sure_of_pose(v)}); more people help, and such as walk other ways"
+    ),
+    ServiceCode.POSE_PROPOSED: lambda v: (
+        f"{v['tracks']} tracks tell its pose ({_sure_of_pose(v)}); somebody has to agree to it"
+    ),
     ServiceCode.LEARNING_REFERENCE: "the reference is being learned",
     ServiceCode.REFERENCE_TRACKS: lambda v: (
         f"{v['counted']} of {v['wanted']} people for the reference"

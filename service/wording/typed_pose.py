@@ -52,6 +52,11 @@ def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> lis
     return found
 
 
+def judge_lens(lens: Intrinsics) -> list[Saying]:
+    """Remarks on a lens alone, of a camera whose pose nobody knows."""
+    return _through(lens)
+
+
 def worst_first(sayings: Sequence[Saying]) -> list[Saying]:
     """Remarks in order: those first that somebody has to look at, then what is good to know."""
     order = list(Tone)

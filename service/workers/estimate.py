@@ -26,6 +26,7 @@ from service.estimation.learning import (
     save_progress,
     save_reference,
 )
+from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
@@ -61,6 +62,11 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
     """Look at all tracks up to one. No transaction is open while anything is computed."""
     store, settings = context.store, context.settings
     begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
+    if propose_if_uncalibrated(context, camera_id, unpacked):
+        with store.write(camera_id) as session:
+            rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
+            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=left_out_by(budget))
+        return
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
         failures.add("averaged estimate", missing)
@@ -84,6 +90,20 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
     _grow_unless_failed(context, camera_id, unpacked)
+
+
+def propose_if_uncalibrated(context: JobContext, camera_id: str, unpacked: Unpacked) -> bool:
+    """Have people tell the pose of a camera without a prior pose; False where it has one."""
+    with context.store.read() as session:
+        people = load_people(session, context.settings, camera_id, unpacked)
+    if people is None:
+        return False
+    found = compute_proposal(people)
+    if found is not None:
+        with context.store.write(camera_id) as session:
+            save_proposal(session, camera_id, people, found)
+        log.info("pose_proposed", extra={"camera_id": camera_id, "tracks": len(people.tracks)})
+    return True
 
 
 def predict_pending(context: JobContext, camera_id: str, unpacked: Unpacked) -> str:

@@ -58,6 +58,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "PATCH /cameras/{camera_id}/maintenance/{window_id}",
         "DELETE /cameras/{camera_id}/maintenance/{window_id}",
         "POST /cameras/{camera_id}/pose/accept",
+        "POST /cameras/{camera_id}/pose/agree",
         "POST /cameras/{camera_id}/pose/put-back",
         "POST /cameras/{camera_id}/reference/reset",
         "POST /cameras/{camera_id}/sources/{source:path}/use",

@@ -112,6 +112,21 @@ const ACTS = {
     if (body) await put("Accepted: a new reference begins.", "POST", `${path}/pose/accept`, body);
   },
 
+  async agree() {
+    const yes = await confirmed({
+      title: "Does it look right?",
+      detail:
+        "The pose that people told becomes the prior pose, as sure as it is. Look whether the " +
+        "horizon and the grid lie on the ground; a still image behind them helps. Moves are told " +
+        "against it from then on.",
+      yes: "Agree to it",
+    });
+    const body = yes && (await asMe());
+    if (!body) return;
+    await call("POST", `${path}/pose/agree`, body);
+    location.reload();
+  },
+
   async "put-back"() {
     const yes = await confirmed({
       title: "Was the camera put back?",

@@ -102,6 +102,16 @@ SAID = [
     (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
     (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
     (S.NOBODY_POSTED, {}, "no track of anybody has been posted for it yet"),
+    (S.POSE_UNKNOWN, {"tracks": 3, "least_walkers": 5},
+     "its pose is found by the people before it: 3 tracks so far, of 5 or more that walk"),
+    (S.POSE_UNTOLD, {"tracks": 30, "groups": 22, "tilt_sd_rad": math.radians(6),
+                     "roll_sd_rad": math.radians(2), "height_sd_m": 1.0},
+     "30 tracks of 22 people or groups do not tell its pose yet (sure to 9.9° in tilt, 3.3° in "
+     "roll, 1.6 m in height); more people help, and such as walk other ways"),
+    (S.POSE_PROPOSED, {"tracks": 70, "groups": 64, "tilt_sd_rad": math.radians(1),
+                       "roll_sd_rad": math.radians(1), "height_sd_m": 0.5},
+     "70 tracks tell its pose (sure to 1.6° in tilt, 1.6° in roll, 0.8 m in height); somebody has "
+     "to agree to it"),
     (S.REFERENCE_TRACKS, {"counted": 40, "wanted": 60, "tracks": 40, "pieces": 0},
      "40 of 60 people for the reference"),
     (S.REFERENCE_TRACKS, {"counted": 98, "wanted": 133, "tracks": 133, "pieces": 35},

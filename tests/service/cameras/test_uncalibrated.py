@@ -1,0 +1,111 @@
+"""A camera of which the lens is known and nothing else: people tell its pose, a person agrees."""
+
+import math
+
+import pytest
+
+from tests.conftest import CAMERA
+from tests.service.conftest import problem
+from tests.service.street import KNOCKED, PRIOR, Street
+
+BARE = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
+
+
+@pytest.fixture
+def street(http, settings):
+    http.post("/cameras", json={**BARE, "reference_tracks": 60}).raise_for_status()
+    return Street(http, settings)
+
+
+def test_people_tell_its_pose_a_person_agrees_and_drift_is_told_against_it(street):
+    camera = street.http.get("/cameras/corner").json()
+    assert camera["prior_pose"] is None
+    assert street.pose()["state"] == "unconnected"
+    street.keep_to_lanes(PRIOR, 70)
+    before = street.look()
+    assert (before["state"], before["reason_code"]) == ("uncalibrated", "pose_proposed")
+    proposed, sd = before["proposed"]["pose"], before["proposed"]["sd"]
+    assert before["proposed"]["can_be_agreed"]
+    assert abs(proposed["tilt_deg"] - 22.0) < 2 * sd["tilt_deg"] < 5.0
+    assert abs(proposed["height_m"] - 6.0) < 2 * sd["height_m"]
+    # Nobody is served by what nobody has agreed to, and nothing is learned or alarmed.
+    assert (before["estimated"], before["drift"], street.alerts()) == ([], None, [])
+    problem(street.http.get("/cameras/corner/pose.yaml"), 409, "conflict")
+
+    agreed = street.http.post("/cameras/corner/pose/agree", json={"by": "Ada"})
+    assert agreed.status_code == 200
+    assert (agreed.json()["state"], agreed.json()["proposed"]) == ("learning", None)
+    assert street.http.get("/cameras/corner").json()["prior_pose"] == proposed
+    entries = street.http.get("/activity", params={"camera_id": "corner"}).json()["items"]
+    assert ("pose.agreed", "Ada") in [(each["what"], each["by"]) for each in entries]
+    # Whoever was seen so far makes the reference: it need not be waited for.
+    after = street.look()
+    assert (after["state"], after["reference"]["state"]) in [("ok", "ready"), ("learning", "ready")]
+    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+
+    street.keep_to_lanes(KNOCKED, 60)
+    moved = street.look()
+    assert moved["state"] == "drifting"
+    assert moved["drift"]["tilt_deg"] == pytest.approx(5.0, abs=1.5)
+    assert [alert["kind"] for alert in street.alerts()] == ["drift"]
+
+
+def test_too_few_people_are_told_and_cannot_be_agreed_to(street):
+    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+    street.cross(PRIOR, 2)
+    few = street.look()
+    assert (few["state"], few["proposed"], few["reason_code"]) == (
+        "uncalibrated", None, "pose_unknown"
+    )  # fmt: skip
+    assert few["reason_values"]["tracks"] == 2
+    street.cross(PRIOR, 20)  # all one way
+    one_way = street.look()
+    assert one_way["reason_code"] == "pose_untold"
+    assert not one_way["proposed"]["can_be_agreed"]
+    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+
+
+def test_what_was_measured_holds(http, settings):
+    body = {**BARE, "prior_pose": {"height_m": 6.0}}
+    http.post("/cameras", json=body).raise_for_status()
+    street = Street(http, settings)
+    street.keep_to_lanes(PRIOR, 70)
+    found = street.look()["proposed"]
+    assert found["pose"]["height_m"] == pytest.approx(6.0, rel=0.1)
+    assert found["sd"]["height_m"] < 1.0
+    http.patch(
+        "/cameras/corner", json={"name": "Another"}, headers={"If-Match": "*"}
+    ).raise_for_status()
+    assert street.pose()["state"] == "uncalibrated"
+
+
+@pytest.mark.parametrize(
+    ("pose", "pointer"),
+    [({"height_m": 0.0}, "/prior_pose"), ({"heading_deg": 3.0}, "/prior_pose")],
+)
+def test_what_is_no_measure_is_named(http, pose, pointer):
+    found = problem(http.post("/cameras", json={**BARE, "prior_pose": pose}), 422, "malformed")
+    assert found["errors"][0]["pointer"].startswith(pointer)
+
+
+def test_a_prior_pose_that_is_said_later_ends_it(street):
+    street.keep_to_lanes(PRIOR, 30)
+    street.look()
+    whole = CAMERA["prior_pose"]
+    headers = {"If-Match": "*"}
+    partial = {"prior_pose": {"tilt_deg": 20.0}}
+    problem(street.http.patch("/cameras/corner", json=partial, headers=headers), 422, "malformed")
+    changed = street.http.patch("/cameras/corner", json={"prior_pose": whole}, headers=headers)
+    assert changed.json()["prior_pose"]["tilt_deg"] == pytest.approx(22.0)
+    assert street.pose()["state"] == "learning"
+
+
+def test_a_lens_that_changes_leaves_it_uncalibrated(street):
+    lens = {**CAMERA["intrinsics"], "fx": 1000.0, "fy": 1000.0}
+    changed = street.http.patch(
+        "/cameras/corner", json={"intrinsics": lens}, headers={"If-Match": "*"}
+    )
+    assert changed.json()["prior_pose"] is None
+    street.keep_to_lanes(PRIOR, 30)
+    assert street.look()["state"] == "uncalibrated"
+    assert math.isfinite(street.pose()["pose"]["height_m"])
