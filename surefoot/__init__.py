@@ -11,7 +11,8 @@ lower, heading clockwise from north (world +Y). Lengths are metres.
 """
 
 from models.errors import CalibrationError
-from surefoot.camera import Camera, Pose, ground, read_camera
+from surefoot.camera import Camera, Pose, read_camera
+from surefoot.ground import ellipses, ground, image
 from surefoot.result import Result, estimate
 from surefoot.site import Site, learn, read_site
 from surefoot.tracks import Track, read_tracks
@@ -23,8 +24,10 @@ __all__ = [
     "Result",
     "Site",
     "Track",
+    "ellipses",
     "estimate",
     "ground",
+    "image",
     "learn",
     "read_camera",
     "read_site",

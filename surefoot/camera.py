@@ -2,15 +2,11 @@
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from models.errors import ShapeError
-from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 
@@ -97,21 +93,3 @@ def camera_of(body: dict[str, Any]) -> Camera:
         raise ShapeError(f"intrinsics, prior_pose: {error}") from error
     _ = camera.prior_pose.in_radians  # refuses what no camera can have
     return camera
-
-
-def ground(
-    camera: Camera, points: Sequence[Sequence[float]], pose: Pose | None = None
-) -> list[tuple[float, float] | None]:
-    """Places (x, y) on the ground of pixels (u, v), in metres; None above the horizon.
-
-    Args:
-        camera: whose lens, and whose prior pose unless another is given.
-        points: pixels of feet, u right and v down.
-        pose: where the camera stands by now, such as a result's.
-    """
-    stands = (pose or camera.prior_pose).in_radians
-    pixels = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    places, valid = ground_from_pixel(camera.intrinsics, stands.rotation, stands.centre_m, pixels)
-    return [
-        (float(x), float(y)) if seen else None for (x, y), seen in zip(places, valid, strict=True)
-    ]

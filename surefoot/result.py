@@ -51,8 +51,7 @@ class Result:
         """
         if not 0 < level < 1:
             raise ValueError(f"level: between 0 and 1, got {level}")
-        known = [name for name in PARAMETERS if _field(name) in self.estimated]
-        return {_field(name): self._interval(name, level) for name in known}
+        return {_field(name): self._interval(name, level) for name in parameter_names(self)}
 
     def _interval(self, name: str, level: float) -> tuple[float, float]:
         low, high = self.posterior.interval(name, level)
@@ -61,6 +60,11 @@ class Result:
             return prior.height_m * math.exp(low), prior.height_m * math.exp(high)
         at = math.degrees(getattr(prior, f"{name}_rad"))
         return at + math.degrees(low), at + math.degrees(high)
+
+
+def parameter_names(result: Result) -> tuple[str, ...]:
+    """Those of tilt, roll, height and heading that a result has estimated."""
+    return tuple(name for name in PARAMETERS if _field(name) in result.estimated)
 
 
 def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0) -> Result:

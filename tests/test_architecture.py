@@ -50,6 +50,7 @@ PUBLIC_MODELS = {
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
     "models.geometry.intrinsics": "the lens",
     "models.geometry.pose": "the pose, its parameters and their names",
+    "models.geometry.propagation": "how far off points are by a pose",
     "models.geometry.rotation": "arrays; forms of a rotation that people register",
     "models.geometry.upright": "upper edges of boxes, as they are stored",
     "models.geometry.usual_pose": "the pose of a camera that nobody has calibrated",

@@ -257,6 +257,7 @@ table(
     *needed(Double, "height_m", "tilt_rad", "roll_rad", "heading_rad"),
     *needed(Double, "height_sd_m", "tilt_sd_rad", "roll_sd_rad"),
     *optional(Double, "heading_sd_rad"),
+    *needed(JSON, "covariance"),
     *needed(Double, "drift_height_m", "drift_tilt_rad", "drift_roll_rad"),
     *needed(Double, "drift_heading_rad", "drift_angle_rad", "moved"),
     *needed(JSON, "moved_parameters", "rivals", "would_notice"),

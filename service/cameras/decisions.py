@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from service.access.activity import note as note_activity
 from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
 from service.cameras.cameras import renew_prior_pose, require_camera
+from service.cameras.held_poses import held_pose
 from service.cameras.poses import PoseView, view_pose
 from service.enums import Activity, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError
@@ -42,6 +43,7 @@ def accept_pose(
     view = view_pose(session, settings, decision.camera_id)
     if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
+    off = held_pose(session, decision.camera_id).covariance  # before the alert is closed
     _close(session, decision, Outcome.ACCEPTED, Activity.POSE_ACCEPTED)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     renew_prior_pose(
@@ -53,6 +55,7 @@ def accept_pose(
         Origin.ACCEPTED,
         from_s=from_s,
         by=decision.by,
+        covariance=None if off is None else off.tolist(),
     )
     return view_pose(session, settings, decision.camera_id)
 

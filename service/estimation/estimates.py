@@ -327,6 +327,7 @@ def _record(
         identifiable=list(drift.identifiable),
         pose=PoseParameters.of_pose(pose_after(drift, evidence.prior)),
         pose_sd=drift.sd,
+        covariance=finding.posterior.covariance.tolist(),
         drift_by=drift.by,
         drift_angle_rad=drift.angle_rad,
         suspected=finding.reading is not None and finding.reading.suspicious,

@@ -14,7 +14,9 @@ from sqlalchemy import (
     and_,
     bindparam,
     exists,
+    func,
     not_,
+    or_,
     select,
     text,
 )
@@ -144,6 +146,20 @@ def newest(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | N
     """The alert of a camera and kind that was opened last, or None."""
     query = newest_first(AlertRecord, camera_id, AlertRecord.opened_at)
     return session.scalars(query.where(AlertRecord.kind == kind).limit(1)).first()
+
+
+def drift_at(session: Session, camera_id: str, at: datetime) -> AlertRecord | None:
+    """The alert by which a camera had moved at a time, as estimates found; the last of several."""
+    begun = func.coalesce(AlertRecord.changed_at, AlertRecord.opened_at)
+    query = select(AlertRecord).where(
+        AlertRecord.camera_id == camera_id,
+        AlertRecord.kind == AlertKind.DRIFT,
+        AlertRecord.source == AlertSource.ESTIMATE,
+        begun <= at,
+        or_(AlertRecord.resolved_at.is_(None), AlertRecord.resolved_at > at),
+        or_(AlertRecord.outcome.is_(None), AlertRecord.outcome != Outcome.FALSE_ALARM),
+    )
+    return session.scalars(query.order_by(begun.desc()).limit(1)).first()
 
 
 def ended(

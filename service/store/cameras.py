@@ -103,7 +103,8 @@ class PriorPoseRecord(Record):
     """A pose that was trusted from a time on; the newest of a camera is its prior pose.
 
     One that is assumed was trusted by nobody; `given` names what was measured of it, in the words
-    of `CameraPose`. `covariance` (3, 3) is of tilt, roll and log height, where people told them.
+    of `CameraPose`. `covariance` is of tilt, roll, log height and, of an accepted one, heading, where people told
+    them.
     """
 
     __tablename__ = "prior_poses"
@@ -119,7 +120,7 @@ class PriorPoseRecord(Record):
     origin: Mapped[Origin] = mapped_column(vocabulary(Origin, checked=False))
     trusted_by: Mapped[str | None]
     given: Mapped[list[str]] = mapped_column(JSON, default=list)
-    covariance: Mapped[list[list[float]] | None] = mapped_column(JSON)
+    covariance: Mapped[list[list[float]] | None] = mapped_column(JSON(none_as_null=True))
     created_at: Mapped[datetime]
 
     __table_args__ = (
@@ -287,6 +288,20 @@ def prior_pose(session: Session, camera_id: str) -> PriorPoseRecord:
 def proposed_pose(session: Session, prior_pose_id: int) -> ProposedPoseRecord | None:
     """The pose that people told instead of one that is assumed; None where they did not yet."""
     return session.get(ProposedPoseRecord, prior_pose_id)
+
+
+def prior_pose_at(session: Session, camera_id: str, at: datetime) -> PriorPoseRecord:
+    """The pose that a camera was trusted to have at a time; its first one before all of them.
+
+    One that is assumed is there alone where nobody has ever agreed to one.
+    """
+    query = newest_first(PriorPoseRecord, camera_id)
+    trusted = query.where(PriorPoseRecord.origin != Origin.ASSUMED)
+    found = session.scalars(trusted.where(PriorPoseRecord.created_at <= at).limit(1)).first()
+    if found is None:
+        first = trusted.order_by(None).order_by(PriorPoseRecord.id)
+        found = session.scalars(first.limit(1)).first()
+    return found or session.scalars(query.limit(1)).one()
 
 
 def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorPoseRecord]:

@@ -11,6 +11,7 @@ from models.geometry.pose import PoseParameters
 from models.monitoring.verdict import Drift, MoveProbabilities
 from service.enums import PoseState
 from service.reasons import Reasons
+from service.store.engines.dialects import as_json
 from service.store.record import (
     Record,
     camera_key,
@@ -68,6 +69,7 @@ class EstimateRecord(Record):
     tilt_sd_rad: Mapped[float]
     roll_sd_rad: Mapped[float]
     heading_sd_rad: Mapped[float | None]
+    covariance: Mapped[list[Any]] = mapped_column(JSON)  # of tilt, roll, log height, heading
     drift_height_m: Mapped[float]
     drift_tilt_rad: Mapped[float]
     drift_roll_rad: Mapped[float]
@@ -132,6 +134,51 @@ def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> Es
     """The last estimate under an earlier reference, or None."""
     query = newest_first(EstimateRecord, camera_id)
     return session.scalars(query.where(EstimateRecord.reference_id < reference_id).limit(1)).first()
+
+
+def standing_at(
+    session: Session, camera_id: str, prior_pose_id: int, at_s: float
+) -> EstimateRecord | None:
+    """The last estimate that knew of a time and by which a camera had not moved; or None."""
+    query = newest_first(EstimateRecord, camera_id).where(
+        EstimateRecord.prior_pose_id == prior_pose_id,
+        EstimateRecord.state != PoseState.DRIFTING,
+        EstimateRecord.from_s <= at_s,
+    )
+    return session.scalars(query.limit(1)).first()
+
+
+def of_drift(
+    session: Session,
+    camera_id: str,
+    moved_s: float | None,
+    until: datetime | None,
+    at_s: float,
+) -> EstimateRecord | None:
+    """The estimate that says best where a camera stood at a time of a drift; None where none does.
+
+    The newest of those whose people had begun to come by then, and if none had, the first.
+
+    Args:
+        session: of a store.
+        camera_id: of the camera.
+        moved_s: when the drift began, in the time of tracks, where that is known.
+        until: when the drift was over; None while it lasts.
+        at_s: the time.
+    """
+    conditions = [
+        EstimateRecord.camera_id == camera_id,
+        EstimateRecord.state == PoseState.DRIFTING,
+        as_json(EstimateRecord.identifiable) != "[]",
+    ]
+    if moved_s is not None:
+        conditions.append(EstimateRecord.to_s >= moved_s)
+    if until is not None:
+        conditions.append(EstimateRecord.created_at <= until)
+    query = select(EstimateRecord).where(*conditions)
+    known = query.where(EstimateRecord.from_s <= at_s).order_by(EstimateRecord.id.desc())
+    found = session.scalars(known.limit(1)).first()
+    return found or session.scalars(query.order_by(EstimateRecord.id).limit(1)).first()
 
 
 def between(

@@ -27,6 +27,7 @@ BENCHMARKS: dict[str, tuple[str, ...]] = {
     "first_estimate": (),
     "trainings": ("--only", "default"),
     "requests": ("--json",),
+    "ground": (),
     "start": (),
     "idle": ("--cameras", "500", "--minutes", "1"),
     "fleet": (),

@@ -149,6 +149,7 @@ class Fleet:
                 height_m=6.0 + height * share, tilt_rad=POSE.tilt_rad + tilt * share,
                 roll_rad=POSE.roll_rad, heading_rad=pan * share,
                 height_sd_m=0.03, tilt_sd_rad=0.001, roll_sd_rad=0.002, heading_sd_rad=0.002,
+                covariance=np.diag([1e-6, 4e-6, 2.5e-5, 4e-6]).tolist(),
                 drift_height_m=height * share + noise(0, 0.03),
                 drift_tilt_rad=tilt * share + noise(0, 0.0002),
                 drift_roll_rad=noise(0, 0.0003), drift_heading_rad=pan * share + noise(0, 0.0003),

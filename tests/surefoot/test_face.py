@@ -48,6 +48,25 @@ def test_a_knock_is_told_with_the_pose_and_intervals_that_hold_it(site, people):
     assert result.drift["tilt_deg"] == pytest.approx(moved_by, abs=1)
 
 
+def test_places_have_ellipses_that_hold_the_truth_and_a_way_back(camera, site, people):
+    result = surefoot.estimate(site, people[1])
+    uv = [(400.0, 500.0), (640.0, 600.0), (900.0, 450.0), (640.0, -5000.0)]
+    found = surefoot.ground(camera, uv, result.pose)
+    true = surefoot.ground(camera, uv, surefoot.Pose.of(KNOCKED))
+    sizes = surefoot.ellipses(camera, uv, result)
+    assert (found[3], sizes[3]) == (None, None)
+    for (x, y), (to_x, to_y), (major, minor, angle) in zip(
+        found[:3], true[:3], sizes[:3], strict=True
+    ):
+        along = np.array([math.sin(math.radians(angle)), math.cos(math.radians(angle))])
+        off = np.array([to_x - x, to_y - y])
+        aside = float(np.hypot(*(off - off @ along * along)))
+        assert math.hypot(off @ along / major, aside / minor) < 3.5
+    back = surefoot.image(camera, found[:3], result.pose)
+    assert np.allclose(back, uv[:3], atol=1e-6)
+    assert surefoot.image(camera, [(1e4, -1e4)]) == [None]
+
+
 def test_a_camera_that_stands_has_not_moved(camera):
     known, after = tracks_of(5, (PRIOR, 200), (PRIOR, 80), config=LANES)
     result = surefoot.estimate(surefoot.learn(camera, known), after)

@@ -48,6 +48,8 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         f"GET {CHARTS_URL}",
         f"GET {VIEWER_SCRIPT_URL}",
         f"GET {VIEWER_STYLE_URL}",
+        "POST /cameras/{camera_id}/ground",
+        "POST /cameras/{camera_id}/image",
         "POST /ui/logout",
     ),
     TokenScope.OPERATE: (

@@ -1,0 +1,90 @@
+"""The pose that held at a time: the prior pose, or while an alert says so, the drifted one.
+
+By what is known of that time now, which is more than was known then: a drift is told some people
+after it began, and its pose best by those who came last.
+"""
+
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from models.geometry.pose import CameraPose
+from models.geometry.propagation import restricted
+from models.geometry.rotation import Array
+from service.enums import PoseState
+from service.store import alerts, cameras, estimates
+from service.store.cameras import PriorPoseRecord
+from service.store.estimates import EstimateRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldPose:
+    """A pose that held `since` a time.
+
+    `identifiable` names the numbers that tracks tell; `own` is their covariance (4, 4) against the
+    prior pose, None where no estimate says one. `prior` is the covariance of the prior pose, where
+    that is one that was estimated and accepted. Where the camera has `drifted` and nothing is
+    identifiable, nobody knows where it stands: it is the prior pose, and wrong.
+    """
+
+    pose: CameraPose
+    drifted: bool
+    since: datetime
+    identifiable: tuple[str, ...]
+    own: Array | None
+    prior: Array | None
+    prior_pose_id: int
+
+    @property
+    def covariance(self) -> Array | None:
+        """How far off it may be in the world, as far as anything tells."""
+        known = [each for each in (self.own, self.prior) if each is not None]
+        return sum(known[1:], known[0]) if known else None
+
+
+def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> HeldPose:
+    """The pose of a camera that there is, at a time, or now.
+
+    An alert of kind `drift` says that it has moved, from its change until it is resolved, unless it
+    was a false alarm. A wrong clock moves no camera.
+    """
+    at = at or datetime.now(UTC)
+    prior = cameras.prior_pose_at(session, camera_id, at)
+    drift = alerts.drift_at(session, camera_id, at)
+    if drift is None:
+        last = estimates.standing_at(session, camera_id, prior.id, at.timestamp())
+        if last is None or last.state in (PoseState.UNSURE, PoseState.LEARNING):
+            return _held(prior, since=prior.created_at)
+        return _held(prior, last, since=prior.created_at)
+    moved_s = None if drift.changed_at is None else drift.changed_at.timestamp()
+    found = estimates.of_drift(session, camera_id, moved_s, drift.resolved_at, at.timestamp())
+    since = drift.changed_at or drift.opened_at
+    if found is None:
+        return _held(prior, since=since, drifted=True)
+    prior = session.get_one(PriorPoseRecord, found.prior_pose_id)
+    return _held(prior, found, since=since, drifted=True)
+
+
+def _held(
+    prior: PriorPoseRecord,
+    estimate: EstimateRecord | None = None,
+    *,
+    since: datetime,
+    drifted: bool = False,
+) -> HeldPose:
+    names = () if estimate is None else tuple(estimate.identifiable)
+    own = None if estimate is None else restricted(np.array(estimate.covariance), names)
+    pose = prior.pose
+    if estimate is not None and drifted:
+        pose = replace(pose, **asdict(estimate.pose))
+    return HeldPose(
+        pose=pose,
+        drifted=drifted,
+        since=since,
+        identifiable=names,
+        own=own if names else None,
+        prior=None if prior.covariance is None else np.array(prior.covariance),
+        prior_pose_id=prior.id,
+    )
