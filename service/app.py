@@ -23,6 +23,7 @@ from service.api import (
     tracks,
     trainings,
     webhooks,
+    zones,
 )
 from service.api.middleware import pages
 from service.api.middleware.admission import (
@@ -92,6 +93,7 @@ def create_app(settings: Settings) -> FastAPI:
         sources,
         snapshots,
         ground,
+        zones,
         trainings,
         alerts,
         maintenance,

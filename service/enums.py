@@ -33,6 +33,13 @@ class Cause(StrEnum):
     FALSE_ALARM = "false_alarm"
 
 
+class ZoneOn(StrEnum):
+    """What a zone lies on: the ground, or what else there is in the scene."""
+
+    GROUND = "ground"
+    SCENE = "scene"
+
+
 class ReferenceState(StrEnum):
     """The state of a reference."""
 
@@ -235,6 +242,7 @@ class Activity(StrEnum):
     TRAINING_CANCELLED = "training.cancelled"
     SNAPSHOT_KEPT = "snapshot.kept"
     SNAPSHOT_REMOVED = "snapshot.removed"
+    ZONES_DRAWN = "zones.drawn"
     WEBHOOK_ADDED = "webhook.added"
     WEBHOOK_CHANGED = "webhook.changed"
     WEBHOOK_SECRET_CHANGED = "webhook.secret_changed"

@@ -63,6 +63,10 @@ CALLED = {
     "camera_rhythms": {"profile": None, "counts": '{"tracks": {}, "latest_s": {}}'},
     "access_tokens": {"id": "some"},
     "snapshots": {"jpeg": b"a picture", "sha256": "0" * 64, "width": 1280, "height": 720},
+    "zones": {"zones": json.dumps([{"id": "gate", "on": "ground",
+                                    "corners": [[400, 500], [800, 500], [800, 600]]}]),
+              "form": None, "document": None, "pose": json.dumps(NUMBERS | {"x_m": 0, "y_m": 0}),
+              "intrinsics": json.dumps(INTRINSICS | {"distortion": [0, 0, 0, 0, 0]})},
     "activity": {"what": "camera.registered", "by": "Ada", "details": "{}"},
 }  # fmt: skip
 

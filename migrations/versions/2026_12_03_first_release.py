@@ -31,7 +31,7 @@ ACTIVITY = (
     "alert.escalated alert.acknowledged alert.silenced alert.silence_ended alert.resolved "
     "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
     "maintenance.over training.requested training.succeeded training.failed training.cancelled "
-    "snapshot.kept snapshot.removed webhook.added webhook.changed webhook.secret_changed "
+    "snapshot.kept snapshot.removed zones.drawn webhook.added webhook.changed webhook.secret_changed "
     "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
     "session.ended login.refused"
 )
@@ -130,6 +130,18 @@ table(
     *needed(String(64), "sha256"),
     *needed(NUMBER, "width", "height"),
     *needed(DateTime, "stored_at"),
+)
+table(
+    "zones",
+    key("camera_id", String(64), of("cameras.id")),
+    prior_pose(),
+    *needed(JSON, "zones"),
+    *optional(String, "form"),
+    *optional(JSON, "document"),
+    *needed(JSON, "intrinsics", "pose"),
+    *optional(JSON, "covariance"),
+    *needed(NUMBER, "version"),
+    *needed(DateTime, "drawn_at", "updated_at"),
 )
 table(
     "tracks",

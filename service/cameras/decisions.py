@@ -12,13 +12,14 @@ from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
 from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.held_poses import held_pose
 from service.cameras.poses import PoseView, view_pose
+from service.cameras.zones import keep_drawn
 from service.enums import Activity, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.references import begin_reference, keep_answer
 from service.settings import Settings
-from service.store import alerts, tracks
+from service.store import alerts, cameras, tracks
 from service.store.alerts import AlertRecord
 
 
@@ -43,7 +44,7 @@ def accept_pose(
     view = view_pose(session, settings, decision.camera_id)
     if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
-    off = held_pose(session, decision.camera_id).covariance  # before the alert is closed
+    held = held_pose(session, decision.camera_id)  # as long as the alert is open
     _close(session, decision, Outcome.ACCEPTED, Activity.POSE_ACCEPTED)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     renew_prior_pose(
@@ -55,8 +56,9 @@ def accept_pose(
         Origin.ACCEPTED,
         from_s=from_s,
         by=decision.by,
-        covariance=None if off is None else off.tolist(),
+        covariance=None if held.covariance is None else held.covariance.tolist(),
     )
+    keep_drawn(session, decision.camera_id, held, cameras.prior_pose(session, decision.camera_id))
     return view_pose(session, settings, decision.camera_id)
 
 

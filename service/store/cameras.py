@@ -42,6 +42,7 @@ from service.store.record import (
 )
 from service.store.references import SiteReferenceRecord, counting_source
 from service.store.trainings import ModelRecord, TrainingRecord
+from service.store.zones import ZonesRecord
 
 
 class CameraRecord(Record):
@@ -312,7 +313,7 @@ def prior_poses(session: Session, camera_id: str, limit: int) -> Sequence[PriorP
 def forget_poses(session: Session, camera_id: str, keep: int, limit: int) -> int:
     """Delete up to `limit` of all but the newest so many that nothing names; how many."""
     beyond = surplus(PriorPoseRecord, camera_id, keep)
-    naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord)
+    naming = (SiteReferenceRecord, TrainingRecord, ModelRecord, EstimateRecord, ZonesRecord)
     named = [select(one.prior_pose_id).where(one.camera_id == camera_id) for one in naming]
     bite = (
         select(PriorPoseRecord.id)

@@ -53,6 +53,7 @@ _DONE = {
     Activity.TRAINING_REQUESTED: "asked for a training",
     Activity.SNAPSHOT_KEPT: "put a new still image",
     Activity.SNAPSHOT_REMOVED: "deleted the still image",
+    Activity.ZONES_DRAWN: "drew the zones anew",
 }
 _HAPPENED = {
     Activity.ALERT_OPENED: "Alert: {kind}",

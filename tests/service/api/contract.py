@@ -180,6 +180,8 @@ class Ground:
             case.path_parameters["camera_id"] = "busy"
         if case.path == "/cameras/{camera_id}" and case.method in ("PATCH", "DELETE"):
             case.headers["if-match"] = self._etag(case.path_parameters["camera_id"])
+        if case.path.endswith("/zones") and case.method == "PUT":
+            case.headers["if-match"] = "*"
         self._fill(case, chance)
         random_ = random.Random(chance)
         if case.query and random_.random() < 0.2:

@@ -1,0 +1,218 @@
+"""Zones follow their camera: kept as they were drawn, told as they are by the pose that holds."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.outlines import (
+    MovedOutline,
+    Outline,
+    View,
+    moved_outline,
+    overlap,
+    within_picture,
+)
+from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
+from service.access.activity import note
+from service.cameras.cameras import require_camera
+from service.cameras.held_poses import HeldPose, held_pose
+from service.enums import Activity, ZoneOn
+from service.errors import PreconditionFailedError
+from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
+from service.formats.zones import Corner, Zone
+from service.store import zones
+from service.store.cameras import PriorPoseRecord
+from service.store.zones import ZonesRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZoneView:
+    """A zone as it was drawn, and where it is `now`.
+
+    `overlap` is the share of it that still lies where it was drawn, if nobody mends the drawing.
+    """
+
+    zone: Zone
+    now: MovedOutline
+    overlap: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZonesView:
+    """The zones of a camera by the pose that holds; `record` is None where none were ever drawn.
+
+    They have `moved` where that pose or the lens is another than at the drawing; the camera's
+    centre is `shift_m` from where it was.
+    """
+
+    camera_id: str
+    record: ZonesRecord | None
+    intrinsics: Intrinsics
+    held: HeldPose
+    zones: tuple[ZoneView, ...]
+    moved: bool
+    shift_m: float
+
+    @property
+    def etag(self) -> str:
+        """Changes whenever zones are drawn."""
+        return _etag(self.camera_id, self.record)
+
+
+def view_zones(session: Session, camera_id: str) -> ZonesView:
+    """The zones of a camera, where they were drawn and where they are.
+
+    Raises:
+        NotFoundError: there is no such camera.
+    """
+    lens = require_camera(session, camera_id).intrinsics
+    record, held = zones.of_camera(session, camera_id), held_pose(session, camera_id)
+    now = View(intrinsics=lens, pose=held.pose)
+    drawn = now if record is None else _view_of(record)
+    moved = drawn != now
+    covariance = None if record is None else _between(session, record, held, moved=moved)
+    found = []
+    for zone in () if record is None else zones_of_record(record):
+        corners = np.array(zone.corners, dtype=np.float64)
+        outline = Outline(corners=corners, drawn=drawn, on_ground=zone.on == ZoneOn.GROUND)
+        placed = moved_outline(outline, now, covariance)
+        if not moved:
+            placed = _unmoved(corners, placed)
+        share = overlap(outline, now) if moved else 1.0
+        found.append(ZoneView(zone=zone, now=placed, overlap=share))
+    return ZonesView(
+        camera_id=camera_id,
+        record=record,
+        intrinsics=lens,
+        held=held,
+        zones=tuple(found),
+        moved=moved,
+        shift_m=float(np.linalg.norm(held.pose.centre_m - drawn.pose.centre_m)),
+    )
+
+
+def draw_zones(
+    session: Session,
+    camera_id: str,
+    etag: str,
+    kind: ZoneFormat | None,
+    document: Any,
+    on: ZoneOn,
+    at: datetime | None,
+) -> ZonesView:
+    """Keep zones in place of those there were, as drawn at the pose that held at a time, or holds.
+
+    Raises:
+        NotFoundError: there is no such camera.
+        MalformedError: of the document.
+        PreconditionFailedError: they were drawn anew since the client read them.
+    """
+    lens = require_camera(session, camera_id).intrinsics
+    record = zones.of_camera(session, camera_id)
+    current = _etag(camera_id, record)
+    if etag not in (current, "*"):
+        raise PreconditionFailedError(f"If-Match: the zones are at {current}, got {etag}")
+    drawn = read_zones(kind, document, camera_id, (lens.width, lens.height), on)
+    held, now = held_pose(session, camera_id, at), datetime.now(UTC)
+    own = held.own if held.drifted else None
+    session.merge(
+        ZonesRecord(
+            camera_id=camera_id,
+            prior_pose_id=held.prior_pose_id,
+            zones=[asdict(zone) for zone in drawn],
+            form=kind,
+            document=None if kind is None else document,
+            intrinsics=asdict(lens),
+            pose=asdict(held.pose),
+            covariance=None if own is None else own.tolist(),
+            version=1 if record is None else record.version + 1,
+            drawn_at=at or now,
+            updated_at=now,
+        )
+    )
+    details = {"zones": len(drawn)}
+    note(session, Activity.ZONES_DRAWN, by=None, camera_id=camera_id, details=details)
+    session.flush()
+    return view_zones(session, camera_id)
+
+
+def keep_drawn(session: Session, camera_id: str, held: HeldPose, prior: PriorPoseRecord) -> None:
+    """Have zones that were drawn since a drift stand as drawn at the pose that it is accepted as.
+
+    Each estimate of the drift is a little elsewhere, and the camera was not.
+    """
+    record = zones.of_camera(session, camera_id)
+    if record is None or not held.drifted or record.drawn_at < held.since:
+        return
+    if record.covariance is None:
+        return  # by the prior pose, before anybody knew
+    record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
+
+
+def zones_document(view: ZonesView, kind: ZoneFormat) -> str:
+    """The zones in a format: the document that came in it, its corners where they are now."""
+    record, lens = view.record, view.intrinsics
+    own = record is not None and record.form == kind
+    moved = {each.zone.id: _shown(view, each, kind) for each in view.zones}
+    return write_zones(
+        kind,
+        record.document if record is not None and own else None,
+        view.camera_id,
+        (lens.width, lens.height),
+        [each.zone for each in view.zones],
+        moved if view.moved else None,
+    )
+
+
+def zones_of_record(record: ZonesRecord) -> Sequence[Zone]:
+    """The zones of a record."""
+    return [
+        Zone(id=each["id"], on=ZoneOn(each["on"]), corners=tuple(map(tuple, each["corners"])))
+        for each in record.zones
+    ]
+
+
+def _shown(view: ZonesView, each: ZoneView, kind: ZoneFormat) -> Sequence[Corner]:
+    """The corners of a zone now, of which a format may take none outside the picture."""
+    corners = each.now.corners
+    if is_cut(kind) and len(corners):
+        corners = within_picture(corners, view.intrinsics, closed=len(each.zone.corners) > 2)
+    return [(u, v) for u, v in corners.tolist()]
+
+
+def _unmoved(corners: Array, placed: MovedOutline) -> MovedOutline:
+    """A zone that is where it was, to the last digit; one above the horizon has no ellipses."""
+    same = len(placed.corners) == len(corners)
+    ellipses = placed.ellipses if same else None
+    return MovedOutline(corners=corners, ellipses=ellipses, in_view=placed.in_view)
+
+
+def _view_of(record: ZonesRecord) -> View:
+    lens = {**record.intrinsics, "distortion": tuple(record.intrinsics["distortion"])}
+    return View(intrinsics=Intrinsics(**lens), pose=CameraPose(**record.pose))
+
+
+def _between(session: Session, record: ZonesRecord, held: HeldPose, *, moved: bool) -> Array | None:
+    """The covariance of a pose against that of a drawing; None where nothing says one.
+
+    Of an earlier prior pose, its error and that of today's are taken for independent, which at
+    worst counts the first one twice.
+    """
+    parts = [held.own]
+    if moved:
+        parts.append(None if record.covariance is None else np.array(record.covariance))
+    if record.prior_pose_id != held.prior_pose_id:
+        drawn_at = session.get_one(PriorPoseRecord, record.prior_pose_id).covariance
+        parts += [held.prior, None if drawn_at is None else np.array(drawn_at)]
+    known = [each for each in parts if each is not None]
+    return sum(known[1:], known[0]) if known else None
+
+
+def _etag(camera_id: str, record: ZonesRecord | None) -> str:
+    return f'"{camera_id}-zones-{0 if record is None else record.version}"'

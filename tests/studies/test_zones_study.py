@@ -1,0 +1,21 @@
+"""Zones after a knock: corners come back within the ellipse that is told."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from studies.protocol.zones_study import _squared, corner_errors
+from tests.conftest import SCENES
+
+
+def test_an_error_along_an_ellipse_counts_less_than_one_across():
+    ellipses = np.array([[2.0, 1.0, np.pi / 2]] * 2)
+    assert_allclose(_squared(np.array([[0.0, 2.0], [2.0, 0.0]]), ellipses), [1.0, 4.0])
+
+
+@pytest.mark.slow
+def test_corners_come_back_on_a_recorded_scene():
+    errors = corner_errors(SCENES / "wildtrack_c1", 0, "knock", by_time=False)
+    assert len(errors) > 8
+    assert np.median([each.share for each in errors]) < 0.01
+    assert np.mean([each.squared <= 5.991 for each in errors]) > 0.9
