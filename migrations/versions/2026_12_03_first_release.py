@@ -31,9 +31,9 @@ ACTIVITY = (
     "alert.escalated alert.acknowledged alert.silenced alert.silence_ended alert.resolved "
     "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
     "maintenance.over training.requested training.succeeded training.failed training.cancelled "
-    "snapshot.kept snapshot.removed zones.drawn webhook.added webhook.changed webhook.secret_changed "
-    "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
-    "session.ended login.refused"
+    "snapshot.kept snapshot.removed zones.drawn webhook.added webhook.changed "
+    "webhook.secret_changed webhook.removed webhook.tested webhook.replayed token.added "
+    "token.revoked session.began session.ended login.refused"
 )
 
 

@@ -11,8 +11,10 @@ from models.geometry.rotation import Array
 from models.tracks.trajectory import Trajectory
 from service.cameras.cameras import CameraView
 from service.cameras.poses import PoseView
+from service.cameras.zones import ZonesView
 from service.pages.drawings.ground_plan import ground_plan_svg
 from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
+from service.pages.drawings.zones import zone_parts
 from service.store.cameras import SnapshotRecord
 
 _POINTS = 24
@@ -42,6 +44,7 @@ def draw_camera(
     tracks: Sequence[Trajectory],
     misplaced: Sequence[Misplacement],
     still: SnapshotRecord | None,
+    zones: ZonesView,
 ) -> CameraDrawings:
     """The picture plane and the ground from above, with the newest tracks.
 
@@ -68,6 +71,7 @@ def draw_camera(
             label=f"The picture with {people}; horizon and ground grid of {both}.",
             ground=ground,
             snapshot_url=snapshot,
+            over=_zones(zones),
         ),
         plan=ground_plan_svg(
             lens,
@@ -83,6 +87,14 @@ def draw_camera(
         two_poses=len(overlays) > 1,
         horizon=any(horizon_path(lens, each.pose) for each in overlays),
     )
+
+
+def _zones(view: ZonesView) -> list[str]:
+    """Zones where they are, and below them as they were drawn if that is elsewhere."""
+    drawn = [(each.zone.id, np.array(each.zone.corners)) for each in view.zones]
+    now = [(each.zone.id, each.now.corners) for each in view.zones]
+    before = zone_parts(view.intrinsics, drawn, "drawn") if view.moved else []
+    return before + zone_parts(view.intrinsics, now, "now")
 
 
 def _fewer(uv: Array) -> Array:

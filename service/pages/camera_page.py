@@ -1,5 +1,6 @@
 """`/ui/cameras/{id}`: the page of a camera, and all that it shows, read in one go."""
 
+import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -18,6 +19,7 @@ from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
+from service.cameras.zones import ZonesView, view_zones
 from service.enums import AlertState, PoseState
 from service.pages.camera_drawings import draw_camera
 from service.pages.connecting import how_to_connect
@@ -35,6 +37,7 @@ from service.wording import moves
 from service.wording.camera import CameraFacts
 from service.wording.reasons import in_words
 from service.wording.times import Clock, next_morning
+from service.wording.zones import corner_words, zone_words
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _ACTIVITY, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 40, 5, 20, 5
@@ -74,6 +77,7 @@ class CameraPage:
     activity: tuple[ActivityRecord, ...]
     sources: tuple[SourceView, ...]
     snapshot: SnapshotRecord | None
+    zones: ZonesView
     snapshots_allowed: bool
     newest_event_id: int
 
@@ -165,6 +169,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
+        zones=view_zones(session, camera_id),
         snapshots_allowed=settings.snapshots,
         newest_event_id=newest_event_id,
     )
@@ -191,8 +196,11 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         zone_name=state.settings.timezone,
         people=camera_words.people_words(page.pose.reference.counted, page.pose.reference.hours),
         headline=camera_words.headline(page.facts, clock),
-        drawings=draw_camera(page.camera, page.pose, page.tracks, page.misplaced, page.snapshot),
+        drawings=draw_camera(
+            page.camera, page.pose, page.tracks, page.misplaced, page.snapshot, page.zones
+        ),
         proposed=None if page.pose.proposed is None else moves.proposed_rows(page.pose.proposed),
+        zones=_zone_rows(page.zones),
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate
         ),
@@ -214,6 +222,29 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     )
     answer.headers["Content-Security-Policy"] += f"; style-src 'self' {_CHARTS_STYLE}"
     return answer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZoneRow:
+    """A zone in words: what a move comes to for it, and how sure its corners are; may be empty."""
+
+    name: str
+    overlap: float
+    meaning: str = ""
+    sure: str = ""
+
+
+def _zone_rows(view: ZonesView) -> list[ZoneRow]:
+    rows = []
+    for each in view.zones:
+        said = {}
+        if view.moved:
+            sizes = [] if each.now.ellipses is None else each.now.ellipses[:, 0].tolist()
+            worst_px = max((size for size in sizes if math.isfinite(size)), default=None)
+            shares = {"overlap": each.overlap, "in_view": each.now.in_view}
+            said = {"meaning": zone_words(each.zone.on, **shares), "sure": corner_words(worst_px)}
+        rows.append(ZoneRow(name=each.zone.id, overlap=each.overlap, **said))
+    return rows
 
 
 def _flags(page: CameraPage, clock: Clock) -> list[str]:

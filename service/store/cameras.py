@@ -104,8 +104,8 @@ class PriorPoseRecord(Record):
     """A pose that was trusted from a time on; the newest of a camera is its prior pose.
 
     One that is assumed was trusted by nobody; `given` names what was measured of it, in the words
-    of `CameraPose`. `covariance` is of tilt, roll, log height and, of an accepted one, heading, where people told
-    them.
+    of `CameraPose`. `covariance` is of tilt, roll, log height and, where it was accepted, heading:
+    of a pose that people told.
     """
 
     __tablename__ = "prior_poses"

@@ -116,6 +116,7 @@ def picture_svg(
     label: str,
     ground: Ground | None = None,
     snapshot_url: str | None = None,
+    over: Sequence[str] = (),
 ) -> Markup:
     """The picture plane with the horizon and the grid of each pose, and foot points (N, 2).
 
@@ -126,6 +127,7 @@ def picture_svg(
         label: what a screen reader says of it.
         ground: the grid; that of the first overlay if not given.
         snapshot_url: a still image to lie behind it.
+        over: SVG that lies over the grids, below people.
     """
     if ground is None and overlays:
         ground = ground_of(lens, overlays[0].pose)
@@ -148,6 +150,7 @@ def picture_svg(
             f'<text class="nothing" x="{lens.width / 2:.0f}" y="{lens.height / 2:.0f}" '
             f'text-anchor="middle" font-size="{lens.width / 24:.0f}">nothing but sky</text>'
         )
+    parts += over
     if tracks:
         parts.append(f'<path class="track" d="{path_data(tracks, picture_frame(lens))}"/>')
     return svg("picture", f"-0.5 -0.5 {lens.width} {lens.height}", label, parts)

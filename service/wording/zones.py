@@ -1,0 +1,35 @@
+"""Zones in words: how much of one still lies where it was drawn, how much the picture shows."""
+
+from models.quantiles import Z90
+from service.enums import ZoneOn
+
+_MANY = 0.995  # of a share that is told as whole
+
+
+def zone_words(on: ZoneOn, *, overlap: float, in_view: float) -> str:
+    """A zone of a camera that moved, to follow its name and a colon.
+
+    Args:
+        on: what it lies on.
+        overlap: the share that still lies where it was drawn.
+        in_view: the share of it that the picture shows.
+    """
+    if in_view <= 0:
+        return "none of it is in the picture any more"
+    where = "on the ground" if on == ZoneOn.GROUND else "of it"
+    if overlap >= _MANY:
+        words = "all still lies where it was drawn"
+    elif overlap < 1 - _MANY:
+        words = "nothing lies where it was drawn"
+    else:
+        words = f"{100 * overlap:.0f} % {where} still lies where it was drawn"
+    if in_view < _MANY:
+        words += f", {100 * (1 - in_view):.0f} % has left the picture"
+    return words
+
+
+def corner_words(worst_px: float | None) -> str:
+    """How sure mended corners are, by the major semi-axis of the least sure one; maybe nothing."""
+    if worst_px is None:
+        return ""
+    return f"mended corners are sure to ±{max(Z90 * worst_px, 1):.0f} px"
