@@ -70,13 +70,14 @@ class HeldPoseOut(BaseModel):
     """A pose that held `since` a time.
 
     Ellipses are of the numbers in `estimated`; the others are the prior pose's. Where the camera
-    has `drifted` and none is estimated, nobody knows where it stands.
+    has `drifted` and none is estimated, nobody knows where it stands. `pose` is null where nobody
+    has agreed to one.
     """
 
     drifted: bool
     since: datetime
     estimated: list[str]
-    pose: PoseOut
+    pose: PoseOut | None
 
     @classmethod
     def from_value(cls, held: HeldPose) -> Self:
@@ -85,7 +86,7 @@ class HeldPoseOut(BaseModel):
             drifted=held.drifted,
             since=held.since,
             estimated=[field for name, field in POSE_FIELDS.items() if name in held.identifiable],
-            pose=PoseOut.from_value(held.pose),
+            pose=None if held.assumed else PoseOut.from_value(held.pose),
         )
 
 

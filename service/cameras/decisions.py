@@ -19,7 +19,7 @@ from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.references import begin_reference, keep_answer
 from service.settings import Settings
-from service.store import alerts, cameras, tracks
+from service.store import alerts, tracks
 from service.store.alerts import AlertRecord
 
 
@@ -58,7 +58,7 @@ def accept_pose(
         by=decision.by,
         covariance=None if held.covariance is None else held.covariance.tolist(),
     )
-    keep_drawn(session, decision.camera_id, held, cameras.prior_pose(session, decision.camera_id))
+    keep_drawn(session, decision.camera_id, held)
     return view_pose(session, settings, decision.camera_id)
 
 
@@ -82,6 +82,7 @@ def agree_pose(
     note_activity(
         session, Activity.POSE_AGREED, by=decision.by, camera_id=camera_id, text=decision.note
     )
+    held = held_pose(session, camera_id)
     renew_prior_pose(
         session,
         queue,
@@ -93,6 +94,7 @@ def agree_pose(
         by=decision.by,
         covariance=proposed.covariance,
     )
+    keep_drawn(session, camera_id, held)
     return view_pose(session, settings, camera_id)
 
 

@@ -10,6 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.propagation import error_ellipses
 from models.geometry.rotation import Array
 from service.cameras.held_poses import HeldPose
+from service.errors import ConflictError
 
 
 def places_of_pixels(
@@ -19,7 +20,11 @@ def places_of_pixels(
 
     An ellipse is its semi-axes in metres and the direction of the major one, in radians clockwise
     from +Y, like a heading. None where nothing says how sure the pose is.
+
+    Raises:
+        ConflictError: nobody has said or agreed to a pose.
     """
+    _require_known(held)
     rays, _ = intrinsics.rays(uv)
     foot_m = held.pose.centre_m[:2]
 
@@ -41,7 +46,11 @@ def pixels_of_places(
 
     An ellipse is its semi-axes in pixels and the angle of the major one, in radians clockwise from
     +u as the picture is seen.
+
+    Raises:
+        ConflictError: as of places.
     """
+    _require_known(held)
 
     def placed(rotation: Array, height_m: float) -> Array:
         centre_m = np.array([held.pose.x_m, held.pose.y_m, height_m])
@@ -53,3 +62,8 @@ def pixels_of_places(
     ellipses = error_ellipses(placed, held.pose, held.covariance)
     ellipses[:, 2] = np.mod(ellipses[:, 2], np.pi)
     return pixels, ellipses
+
+
+def _require_known(held: HeldPose) -> None:
+    if held.assumed:
+        raise ConflictError("pose: nobody has agreed to a prior pose yet")

@@ -10,10 +10,10 @@ from datetime import UTC, datetime
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.geometry.pose import CameraPose
+from models.geometry.pose import PARAMETERS, CameraPose
 from models.geometry.propagation import restricted
 from models.geometry.rotation import Array
-from service.enums import PoseState
+from service.enums import Origin, PoseState
 from service.store import alerts, cameras, estimates
 from service.store.cameras import PriorPoseRecord
 from service.store.estimates import EstimateRecord
@@ -26,7 +26,8 @@ class HeldPose:
     `identifiable` names the numbers that tracks tell; `own` is their covariance (4, 4) against the
     prior pose, None where no estimate says one. `prior` is the covariance of the prior pose, where
     that is one that was estimated and accepted. Where the camera has `drifted` and nothing is
-    identifiable, nobody knows where it stands: it is the prior pose, and wrong.
+    identifiable, nobody knows where it stands: it is the prior pose, and wrong. One that is
+    `assumed` is usual somewhere, and nobody has agreed to it: nobody is served by it.
     """
 
     pose: CameraPose
@@ -36,6 +37,7 @@ class HeldPose:
     own: Array | None
     prior: Array | None
     prior_pose_id: int
+    assumed: bool
 
     @property
     def covariance(self) -> Array | None:
@@ -52,6 +54,8 @@ def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> H
     """
     at = at or datetime.now(UTC)
     prior = cameras.prior_pose_at(session, camera_id, at)
+    if prior.origin == Origin.ASSUMED:
+        return _held(prior, since=prior.created_at)
     drift = alerts.drift_at(session, camera_id, at)
     if drift is None:
         last = estimates.standing_at(session, camera_id, prior.id, at.timestamp())
@@ -65,6 +69,12 @@ def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> H
         return _held(prior, since=since, drifted=True)
     prior = session.get_one(PriorPoseRecord, found.prior_pose_id)
     return _held(prior, found, since=since, drifted=True)
+
+
+def _four(covariance: list[list[float]]) -> Array:
+    """A covariance (4, 4): people who propose a pose tell no heading."""
+    known = np.array(covariance)
+    return np.pad(known, (0, len(PARAMETERS) - len(known)))
 
 
 def _held(
@@ -85,6 +95,7 @@ def _held(
         since=since,
         identifiable=names,
         own=own if names else None,
-        prior=None if prior.covariance is None else np.array(prior.covariance),
+        prior=None if prior.covariance is None else _four(prior.covariance),
         prior_pose_id=prior.id,
+        assumed=prior.origin == Origin.ASSUMED,
     )

@@ -26,7 +26,7 @@ from service.enums import Activity, ZoneOn
 from service.errors import PreconditionFailedError
 from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
 from service.formats.zones import Corner, Zone
-from service.store import zones
+from service.store import cameras, zones
 from service.store.cameras import PriorPoseRecord
 from service.store.zones import ZonesRecord
 
@@ -75,6 +75,8 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
     record, held = zones.of_camera(session, camera_id), held_pose(session, camera_id)
     now = View(intrinsics=lens, pose=held.pose)
     drawn = now if record is None else _view_of(record)
+    if held.assumed:  # nobody knows a pose that it could have left
+        now = View(intrinsics=lens, pose=drawn.pose)
     moved = drawn != now
     covariance = None if record is None else _between(session, record, held, moved=moved)
     found = []
@@ -93,7 +95,7 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
         held=held,
         zones=tuple(found),
         moved=moved,
-        shift_m=float(np.linalg.norm(held.pose.centre_m - drawn.pose.centre_m)),
+        shift_m=float(np.linalg.norm(now.pose.centre_m - drawn.pose.centre_m)),
     )
 
 
@@ -142,17 +144,24 @@ def draw_zones(
     return view_zones(session, camera_id)
 
 
-def keep_drawn(session: Session, camera_id: str, held: HeldPose, prior: PriorPoseRecord) -> None:
-    """Have zones that were drawn since a drift stand as drawn at the pose that it is accepted as.
+def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
+    """Have zones stand as drawn at a new prior pose, where the camera stood when they were drawn.
 
-    Each estimate of the drift is a little elsewhere, and the camera was not.
+    That is so of zones since the drift whose pose is accepted, by an estimate of it: each one is a
+    little elsewhere, and the camera was not. And of those from before anybody had agreed to a pose.
+
+    Args:
+        session: of a store.
+        camera_id: of the camera.
+        held: the pose that held until then.
     """
     record = zones.of_camera(session, camera_id)
-    if record is None or not held.drifted or record.drawn_at < held.since:
+    if record is None:
         return
-    if record.covariance is None:
-        return  # by the prior pose, before anybody knew
-    record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
+    since_drift = held.drifted and record.covariance is not None and record.drawn_at >= held.since
+    if held.assumed or since_drift:
+        prior = cameras.prior_pose(session, camera_id)
+        record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
 
 
 def zones_document(view: ZonesView, kind: ZoneFormat) -> str:

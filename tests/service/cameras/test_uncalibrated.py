@@ -31,6 +31,11 @@ def test_people_tell_its_pose_a_person_agrees_and_drift_is_told_against_it(stree
     # Nobody is served by what nobody has agreed to, and nothing is learned or alarmed.
     assert (before["estimated"], before["drift"], street.alerts()) == ([], None, [])
     problem(street.http.get("/cameras/corner/pose.yaml"), 409, "conflict")
+    told = problem(street.http.post("/cameras/corner/ground", json={"points": []}), 409, "conflict")
+    assert told["detail"] == "pose: nobody has agreed to a prior pose yet"
+    gate = {"zones": [{"id": "gate", "points": [[400, 350.5], [800, 361], [900, 600]]}]}
+    drawn = street.http.put("/cameras/corner/zones", json=gate, headers={"If-Match": "*"})
+    assert drawn.raise_for_status().json()["by"]["pose"] is None
 
     agreed = street.http.post("/cameras/corner/pose/agree", json={"by": "Ada"})
     assert agreed.status_code == 200
@@ -43,8 +48,14 @@ def test_people_tell_its_pose_a_person_agrees_and_drift_is_told_against_it(stree
     assert (after["state"], after["reference"]["state"]) in [("ok", "ready"), ("learning", "ready")]
     problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
 
+    zones = street.http.get("/cameras/corner/zones").json()
+    assert (zones["moved"], zones["by"]["pose"]) == (False, proposed)
+    assert zones["zones"][0]["points_now"] == gate["zones"][0]["points"]
+    assert all(sd[0] > 0 for sd in zones["zones"][0]["sd_px"])
+
     street.keep_to_lanes(KNOCKED, 60)
     moved = street.look()
+    assert street.http.get("/cameras/corner/zones").json()["moved"]
     assert moved["state"] == "drifting"
     assert moved["drift"]["tilt_deg"] == pytest.approx(5.0, abs=1.5)
     assert [alert["kind"] for alert in street.alerts()] == ["drift"]

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
+from sqlalchemy import delete
 
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
+from service.store.cameras import forget_poses, prior_poses
+from service.store.estimates import EstimateRecord
+from service.store.references import SiteReferenceRecord
+from service.store.trainings import ModelRecord, TrainingRecord
 from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
@@ -332,6 +337,20 @@ def test_other_types_and_too_much_are_refused(corner):
     problem(put(corner, ("application/yaml", "#" * 70_000)), 413, "too_large")
     problem(put(corner, ("application/json", "[" * 100_000)), 422, "malformed")
     problem(corner.get("/cameras/none/zones"), 404, "not_found")
+
+
+def test_the_prior_pose_that_they_were_drawn_at_is_kept(bench):
+    draw(bench.http, GATE)
+    for tilt_deg in (4, 8):
+        bench.see(moved(tilt_deg=tilt_deg), change=5)
+        bench.http.post("/cameras/corner/pose/accept").raise_for_status()
+        bench.learn()
+    with bench.store.write() as session:
+        first, second, third = [each.id for each in prior_poses(session, "corner", 9)][::-1]
+        for table in (EstimateRecord, SiteReferenceRecord, ModelRecord, TrainingRecord):
+            session.execute(delete(table))
+        assert forget_poses(session, "corner", 1, 100) == 1
+        assert [each.id for each in prior_poses(session, "corner", 9)] == [third, first]
 
 
 def test_they_go_with_their_camera(corner):
