@@ -51,11 +51,15 @@ class MovedOutline:
 
     None are left of what is behind the camera or beyond the horizon; where it is cut there, there
     are others than were drawn. `in_view` is the share of what was drawn that the picture shows.
+    `overlap` is the share that still lies where it was drawn, if nobody mends the drawing: of what
+    was meant, how much is within the same pixels by now. On the ground that is by its area, up to
+    10 camera heights away where any of it is so near; else by its area in the picture.
     """
 
     corners: Array
     ellipses: Array | None
     in_view: float
+    overlap: float
 
 
 def moved_outline(outline: Outline, now: View, covariance: Array | None) -> MovedOutline:
@@ -76,24 +80,20 @@ def moved_outline(outline: Outline, now: View, covariance: Array | None) -> Move
         drop = np.array([0.0, 0.0, now.pose.height_m - height_m]) * outline.on_ground
         return now.intrinsics.project((away + drop) @ rotation.T)[0]
 
-    samples, _ = _samples_now(outline, now)
-    in_view = float(now.intrinsics.contains(samples).mean()) if len(samples) else 0.0
+    in_view, overlap = _shares(outline, now)
     ellipses = None if covariance is None else error_ellipses(placed, now.pose, covariance)
-    return MovedOutline(corners=corners, ellipses=ellipses, in_view=in_view)
+    return MovedOutline(corners=corners, ellipses=ellipses, in_view=in_view, overlap=overlap)
 
 
-def overlap(outline: Outline, now: View) -> float:
-    """The share of an outline that still lies where it was drawn, if nobody mends the drawing.
-
-    Of what was meant, how much is within the same pixels by now: of the ground by its area, up to
-    10 camera heights away where any of it is so near, else by its area in the picture.
-    """
+def _shares(outline: Outline, now: View) -> tuple[float, float]:
+    """The shares of an outline that are in the picture, and that still lie where it was drawn."""
     uv, weights = _samples_now(outline, now)
     if not len(uv):
-        return 0.0
-    there = now.intrinsics.contains(uv)
-    there[there] = inside(uv[there], outline.corners, now.intrinsics.width * _NEAR)
-    return float((weights * there).sum() / weights.sum())
+        return 0.0, 0.0
+    seen = now.intrinsics.contains(uv)
+    there = seen.copy()
+    there[seen] = inside(uv[seen], outline.corners, now.intrinsics.width * _NEAR)
+    return float(seen.mean()), float((weights * there).sum() / weights.sum())
 
 
 def clipped(points: Array, planes: Array, *, closed: bool) -> Array:

@@ -67,7 +67,7 @@ class ZoneOut(BaseModel):
             points_now=now,
             sd_px=_ellipses(view, len(now)),
             in_view=view.now.in_view,
-            overlap=view.overlap,
+            overlap=view.now.overlap,
         )
 
 

@@ -1,7 +1,7 @@
 """Zones follow their camera: kept as they were drawn, told as they are by the pose that holds."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -14,7 +14,6 @@ from models.geometry.outlines import (
     Outline,
     View,
     moved_outline,
-    overlap,
     within_picture,
 )
 from models.geometry.pose import CameraPose
@@ -33,14 +32,10 @@ from service.store.zones import ZonesRecord
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZoneView:
-    """A zone as it was drawn, and where it is `now`.
-
-    `overlap` is the share of it that still lies where it was drawn, if nobody mends the drawing.
-    """
+    """A zone as it was drawn, and where it is `now`."""
 
     zone: Zone
     now: MovedOutline
-    overlap: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +81,7 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
         placed = moved_outline(outline, now, covariance)
         if not moved:
             placed = _unmoved(corners, placed)
-        share = overlap(outline, now) if moved else 1.0
-        found.append(ZoneView(zone=zone, now=placed, overlap=share))
+        found.append(ZoneView(zone=zone, now=placed))
     return ZonesView(
         camera_id=camera_id,
         record=record,
@@ -199,7 +193,7 @@ def _unmoved(corners: Array, placed: MovedOutline) -> MovedOutline:
     """A zone that is where it was, to the last digit; one above the horizon has no ellipses."""
     same = len(placed.corners) == len(corners)
     ellipses = placed.ellipses if same else None
-    return MovedOutline(corners=corners, ellipses=ellipses, in_view=placed.in_view)
+    return replace(placed, corners=corners, ellipses=ellipses, overlap=1.0)
 
 
 def _view_of(record: ZonesRecord) -> View:

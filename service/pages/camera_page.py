@@ -241,9 +241,9 @@ def _zone_rows(view: ZonesView) -> list[ZoneRow]:
         if view.moved:
             sizes = [] if each.now.ellipses is None else each.now.ellipses[:, 0].tolist()
             worst_px = max((size for size in sizes if math.isfinite(size)), default=None)
-            shares = {"overlap": each.overlap, "in_view": each.now.in_view}
+            shares = {"overlap": each.now.overlap, "in_view": each.now.in_view}
             said = {"meaning": zone_words(each.zone.on, **shares), "sure": corner_words(worst_px)}
-        rows.append(ZoneRow(name=each.zone.id, overlap=each.overlap, **said))
+        rows.append(ZoneRow(name=each.zone.id, overlap=each.now.overlap, **said))
     return rows
 
 

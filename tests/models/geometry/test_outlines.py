@@ -15,7 +15,6 @@ from models.geometry.outlines import (
     clipped,
     inside,
     moved_outline,
-    overlap,
     within_picture,
 )
 from models.geometry.pose import CameraPose
@@ -71,7 +70,7 @@ def test_where_nothing_moved_everything_is_where_it_was(lens, pose):
     found = after(of, pose)
     assert_allclose(found.corners, GATE, atol=1e-9)
     assert found.in_view == 1.0
-    assert overlap(of, of.drawn) == 1.0
+    assert found.overlap == 1.0
 
 
 def test_what_was_drawn_above_the_horizon_is_no_ground(lens):
@@ -118,19 +117,21 @@ def test_shares_are_those_of_areas(lens):
     of = outline(lens, down, square)
     aside_m = 50 / 1100 * 10
     now = View(intrinsics=lens, pose=replace(down, x_m=aside_m))
-    assert overlap(of, now) == pytest.approx(0.75, abs=0.02)
-    assert moved_outline(of, now, None).in_view == 1.0
+    found = moved_outline(of, now, None)
+    assert found.overlap == pytest.approx(0.75, abs=0.02)
+    assert found.in_view == 1.0
     far = View(intrinsics=lens, pose=replace(down, x_m=640 / 1100 * 10))
-    assert moved_outline(of, far, None).in_view == pytest.approx(0.5, abs=0.02)
-    assert overlap(of, far) == 0.0
+    found = moved_outline(of, far, None)
+    assert found.in_view == pytest.approx(0.5, abs=0.02)
+    assert found.overlap == 0.0
 
 
 def test_a_line_is_a_line(lens, pose):
     line = outline(lens, pose, [[300, 500], [900, 520]])
     found = after(line, turned(pose, tilt=1))
     assert found.corners.shape == (2, 2)
-    assert overlap(line, line.drawn) == 1.0
-    assert overlap(line, View(intrinsics=lens, pose=turned(pose, tilt=5))) < 0.1
+    assert after(line, pose).overlap == 1.0
+    assert after(line, turned(pose, tilt=5)).overlap < 0.1
     gone = after(line, turned(pose, heading=150))
     assert (len(gone.corners), gone.in_view) == (0, 0.0)
 
