@@ -160,8 +160,10 @@ def write_zones(
     made = copy.deepcopy(form.template(zones) if document is None else document)
     if document is None or moved is not None:
         corners = {zone.id: zone.corners for zone in zones} if moved is None else moved
+        fewest = {zone.id: min(len(zone.corners), 3) for zone in zones}  # a line has two
         for slot in list(form.slots(made, camera_id)):
-            if len(found := corners.get(slot.id, ())) < 2:
+            found = corners.get(slot.id, ())
+            if len(found) < fewest[slot.id]:
                 slot.drop()
             else:
                 slot.put([form.of(each, *picture) for each in found])

@@ -36,8 +36,9 @@ def frigate_slots(document: Any, camera_id: str) -> Iterator[Slot]:
 
 
 def frigate_template(zones: Sequence[Zone]) -> Any:
-    """A configuration of zones, whose coordinates are to be put in."""
-    return {"zones": {zone.id: {"coordinates": "0,0,0,0"} for zone in zones}}
+    """A configuration of zones, whose coordinates are to be put in; Frigate has no lines."""
+    areas = [zone for zone in zones if len(zone.corners) > 2]
+    return {"zones": {zone.id: {"coordinates": "0,0,0,0"} for zone in areas}}
 
 
 def _camera_part(document: Any, camera_id: str) -> tuple[Any, str]:

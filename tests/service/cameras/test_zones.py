@@ -144,8 +144,9 @@ def test_other_formats_say_the_same_corners(corner, name, other):
     text = corner.get(URL, params={"format": other}).text
     put(corner, (DOCUMENTS[other][0], text), format=other).raise_for_status()
     after = corner.get(URL).json()["zones"]
-    if other != name:
-        assert [zone["id"] for zone in after] == [zone["id"] for zone in before]
+    if other == "frigate":  # which has no lines
+        before = [zone for zone in before if len(zone["points"]) > 2]
+    assert [zone["id"] for zone in after] == [zone["id"] for zone in before]
     for zone, was in zip(after, before, strict=True):
         assert_allclose(zone["points"], was["points"], atol=0.02)
 
