@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from importlib.metadata import version
 from typing import TypedDict
 
 from fastapi import FastAPI
@@ -78,7 +79,7 @@ def create_app(settings: Settings) -> FastAPI:
 
     app = FastAPI(
         title="surefoot",
-        version="0.1.0",
+        version=version("surefoot"),
         summary="Tells when a fixed camera has moved, from the paths of people walking.",
         lifespan=lifespan,
         docs_url=None,  # FastAPI's own fetch their viewers from a public host

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,14 +14,12 @@ from service.commands.settings_given import WrongSettingsError, begin
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.workers.processes.collector import importing
-from service.workers.processes.process import be_private
-from service.workers.processes.workers import WorkKind
+from service.workers.processes.process import WorkKind, be_private
 
 if TYPE_CHECKING:
     from models.simulation.poses import PoseOffset
 
 app = typer.Typer(
-    help="Tells when a fixed camera has moved, by how much, and its pose now.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -31,6 +30,24 @@ app.add_typer(token_app, name="token")
 FollowStdin = Annotated[bool, typer.Option(help="End when stdin ends.")]
 
 Recipe = Annotated[str | None, typer.Option(help="Recipe of new trainings: default or paper.")]
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"surefoot {version('surefoot')}")
+        raise typer.Exit
+
+
+@app.callback()
+def surefoot(
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_tell_version, is_eager=True, help="Print the version and end."
+        ),
+    ] = False,
+) -> None:
+    """Tells when a fixed camera has moved, by how much, and its pose now."""
 
 
 @app.command()

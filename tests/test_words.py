@@ -35,7 +35,7 @@ OTHERS = {
     ("formats/json_body.py", "source"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
-    ("workers/processes/workers.py", "estimate"): "what a worker may be for alone, defined there",
+    ("workers/processes/process.py", "estimate"): "what a worker may be for alone, defined there",
     ("workers/upkeep/reconciliation.py", "stale"): "the name of a log line",
     ("workers/context.py", "upkeep"): "the engine's name of a job",
     ("workers/upkeep/periodic.py", "clock"): "the name of a round",

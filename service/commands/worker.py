@@ -19,6 +19,7 @@ from service.workers.context import UPKEEP, JobContext, RunningJobs
 from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
 from service.workers.processes.process import (
+    WorkKind,
     give_back,
     limit_memory,
     resident_mb,
@@ -28,7 +29,6 @@ from service.workers.processes.process import (
 from service.workers.processes.workers import (
     WORKERS,
     Watch,
-    WorkKind,
     heartbeat,
     register_worker,
     worker_name,

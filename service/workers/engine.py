@@ -12,7 +12,7 @@ from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, engine_confi
 from service.workers.context import JobContext
 from service.workers.deliver import run_deliver
 from service.workers.estimate import run_estimate
-from service.workers.processes.workers import WorkKind
+from service.workers.processes.process import WorkKind
 from service.workers.train import run_training
 
 log = logging.getLogger("surefoot.worker")

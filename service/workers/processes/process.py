@@ -1,10 +1,11 @@
-"""A process of ours before the system: private files, an end that cleans up, memory, niceness."""
+"""A process of ours before the system: its work, private files, a clean end, memory, niceness."""
 
 import ctypes
 import logging
 import os
 import resource
 import signal
+from enum import StrEnum
 from pathlib import Path
 
 log = logging.getLogger("surefoot.worker")
@@ -12,6 +13,13 @@ log = logging.getLogger("surefoot.worker")
 _M_ARENA_MAX, _M_MMAP_THRESHOLD = -8, -3  # of glibc's mallopt
 _PAGE_MB = 4096 / 2**20
 _MMAP_FROM_BYTES = 256 * 1024
+
+
+class WorkKind(StrEnum):
+    """Trainings, or all but trainings; as `surefoot worker --only` says it."""
+
+    ESTIMATE = "estimate"
+    TRAIN = "train"
 
 
 def settle_allocator() -> None:

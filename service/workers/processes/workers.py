@@ -4,7 +4,6 @@ import hashlib
 import socket
 import time
 from datetime import timedelta
-from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
@@ -12,14 +11,6 @@ from service.settings import Settings
 from service.store import workers
 from service.store.engines.dialects import now_in
 from service.store.workers import WorkerRecord
-
-
-class WorkKind(StrEnum):
-    """Trainings, or all but trainings; as `surefoot worker --only` says it."""
-
-    ESTIMATE = "estimate"
-    TRAIN = "train"
-
 
 WORKERS = "workers/"  # what is written about
 _FORGET_LOST = timedelta(days=7)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from service.workers.processes.workers import WorkKind
+from service.workers.processes.process import WorkKind
 from tests.conftest import track
 from tests.running import wait_for
 from tests.service.commands import forked
