@@ -79,13 +79,26 @@ class TooManySourcesError(ServiceError):
     status, code = 409, "too_many_sources"
 
 
-class PreconditionFailedError(ServiceError):
+class _VersionError(ServiceError):
+    """An error about the version that a change is meant for; `etag` is the stored one's."""
+
+    def __init__(self, detail: str, etag: str) -> None:
+        super().__init__(detail)
+        self.etag = etag
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What `If-Match` has to be, once the change still holds of that version."""
+        return {"ETag": self.etag}
+
+
+class PreconditionFailedError(_VersionError):
     """`If-Match` names another version than the stored one."""
 
     status, code = 412, "precondition_failed"
 
 
-class PreconditionRequiredError(ServiceError):
+class PreconditionRequiredError(_VersionError):
     """A change came without `If-Match`."""
 
     status, code = 428, "precondition_required"

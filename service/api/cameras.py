@@ -9,8 +9,9 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from models.geometry.intrinsics import Intrinsics
+from service.api.documented import ETAG
 from service.api.ignored import NamingRoute
-from service.api.middleware.dependencies import EtagDep, ReadDep, StateDep, WriteDep
+from service.api.middleware.dependencies import IfMatch, ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     Body,
     CameraId,
@@ -180,7 +181,7 @@ def slug(name: str) -> str:
 router = APIRouter(prefix="/cameras", tags=["cameras"], route_class=NamingRoute)
 
 
-@router.post("", status_code=201)
+@router.post("", status_code=201, responses={201: {"headers": ETAG}})
 def register(
     body: CameraBody, state: StateDep, session: WriteDep, response: Response
 ) -> CameraAnswer:
@@ -207,7 +208,7 @@ def list_all(
     )
 
 
-@router.get("/{camera_id}")
+@router.get("/{camera_id}", responses={200: {"headers": ETAG}})
 def show(camera_id: str, session: ReadDep, response: Response) -> CameraOut:
     """A camera, with the ETag that a change asks for."""
     view = cameras.view_camera(session, camera_id)
@@ -215,23 +216,27 @@ def show(camera_id: str, session: ReadDep, response: Response) -> CameraOut:
     return CameraOut.from_value(view)
 
 
-@router.patch("/{camera_id}")
+@router.patch("/{camera_id}", responses={200: {"headers": ETAG}})
 def change(
     camera_id: str,
     body: CameraPatch,
-    etag: EtagDep,
     state: StateDep,
     session: WriteDep,
     response: Response,
+    if_match: IfMatch = None,
 ) -> CameraAnswer:
-    """Change a camera; another lens, prior pose or walking speed queues a training."""
+    """Change a camera; another lens, prior pose or walking speed queues a training.
+
+    `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
+    `etag`, and so has that of a change made of an older version, 412.
+    """
     speed = body.walking_speed
     view = cameras.change_camera(
         session,
         state.queue,
         state.settings,
         camera_id,
-        etag,
+        if_match,
         CameraChange(
             name=body.name,
             intrinsics=body.lens_value(),
@@ -247,7 +252,7 @@ def change(
 
 
 @router.delete("/{camera_id}", status_code=204)
-def remove(camera_id: str, etag: EtagDep, state: StateDep, session: WriteDep) -> None:
-    """Delete a camera with its tracks, models, estimates and alerts."""
-    cameras.remove_camera(session, camera_id, etag)
+def remove(camera_id: str, state: StateDep, session: WriteDep, if_match: IfMatch = None) -> None:
+    """Delete a camera with its tracks, models, estimates and alerts; `If-Match` as of a change."""
+    cameras.remove_camera(session, camera_id, if_match)
     state.posts.forget(camera_id)  # another may come under its id

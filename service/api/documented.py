@@ -25,17 +25,19 @@ _WORDS = {
     403: "The token does not allow this, or it is switched off",
     404: "There is no such thing",
     409: "It does not fit the state that things are in",
-    412: "If-Match names another version than the stored one",
+    412: "If-Match names another version than the stored one, which is `etag`",
     413: "Larger than a stated limit",
     415: "A content type that is not taken",
     421: "This service does not go by the name in Host",
     422: "Malformed; `errors` names each field",
-    428: "If-Match is needed",
+    428: "If-Match is needed; `etag` is what it has to be now",
     429: "Too much at once; Retry-After says when to come back",
     503: "Not now; Retry-After says when to come back",
     507: "No room left to store it",
 }
-_WITH_RETRY_AFTER = (429, 503)
+_RETRY_AFTER = {"Retry-After": {"schema": {"type": "string"}, "description": "Seconds, or a date"}}
+ETAG = {"ETag": {"schema": {"type": "string"}, "description": "The version, for If-Match"}}
+_HEADERS = {412: ETAG, 428: ETAG, 429: _RETRY_AFTER, 503: _RETRY_AFTER}
 
 
 class ProblemField(BaseModel):
@@ -54,6 +56,7 @@ class Problem(BaseModel):
     code: str
     detail: str
     errors: list[ProblemField] | None = None
+    etag: str | None = Field(None, description="with 412 and 428: what If-Match has to be now")
 
 
 def document_errors(app: FastAPI) -> None:
@@ -119,7 +122,6 @@ def _answer(status: int) -> dict[str, Any]:
     answer: dict[str, Any] = {"description": _WORDS[status]}
     if status >= 400:
         answer["content"] = {_MEDIA_TYPE: {"schema": {"$ref": _REF.format(model="Problem")}}}
-    if status in _WITH_RETRY_AFTER:
-        seconds = {"schema": {"type": "string"}, "description": "Seconds, or a date"}
-        answer["headers"] = {"Retry-After": seconds}
+    if status in _HEADERS:
+        answer["headers"] = _HEADERS[status]
     return answer

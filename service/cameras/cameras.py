@@ -18,6 +18,7 @@ from service.errors import (
     ConflictError,
     NotFoundError,
     PreconditionFailedError,
+    PreconditionRequiredError,
     TooManyCamerasError,
 )
 from service.estimate_queue import request_estimate
@@ -144,7 +145,7 @@ def change_camera(
     queue: JobQueue,
     settings: Settings,
     camera_id: str,
-    etag: str,
+    etag: str | None,
     change: CameraChange,
 ) -> CameraView:
     """Change a camera; another lens or prior pose queues a training.
@@ -152,6 +153,7 @@ def change_camera(
     Raises:
         NotFoundError: there is none of that id.
         PreconditionFailedError: it was changed since the client read it.
+        PreconditionRequiredError: the client does not say what it has read.
     """
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
@@ -193,12 +195,13 @@ def change_camera(
     return view_camera(session, camera_id)
 
 
-def remove_camera(session: Session, camera_id: str, etag: str) -> None:
+def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
     """Delete a camera with all that is stored of it; who was told of its alerts is told their end.
 
     Raises:
         NotFoundError: there is none of that id.
         PreconditionFailedError: it was changed since the client read it.
+        PreconditionRequiredError: the client does not say what it has read.
     """
     view = view_camera(session, camera_id)
     _check_etag(view, etag)
@@ -291,9 +294,15 @@ def _view(session: Session, record: CameraRecord) -> CameraView:
     )
 
 
-def _check_etag(view: CameraView, etag: str) -> None:
+def _check_etag(view: CameraView, etag: str | None) -> None:
+    if etag is None:
+        raise PreconditionRequiredError(
+            f"If-Match: the ETag of the camera as read is needed, now {view.etag}", view.etag
+        )
     if etag not in (view.etag, "*"):
-        raise PreconditionFailedError(f"If-Match: the camera is at {view.etag}, got {etag}")
+        raise PreconditionFailedError(
+            f"If-Match: the camera is at {view.etag}, got {etag}", view.etag
+        )
 
 
 def _columns(lens: Intrinsics) -> dict[str, Any]:

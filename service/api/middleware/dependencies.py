@@ -17,7 +17,6 @@ from service.api.middleware.event_feed import Feed
 from service.api.middleware.instruments import Instruments
 from service.cameras.post_log import PostLog
 from service.cameras.tracks import Pictures, Quota, Watched
-from service.errors import PreconditionRequiredError
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store.access import set_actor
@@ -99,15 +98,6 @@ def media_type_of(request: Request) -> str:
     return request.headers.get("content-type", "").split(";")[0].strip().lower()
 
 
-async def required_etag(if_match: Annotated[str | None, Header()] = None) -> str:
-    """The version that a change is meant for.
-
-    Raises:
-        PreconditionRequiredError: the header is missing.
-    """
-    if if_match is None:
-        raise PreconditionRequiredError("If-Match: the ETag of the camera as read is needed")
-    return if_match
-
-
-EtagDep = Annotated[str, Depends(required_etag)]
+IfMatch = Annotated[
+    str | None, Header(description="the ETag of what is changed, as it was read; or *")
+]

@@ -93,6 +93,8 @@ def problem(request: Request, error: ServiceError) -> Response:
         content["errors"] = [
             {"pointer": item.pointer, "reason": item.reason} for item in error.errors
         ]
+    if "ETag" in headers:
+        content["etag"] = headers["ETag"]  # in the body, too: a person copies it from there
     # Text may hold half a surrogate pair, which came as one of JSON's escapes.
     text = json.dumps(content, ensure_ascii=False).encode("utf-8", errors="replace")
     return Response(text, status, headers, media_type="application/problem+json")

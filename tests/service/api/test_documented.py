@@ -24,6 +24,17 @@ def test_errors_are_described_as_problem_documents(http):
     assert set(schemas["Problem"]["required"]) <= set(body) <= set(schemas["Problem"]["properties"])
 
 
+def test_a_change_is_described_with_the_version_that_it_needs(http):
+    paths = http.get("/openapi.json").json()["paths"]
+    one = paths["/cameras/{camera_id}"]
+    for method in ("patch", "delete"):
+        for status in ("412", "428"):
+            assert "ETag" in one[method]["responses"][status]["headers"]
+    for method in ("get", "patch"):
+        assert "ETag" in one[method]["responses"]["200"]["headers"]
+    assert "ETag" in paths["/cameras"]["post"]["responses"]["201"]["headers"]
+
+
 def test_it_says_which_scope_a_route_needs(http):
     document = http.get("/openapi.json").json()
     assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"

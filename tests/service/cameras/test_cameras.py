@@ -144,12 +144,20 @@ def test_cameras_come_in_pages(http):
 def test_a_change_needs_the_version_that_was_read(http):
     etag = http.post("/cameras", json=CAMERA).headers["ETag"]
     change = {"name": "Renamed"}
-    problem(http.patch("/cameras/corner", json=change), 428, "precondition_required")
+    for unsaid in (http.patch("/cameras/corner", json=change), http.delete("/cameras/corner")):
+        told = problem(unsaid, 428, "precondition_required")
+        assert told["etag"] == unsaid.headers["ETag"] == etag
+        assert etag in told["detail"]
     answer = http.patch("/cameras/corner", json=change, headers={"If-Match": etag})
     assert answer.json()["name"] == "Renamed"
     stale = http.patch("/cameras/corner", json={"name": "Other"}, headers={"If-Match": etag})
-    problem(stale, 412, "precondition_failed")
+    assert problem(stale, 412, "precondition_failed")["etag"] == answer.headers["ETag"]
     assert http.get("/cameras/corner").json()["name"] == "Renamed"
+    old = http.delete("/cameras/corner", headers={"If-Match": etag})
+    told = problem(old, 412, "precondition_failed")
+    copied = {"If-Match": told["etag"]}
+    assert http.delete("/cameras/corner", headers=copied).status_code == 204
+    problem(http.delete("/cameras/corner"), 404, "not_found")
 
 
 def test_a_new_prior_pose_replaces_the_training_under_way(http):
