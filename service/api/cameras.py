@@ -21,10 +21,12 @@ from service.api.schemas import (
     Out,
     PoseOut,
     PriorPoseBody,
+    ReferenceOut,
     Text,
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
+from service.enums import PoseState
 from service.wording.typed_pose import Tone, judge_lens, judge_pose
 
 CameraName = Annotated[str, StringConstraints(max_length=200)]
@@ -128,6 +130,8 @@ class CameraOut(Out):
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
     reference_tracks: int
+    state: PoseState
+    reference: ReferenceOut
     tracks: int
     model_id: str | None
     created_at: datetime
@@ -144,6 +148,8 @@ class CameraOut(Out):
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
+            state=view.state,
+            reference=ReferenceOut.of(view.reference),
             tracks=view.tracks,
             model_id=view.model_id,
         )
@@ -197,10 +203,17 @@ def register(
 
 @router.get("")
 def list_all(
-    session: ReadDep, cursor: Text = "", limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    state: StateDep,
+    session: ReadDep,
+    cursor: Text = "",
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    wanted: Annotated[
+        list[PoseState] | None,
+        Query(alias="state", description="cameras in this state alone; may be said repeatedly"),
+    ] = None,
 ) -> CameraPage:
     """Cameras in order of their ids; `next_cursor` leads to the next page."""
-    views = cameras.list_cameras(session, cursor, limit + 1)
+    views = cameras.list_cameras(session, state.settings, cursor, limit + 1, wanted or ())
     page = views[:limit]
     return CameraPage(
         items=[CameraOut.from_value(view) for view in page],
@@ -209,9 +222,9 @@ def list_all(
 
 
 @router.get("/{camera_id}", responses={200: {"headers": ETAG}})
-def show(camera_id: str, session: ReadDep, response: Response) -> CameraOut:
+def show(camera_id: str, state: StateDep, session: ReadDep, response: Response) -> CameraOut:
     """A camera, with the ETag that a change asks for."""
-    view = cameras.view_camera(session, camera_id)
+    view = cameras.view_camera(session, state.settings, camera_id)
     response.headers["ETag"] = view.etag
     return CameraOut.from_value(view)
 

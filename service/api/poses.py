@@ -26,6 +26,7 @@ from service.api.schemas import (
     PoseOut,
     ReasonCode,
     ReasonValues,
+    ReferenceOut,
     RivalOut,
     SinceOut,
     Who,
@@ -33,7 +34,7 @@ from service.api.schemas import (
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
 from service.degrees import in_degrees
-from service.enums import PoseState, ReferenceState
+from service.enums import PoseState
 from service.errors import ConflictError, MalformedError
 from service.formats.geojson import GeoOrigin
 from service.formats.pose_formats import MEDIA_TYPES, PoseFormat, pose_file
@@ -119,22 +120,6 @@ class ProposedOut(BaseModel):
         )
 
 
-class ReferenceOut(Out):
-    """How much of the reference period has been seen.
-
-    `counted` of `wanted` people, each once: of `tracks`, `pieces` go on others' walks. They are of
-    so many different `hours` of date and time. Pieces and hours are those of the last look.
-    """
-
-    state: ReferenceState
-    tracks: int
-    counted: int
-    pieces: int
-    hours: int
-    wanted: int
-    walking_speed_mps: float | None
-
-
 class ServedPoseOut(BaseModel):
     """The answer of `GET /cameras/{id}/pose`."""
 
@@ -167,7 +152,6 @@ class ServedPoseOut(BaseModel):
     def from_value(cls, view: PoseView) -> Self:
         """The body of a served pose."""
         status, estimate = view.status, view.status.estimate
-        learned = ReferenceState.READY if view.reference.ready else ReferenceState.LEARNING
         return cls(
             camera_id=status.camera_id,
             state=status.state,
@@ -185,7 +169,7 @@ class ServedPoseOut(BaseModel):
                 before=None if estimate is None else estimate.drift_since,
             ),
             estimates={} if estimate is None else in_degrees(estimate.raw),
-            reference=ReferenceOut.of(view.reference, state=learned),
+            reference=ReferenceOut.of(view.reference),
             tracks=0 if estimate is None else estimate.tracks,
             from_=None if estimate is None else from_seconds(estimate.from_s),
             to=None if estimate is None else from_seconds(estimate.to_s),
@@ -307,7 +291,7 @@ def _file(session: Session, view: PoseView, kind: PoseFormat, origin: GeoOrigin 
         raise ConflictError("pose: nobody has agreed to a prior pose yet")
     file = pose_file(
         kind,
-        cameras.view_camera(session, camera_id).intrinsics,
+        cameras.require_camera(session, camera_id).intrinsics,
         view.pose,
         camera_id=camera_id,
         at=None if estimate is None else from_seconds(estimate.to_s),

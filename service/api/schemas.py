@@ -25,6 +25,7 @@ from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrice
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
 from service.api.ignored import note_ignored
 from service.degrees import in_degrees
+from service.enums import ReferenceState
 from service.reasons import CODES
 
 _EARLIEST, _LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
@@ -282,6 +283,22 @@ class SinceOut(BaseModel):
 
     after: datetime | None
     before: datetime | None
+
+
+class ReferenceOut(Out):
+    """How much of the reference period has been seen.
+
+    `counted` of `wanted` people, each once: of `tracks`, `pieces` go on others' walks. They are of
+    so many different `hours` of date and time. Pieces and hours are those of the last look.
+    """
+
+    state: ReferenceState
+    tracks: int
+    counted: int
+    pieces: int
+    hours: int
+    wanted: int
+    walking_speed_mps: float | None
 
 
 class PoseOut(BaseModel):

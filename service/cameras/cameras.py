@@ -1,7 +1,8 @@
 """Register, change and remove cameras."""
 
+import itertools
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from typing import Any
@@ -13,7 +14,9 @@ from models.geometry.pose import CameraPose
 from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
-from service.enums import Activity, AlertState, Origin, Outcome
+from service.cameras.reference_views import ReferenceView, reference_views
+from service.cameras.status import CameraStatus, camera_statuses
+from service.enums import Activity, AlertState, Origin, Outcome, PoseState
 from service.errors import (
     ConflictError,
     NotFoundError,
@@ -25,7 +28,7 @@ from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.references import begin_reference
 from service.settings import Settings
-from service.store import cameras, references, tracks, trainings
+from service.store import cameras, references, tracks
 from service.store.access import name_in
 from service.store.alerts import AlertFilter
 from service.store.cameras import CameraRecord, PriorPoseRecord
@@ -67,16 +70,22 @@ class CameraView:
     """A camera as clients see it; `calibrated` once somebody has said or agreed to a prior pose."""
 
     record: CameraRecord
-    intrinsics: Intrinsics
     prior_pose: CameraPose
     calibrated: bool
     tracks: int
     model_id: str | None
+    state: PoseState
+    reference: ReferenceView
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The lens."""
+        return self.record.intrinsics
 
     @property
     def etag(self) -> str:
-        """Changes whenever the camera's own fields do."""
-        return f'"{self.record.id}-{self.record.version}"'
+        """The version of the camera's own fields."""
+        return etag_of(self.record)
 
 
 def register_camera(
@@ -123,21 +132,44 @@ def register_camera(
         begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
         train_by_itself(session, queue, settings, camera_id)
     note(session, Activity.CAMERA_REGISTERED, by=None, camera_id=camera_id)
-    return view_camera(session, camera_id)
+    return view_camera(session, settings, camera_id)
 
 
-def view_camera(session: Session, camera_id: str) -> CameraView:
+def view_camera(session: Session, settings: Settings, camera_id: str) -> CameraView:
     """A camera.
 
     Raises:
         NotFoundError: there is none of that id.
     """
-    return _view(session, require_camera(session, camera_id))
+    views = _views(session, settings, camera_statuses(session, settings, (camera_id,)))
+    if not views:
+        raise no_camera(camera_id)
+    return views[0]
 
 
-def list_cameras(session: Session, after_id: str, limit: int) -> list[CameraView]:
-    """Some cameras in order of their ids, after one."""
-    return [_view(session, record) for record in cameras.page(session, after_id, limit)]
+def list_cameras(
+    session: Session,
+    settings: Settings,
+    after_id: str,
+    limit: int,
+    states: Collection[PoseState] = (),
+) -> list[CameraView]:
+    """Some cameras in order of their ids, after one; of some states alone, if any are named.
+
+    By a handful of statements, however many they are.
+    """
+    # A state is derived and stands in no column.
+    ids = cameras.ids(session, after_id, None if states else limit)
+    statuses = camera_statuses(session, settings, ids)
+    if states:
+        wanted = (i for i, each in statuses.items() if each.state in states)
+        statuses = {i: statuses[i] for i in itertools.islice(wanted, limit)}
+    return _views(session, settings, statuses)
+
+
+def etag_of(record: CameraRecord) -> str:
+    """Changes whenever the camera's own fields do."""
+    return f'"{record.id}-{record.version}"'
 
 
 def change_camera(
@@ -155,9 +187,8 @@ def change_camera(
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
     """
-    view = view_camera(session, camera_id)
-    _check_etag(view, etag)
-    record = view.record
+    record = require_camera(session, camera_id)
+    _check_etag(record, etag)
     changed = {
         field.name: getattr(change, field.name)
         for field in fields(change)
@@ -182,17 +213,18 @@ def change_camera(
         from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
-        pose, origin = change.prior_pose or view.prior_pose, Origin.CHANGED
+        prior = cameras.prior_pose(session, camera_id)
+        pose, origin = change.prior_pose or prior.pose, Origin.CHANGED
         given: Sequence[str] = ()
-        if change.prior_pose is None and not view.calibrated:
-            origin, given = Origin.ASSUMED, cameras.prior_pose(session, camera_id).given
+        if change.prior_pose is None and prior.origin == Origin.ASSUMED:
+            origin, given = Origin.ASSUMED, prior.given
         renew_prior_pose(
             session, queue, settings, camera_id, pose, origin, from_s=from_s, by=None, given=given
         )
     details = {"fields": list(changed)}
     note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
     session.flush()
-    return view_camera(session, camera_id)
+    return view_camera(session, settings, camera_id)
 
 
 def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
@@ -203,15 +235,15 @@ def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
     """
-    view = view_camera(session, camera_id)
-    _check_etag(view, etag)
+    record = require_camera(session, camera_id)
+    _check_etag(record, etag)
     for alert in list_alerts(
         session, AlertFilter(state=AlertState.FIRING, camera_id=camera_id), _MANY
     ):
         end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
-    details = {"name": view.record.name}
+    details = {"name": record.name}
     note(session, Activity.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
-    session.delete(view.record)
+    session.delete(record)
 
 
 def require_camera(session: Session, camera_id: str) -> CameraRecord:
@@ -281,28 +313,33 @@ def add_prior_pose(
     session.flush()
 
 
-def _view(session: Session, record: CameraRecord) -> CameraView:
-    model = trainings.newest_model(session, record.id)
-    prior = cameras.prior_pose(session, record.id)
-    return CameraView(
-        record=record,
-        intrinsics=record.intrinsics,
-        prior_pose=prior.pose,
-        calibrated=prior.origin != Origin.ASSUMED,
-        tracks=tracks.count(session, record.id),
-        model_id=None if model is None else model.id,
-    )
+def _views(
+    session: Session, settings: Settings, statuses: Mapping[str, CameraStatus]
+) -> list[CameraView]:
+    views = reference_views(session, settings, statuses)
+    counts = tracks.counts(session, statuses.keys())
+    return [
+        CameraView(
+            record=record,
+            prior_pose=prior.pose,
+            calibrated=prior.origin != Origin.ASSUMED,
+            tracks=counts.get(record.id, 0),
+            model_id=model_id,
+            state=statuses[record.id].state,
+            reference=views[record.id],
+        )
+        for record, prior, model_id in cameras.all_as_set_up(session, statuses.keys())
+    ]
 
 
-def _check_etag(view: CameraView, etag: str | None) -> None:
+def _check_etag(record: CameraRecord, etag: str | None) -> None:
+    now = etag_of(record)
     if etag is None:
         raise PreconditionRequiredError(
-            f"If-Match: the ETag of the camera as read is needed, now {view.etag}", view.etag
+            f"If-Match: the ETag of the camera as read is needed, now {now}", now
         )
-    if etag not in (view.etag, "*"):
-        raise PreconditionFailedError(
-            f"If-Match: the camera is at {view.etag}, got {etag}", view.etag
-        )
+    if etag not in (now, "*"):
+        raise PreconditionFailedError(f"If-Match: the camera is at {now}, got {etag}", now)
 
 
 def _columns(lens: Intrinsics) -> dict[str, Any]:

@@ -12,34 +12,18 @@ from models.reasons import Reason, Value
 from models.walking.config import FEWEST_WALKERS
 from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
+from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import Origin, PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
-from service.references import people_so_far, wanted_tracks, window_beside
+from service.references import wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, fleet, references, windows
+from service.store import cameras, estimates, references, windows
 from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReferenceView:
-    """The served part of a camera's reference.
-
-    `counted` of `wanted` people are there, by `tracks` of which `pieces` go on others' walks; they
-    are of so many different `hours` of date and time.
-    """
-
-    ready: bool
-    tracks: int
-    counted: int
-    pieces: int
-    hours: int
-    wanted: int
-    walking_speed_mps: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,20 +60,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         raise no_camera(camera_id)
     camera, prior, model_id = set_up
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
-    record = status.reference
-    tracks = record.tracks
-    if record.ready_at is None:
-        attended = {camera_id: status.attended.spans}
-        tracks = fleet.learning_counts(session, (camera_id,), attended).get(camera_id, 0)
-    reference = ReferenceView(
-        ready=record.ready_at is not None,
-        tracks=tracks,
-        counted=people_so_far(record, settings, tracks),
-        pieces=record.pieces,
-        hours=record.hours,
-        wanted=record.wanted,
-        walking_speed_mps=record.walking_speed_mps,
-    )
+    reference = reference_views(session, settings, {camera_id: status})[camera_id]
     pose, calibrated = prior.pose, prior.origin != Origin.ASSUMED
     proposed = None if calibrated else cameras.proposed_pose(session, prior.id)
     reasons = _reasons_of(session, settings, status, reference, proposed)

@@ -127,7 +127,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     now = datetime.now(UTC)
     # Taken first: what happens while the rest is read is told again, and not missed.
     newest_event_id = journal.newest_event_id(session)
-    camera = view_camera(session, camera_id)
+    camera = view_camera(session, settings, camera_id)
     pose = view_pose(session, settings, camera_id)
     estimate = pose.status.estimate
     ended = AlertFilter(state=AlertState.RESOLVED, camera_id=camera_id)

@@ -15,10 +15,11 @@ from models.monitoring.verdict import Drift
 from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.api.schemas import Text
+from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, Severity
 from service.pages.drawings.sparkline import sparkline
-from service.references import drift_limits, people_so_far, wanted_tracks
+from service.references import drift_limits, wanted_tracks
 from service.settings import Settings
 from service.store import fleet, journal
 from service.store.alerts import AlertRecord
@@ -40,6 +41,8 @@ _RANKS = {
     PoseState.LEARNING: 8,
     PoseState.OK: 9,
 }
+# No reference can be learned there yet.
+_WITHOUT_REFERENCE = (PoseState.UNCONNECTED, PoseState.UNCALIBRATED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,13 +164,7 @@ def list_fleet(
     statuses = camera_statuses(session, settings, ids)
     names = dict(fleet.names(session, ids))
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
-    learning = {
-        i: each.attended.spans
-        for i, each in statuses.items()
-        if each.reference.ready_at is None
-        and each.state not in (PoseState.UNCONNECTED, PoseState.UNCALIBRATED)
-    }
-    counts = fleet.learning_counts(session, ids, learning)
+    references = reference_views(session, settings, statuses)
     trainings = fleet.unfinished_trainings(session, ids)
     rows = [
         FleetRow(
@@ -176,9 +173,9 @@ def list_fleet(
             status=each,
             drift=_sure_drift(each.estimate) if each.state != PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
-            learned=people_so_far(each.reference, settings, counts.get(camera_id, 0))
-            if camera_id in learning
-            else None,
+            learned=None
+            if references[camera_id].ready or each.state in _WITHOUT_REFERENCE
+            else references[camera_id].counted,
             wanted=wanted_tracks(each.reference, settings),
             unfinished=trainings.get(camera_id),
         )

@@ -208,10 +208,12 @@ _NEWEST_MODEL = (
     .correlate(CameraRecord)
     .scalar_subquery()
 )
-_AS_SET_UP = (
-    select(CameraRecord, PriorPoseRecord, _NEWEST_MODEL)
-    .join(PriorPoseRecord, PriorPoseRecord.id == _NEWEST_POSE)
-    .where(CameraRecord.id == bindparam("camera"))
+_SET_UP = select(CameraRecord, PriorPoseRecord, _NEWEST_MODEL).join(
+    PriorPoseRecord, PriorPoseRecord.id == _NEWEST_POSE
+)
+_ONE_SET_UP = _SET_UP.where(CameraRecord.id == bindparam("camera"))
+_SOME_SET_UP = _SET_UP.where(CameraRecord.id.in_(bindparam("cameras", expanding=True))).order_by(
+    CameraRecord.id
 )
 _PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
 
@@ -261,19 +263,22 @@ def as_set_up(
     session: Session, camera_id: str
 ) -> tuple[CameraRecord, PriorPoseRecord, str | None] | None:
     """The camera, its prior pose and the id of its model in use, if it has one; or None."""
-    row = session.execute(_AS_SET_UP, {"camera": camera_id}).first()
+    row = session.execute(_ONE_SET_UP, {"camera": camera_id}).first()
     return None if row is None else (row[0], row[1], row[2])
 
 
-def page(session: Session, after_id: str, limit: int) -> Sequence[CameraRecord]:
-    """Cameras in order of their ids, after one."""
-    query = select(CameraRecord).where(CameraRecord.id > after_id)
+def all_as_set_up(
+    session: Session, ids: Collection[str]
+) -> list[tuple[CameraRecord, PriorPoseRecord, str | None]]:
+    """The same of some cameras, in order of their ids."""
+    rows = session.execute(_SOME_SET_UP, {"cameras": list(ids)})
+    return [(row[0], row[1], row[2]) for row in rows]
+
+
+def ids(session: Session, after_id: str = "", limit: int | None = None) -> Sequence[str]:
+    """The ids of cameras after one, in order; of all, unless it is said how many."""
+    query = select(CameraRecord.id).where(CameraRecord.id > after_id)
     return session.scalars(query.order_by(CameraRecord.id).limit(limit)).all()
-
-
-def ids(session: Session) -> Sequence[str]:
-    """The ids of all cameras, in order."""
-    return session.scalars(select(CameraRecord.id).order_by(CameraRecord.id)).all()
 
 
 def count(session: Session) -> int:

@@ -4,7 +4,7 @@ Of a camera's tracks those count that its reference is of: one source's. Others 
 counted where a function says that it is of all.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -229,9 +229,11 @@ def add(connection: Connection, rows: Sequence[dict[str, Any]]) -> int:
     return _ADDED.change(connection, *rows) if rows else 0
 
 
-def count(session: Session, camera_id: str) -> int:
-    """The number of stored tracks."""
-    return count_where(session, TrackRecord.camera_id == camera_id)
+def counts(session: Session, camera_ids: Collection[str]) -> dict[str, int]:
+    """The number of stored tracks of each of some cameras that has any."""
+    query = select(TrackRecord.camera_id, func.count())
+    query = query.where(TrackRecord.camera_id.in_(camera_ids)).group_by(TrackRecord.camera_id)
+    return {camera_id: number for camera_id, number in session.execute(query)}
 
 
 def stored_bytes(session: Session, camera_id: str) -> int:

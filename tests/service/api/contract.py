@@ -196,9 +196,8 @@ class Ground:
 
     def _etag(self, camera_id: str) -> str:
         with self.store.read() as session:
-            if session.get(CameraRecord, camera_id) is None:
-                return '"gone"'
-            return cameras.view_camera(session, camera_id).etag
+            record = session.get(CameraRecord, camera_id)
+            return '"gone"' if record is None else cameras.etag_of(record)
 
     def _fill(self, case: Any, chance: int) -> None:
         if case.path.endswith("/tracks") and case.method == "POST":

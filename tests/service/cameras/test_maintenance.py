@@ -147,7 +147,7 @@ def test_tracks_of_a_window_are_in_no_window_of_an_estimate(bench):
         reference = references.newest(session, "corner")
         window = windows.window(session, window_of(session, reference, bench.settings))
         assert [record.track_id for record in window] == [str(n) for n in range(12, 18)]
-        assert tracks.count(session, "corner") == 18  # they stay stored
+        assert tracks.counts(session, ["corner"]) == {"corner": 18}  # they stay stored
 
 
 def test_nor_in_a_reference_that_is_being_learned(corner, settings, bench):

@@ -161,7 +161,7 @@ def test_a_person_says_at_once_which_one_counts(known):
     assert known.http.delete(f"{URL}/tracker-1.2").status_code == 204
     assert list(known.sources()) == ["lidar/7"]
     with known.context.store.read() as session:
-        assert tracks.count(session, "corner") == WANTED + 10
+        assert tracks.counts(session, ["corner"]) == {"corner": WANTED + 10}
 
 
 def test_after_a_reset_the_same_source_counts(known):
