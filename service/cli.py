@@ -1,4 +1,4 @@
-"""The command line: serve, worker, replay and demo; what concerns data is beside it."""
+"""The command line: serve, worker, replay and demo; what asks a service, or its data, is beside."""
 
 import math
 import sys
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from service.commands.asking import LOCAL_URL, Url
 from service.commands.data import DATA_COMMANDS, DataDir
+from service.commands.remote import REMOTE_COMMANDS
 from service.commands.settings_given import WrongSettingsError, begin
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -97,7 +98,7 @@ def worker(
 @app.command()
 def replay(
     scene_dir: Annotated[Path, typer.Argument(help="Folder with camera.json and tracks.csv.")],
-    url: Annotated[str, typer.Option(help="The running service.")] = "http://127.0.0.1:8080",
+    url: Url = LOCAL_URL,
     knock: Annotated[
         str | None,
         typer.Option(help="Move the camera: tilt and roll in degrees, log height ratio."),
@@ -140,7 +141,7 @@ def replay(
 
 @app.command()
 def bridge(
-    url: Annotated[str, typer.Option(help="The running service.")] = "http://127.0.0.1:8080",
+    url: Url = LOCAL_URL,
     token: Annotated[
         str | None,
         typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes read and ingest, if needed."),
@@ -181,7 +182,7 @@ def _knock(text: str) -> "PoseOffset":
     )
 
 
-for _command in DATA_COMMANDS:
+for _command in (*REMOTE_COMMANDS, *DATA_COMMANDS):
     app.command()(_command)
 
 

@@ -22,7 +22,7 @@ README = (ROOT / "README.md").read_text()
 HOST = "http://127.0.0.1:8080"
 COMMANDS = (
     "serve", "worker", "migrate", "replay", "demo", "backup", "restore", "check", "rotate-key",
-    "token", "migrate-data", "bridge",
+    "token", "migrate-data", "bridge", "status", "cameras", "alerts", "ack", "tail",
 )  # fmt: skip
 
 

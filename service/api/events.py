@@ -35,7 +35,8 @@ async def events(
     if seen is None:
         seen = await state.feed.newest()
     heard_s = checked_s = time.monotonic()
-    yield ServerSentEvent(comment="connected", retry=2000)
+    # With an id: who loses the connection before the first event goes on from here, too.
+    yield ServerSentEvent(comment="connected", retry=2000, id=str(seen))
     await state.feed.join()
     try:
         while not state.stopping.is_set() and not await request.is_disconnected():

@@ -1,7 +1,6 @@
 """`surefoot token`: make, list and revoke tokens where the data directory is."""
 
 import contextlib
-import getpass
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -12,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from service.commands.asking import account
 from service.commands.data import DataDir
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError
@@ -110,11 +110,9 @@ def _store(data_dir: Path | None) -> Iterator["Store"]:
 
 
 def _who() -> str:
-    """The account that runs the command; containers may have one without a name."""
-    try:
-        return f"{getpass.getuser()} (command line)"
-    except (KeyError, OSError):
-        return "command line"
+    """The account that runs the command, as the log of activity names it."""
+    name = account()
+    return "command line" if name is None else f"{name} (command line)"
 
 
 def _time_after(text: str) -> datetime:

@@ -1,4 +1,4 @@
-"""The service as the bridge asks it: posts of tracks, pictures' sizes, states, alerts, events."""
+"""The service as the bridge and the command line ask it: posts, pictures' sizes, alerts, events."""
 
 import time
 from collections.abc import Iterator
@@ -39,11 +39,12 @@ class Event(NamedTuple):
 
 
 class Service:
-    """A client of one service; for one thread."""
+    """A client of one service, for one thread; `heard` is what a next stream goes on from."""
 
     def __init__(self, url: str, token: str | None) -> None:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         self._http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT_S)
+        self.heard: str | None = None
         self._sizes: dict[str, tuple[float, tuple[float, float] | RefusedError]] = {}
 
     def post_tracks(self, camera_id: str, body: bytes) -> dict[str, Any]:
@@ -64,6 +65,24 @@ class Service:
             RefusedError: there is none.
         """
         return self._ask("GET", path, params=query)
+
+    def post(self, path: str, document: dict[str, Any]) -> dict[str, Any]:
+        """The answer to a document.
+
+        Raises:
+            LaterError: nothing has come of it for now.
+            RefusedError: nothing ever will.
+        """
+        return self._ask("POST", path, json=document)
+
+    def readiness(self) -> dict[str, Any]:
+        """The document of `/readyz`, which is answered with 503 where the service is not ready.
+
+        Raises:
+            LaterError: there is none for now.
+            RefusedError: there is none.
+        """
+        return self._ask("GET", "/readyz", told_by_503=True)
 
     def size_of(self, camera_id: str) -> tuple[float, float]:
         """Width and height in pixels of a camera's picture, as asked a minute ago at most.
@@ -100,15 +119,34 @@ class Service:
                 if answer.status_code != 200:
                     answer.read()
                     _check(answer)
-                yield from _parsed(answer.iter_lines())
+                yield from self._parsed(answer.iter_lines())
         except httpx.TransportError as error:
             raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
         raise LaterError("the stream has ended", away=True)
 
-    def _ask(self, method: str, path: str, **what: Any) -> dict[str, Any]:
+    def _parsed(self, lines: Iterator[str]) -> Iterator[Event | None]:
+        """Server-Sent Events, as far as the service uses them; None for each comment."""
+        fields: dict[str, str] = {}
+        for line in lines:
+            if line.startswith(":"):
+                yield None
+            elif line:
+                name, _, value = line.partition(":")
+                fields[name] = value.removeprefix(" ")
+            else:
+                if "data" in fields:
+                    yield Event(fields.get("id", ""), fields.get("event", ""), fields["data"])
+                self.heard = fields.get("id", self.heard)
+                fields = {}
+
+    def _ask(
+        self, method: str, path: str, *, told_by_503: bool = False, **what: Any
+    ) -> dict[str, Any]:
         try:
             answer = self._http.request(method, path, **what)
-            _check(answer)
+            own = answer.headers.get("content-type") == "application/json"  # no problem document
+            if not (told_by_503 and answer.status_code == 503 and own):
+                _check(answer)
             document: dict[str, Any] = answer.json()
         except httpx.TransportError as error:
             raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
@@ -131,17 +169,3 @@ def _check(answer: httpx.Response) -> None:
     wait_s = float(wait) if wait.isdecimal() else None
     away = status not in (429, 500)  # too much of one camera; what one body trips over
     raise LaterError(f"{status} {code}: {detail}", away=away, wait_s=wait_s)
-
-
-def _parsed(lines: Iterator[str]) -> Iterator[Event | None]:
-    """Server-Sent Events, as far as the service uses them; None for each comment."""
-    fields: dict[str, str] = {}
-    for line in lines:
-        if line.startswith(":"):
-            yield None
-        elif line:
-            name, _, value = line.partition(":")
-            fields[name] = value.removeprefix(" ")
-        elif "data" in fields:
-            yield Event(fields.get("id", ""), fields.get("event", ""), fields["data"])
-            fields = {}

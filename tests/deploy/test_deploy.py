@@ -19,7 +19,8 @@ COMPOSE = ROOT / "deploy" / "compose.yaml"
 GUIDES = sorted((ROOT / "docs" / "guides").glob("*.md"))
 RETENTION = (ROOT / "docs" / "guides" / "backup.md").read_text().split("## Retention")[1]
 SETTINGS = {f"SUREFOOT_{name.upper()}" for name in Settings.model_fields}
-OF_CLIENTS = {"SUREFOOT_TOKEN"}  # of replay, which is no part of the service
+# Of the commands that ask a service, and of the shell that completes them.
+OF_CLIENTS = {f"SUREFOOT_{name}" for name in ("TOKEN", "TOKEN_FILE", "URL", "COMPLETE")}
 
 
 def test_settings_exist():
