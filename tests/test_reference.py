@@ -1,4 +1,4 @@
-"""The pages of `docs/reference/` that a command makes are what it makes, and guides name all."""
+"""The pages of `docs/reference/` and examples are what a command makes, and guides name all."""
 
 import re
 
@@ -7,12 +7,12 @@ import pytest
 from service.enums import AlertKind, PoseState
 from service.settings import Settings
 from tests.conftest import ROOT
-from tests.reference import PAGES, REFERENCE
+from tests.reference import FILES
 
 
-@pytest.mark.parametrize("name", list(PAGES))
-def test_a_page_is_what_its_command_makes(name):
-    assert (REFERENCE / name).read_text() == PAGES[name](), "python -m tests.reference --write"
+@pytest.mark.parametrize("path", list(FILES), ids=lambda path: path.name)
+def test_a_file_is_what_its_command_makes(path):
+    assert path.read_text() == FILES[path](), "python -m tests.reference --write"
 
 
 def test_the_guide_says_what_each_state_and_kind_means():

@@ -1,10 +1,15 @@
-"""Errors in `/openapi.json`, for all routes in one place.
+"""Errors and examples in `/openapi.json`, for all routes in one place.
 
 FastAPI describes its own 422, which is not what is answered here, and no other error. Which errors
 a route may answer follows from what it takes: a name in the path, a body, a header, a change.
+
+Examples are in `examples.json`, by the schema that they are of: real ones, which
+`python -m tests.reference --write` makes and a test makes again.
 """
 
+import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -72,12 +77,26 @@ def document_errors(app: FastAPI) -> None:
     app.openapi = openapi  # type: ignore[method-assign]
 
 
+def schema_name(schema: dict[str, Any]) -> str | None:
+    """The name of the schema that a body is of, or may be of instead of null; else None."""
+    (of, *_) = schema.get("anyOf", [schema])
+    name: str = of.get("$ref", "").rpartition("/")[2]
+    return name or None
+
+
 def _correct(document: dict[str, Any]) -> None:
+    told = json.loads(Path(__file__).with_name("examples.json").read_text())
     schemas = document.setdefault("components", {}).setdefault("schemas", {})
     for name in _OURS_NOT:
         schemas.pop(name, None)
     _, made = models_json_schema([(Problem, "serialization")], ref_template=_REF)
     schemas |= made["$defs"]
+    problems = {f"Problem{status}": value for status, value in told["problems"].items()}
+    document["components"]["examples"] = {
+        name: {"value": value}
+        for name, value in (told["schemas"] | problems).items()
+        if name in schemas or name in problems
+    }
     document["components"]["securitySchemes"] = {
         _SCHEME: {
             "type": "http",
@@ -91,6 +110,9 @@ def _correct(document: dict[str, Any]) -> None:
             answers.pop("422", None)
             for status in _statuses(path, method, operation):
                 answers.setdefault(str(status), _answer(status))
+            own = told["others"].get(f"{method.upper()} {path}", {})
+            for part in (operation.get("requestBody", {}), *answers.values()):
+                _show(part.get("content", {}), told["schemas"], own)
             need = need_of(method.upper(), path)[0]
             operation["security"] = [] if need is None else [{_SCHEME: [need]}]
 
@@ -118,10 +140,25 @@ def _statuses(path: str, method: str, operation: dict[str, Any]) -> Iterator[int
             yield 415
 
 
+def _show(contents: dict[str, Any], by_schema: dict[str, Any], own: dict[str, Any]) -> None:
+    """Show the example of each content that has one: the one of its schema, or its own."""
+    for kind, content in contents.items():
+        if (name := schema_name(content.get("schema", {}))) in by_schema:
+            content["examples"] = _example_named(name)
+        elif kind in own:
+            content["example"] = own[kind]
+
+
+def _example_named(name: str | None) -> dict[str, Any]:
+    return {"example": {"$ref": f"#/components/examples/{name}"}}
+
+
 def _answer(status: int) -> dict[str, Any]:
     answer: dict[str, Any] = {"description": _WORDS[status]}
     if status >= 400:
-        answer["content"] = {_MEDIA_TYPE: {"schema": {"$ref": _REF.format(model="Problem")}}}
+        schema = {"$ref": _REF.format(model="Problem")}
+        examples = _example_named(f"Problem{status}")
+        answer["content"] = {_MEDIA_TYPE: {"schema": schema, "examples": examples}}
     if status in _HEADERS:
         answer["headers"] = _HEADERS[status]
     return answer

@@ -1,8 +1,9 @@
-"""Pages of `docs/reference/` that `python -m tests.reference --write` makes."""
+"""Pages of `docs/reference/`, and examples, that `python -m tests.reference --write` makes."""
 
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.reference.examples import EXAMPLES, examples_file
 from tests.reference.http import http_page
 from tests.reference.settings import settings_page
 from tests.reference.states import states_page
@@ -15,8 +16,9 @@ def _marked(page: Callable[[], str]) -> Callable[[], str]:
     return lambda: _MADE + page().rstrip() + "\n"
 
 
-PAGES: dict[str, Callable[[], str]] = {
-    "http.md": _marked(http_page),
-    "settings.md": _marked(settings_page),
-    "states.md": _marked(states_page),
+FILES: dict[Path, Callable[[], str]] = {
+    EXAMPLES: examples_file,
+    REFERENCE / "http.md": _marked(http_page),
+    REFERENCE / "settings.md": _marked(settings_page),
+    REFERENCE / "states.md": _marked(states_page),
 }

@@ -1,12 +1,12 @@
-"""Print the pages of `docs/reference/` that are made, or `--write` them."""
+"""Print the pages of `docs/reference/` that are made, and the examples, or `--write` them."""
 
 import sys
 
-from tests.reference import PAGES, REFERENCE
+from tests.reference import FILES
 
 if __name__ == "__main__":
-    for name, made in PAGES.items():
+    for path, made in FILES.items():
         if sys.argv[1:] == ["--write"]:
-            (REFERENCE / name).write_text(made())
+            path.write_text(made())
         else:
             sys.stdout.write(made())
