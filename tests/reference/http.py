@@ -15,8 +15,8 @@ Bodies are JSON unless a row says otherwise. Errors are `application/problem+jso
 a stable `code`. Angles are in degrees, lengths in metres, times RFC 3339 in UTC; names say units.
 *Scope* is what a token has to hold. `/docs` of a running service has the same to try, and
 `/openapi.json` for programs, with an example of every request and answer. Unknown fields of a body
-refuse nothing, but those of a new token: the answer names up to 20 of them (`ignored`). The guides
-say how these belong together.
+refuse nothing, but those of a new token: the answer names up to 20 of them (`ignored`). [How the
+API changes](../guides/changes.md) is promised. The guides say how these belong together.
 """
 _ERRORS = """\
 ## Errors

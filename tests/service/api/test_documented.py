@@ -1,5 +1,7 @@
 """What `/openapi.json` says of errors."""
 
+from importlib.metadata import version
+
 from service.enums import AlertKind, PoseState
 from service.reasons import CODES
 
@@ -62,3 +64,13 @@ def test_a_code_stands_beside_every_reason(http):
         assert (code["enum"], nothing) == (list(CODES), {"type": "null"})
     for name, words in (("PoseState", PoseState), ("AlertKind", AlertKind)):
         assert schemas[name]["enum"] == list(words)
+
+
+def test_no_body_but_a_tokens_is_closed_to_fields_of_a_newer_version(http):
+    schemas = http.get("/openapi.json").json()["components"]["schemas"]
+    closed = [name for name, each in schemas.items() if each.get("additionalProperties") is False]
+    assert closed == ["TokenBody"]
+
+
+def test_the_api_has_the_version_of_its_release(http):
+    assert http.get("/openapi.json").json()["info"]["version"] == version("surefoot")
