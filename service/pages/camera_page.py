@@ -188,13 +188,15 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     state.watched.note(camera_id)
     zone = state.settings.zone
     clock = Clock(now=page.now, zone=zone)
+    learned = page.pose.reference
     answer = render(
         request,
         "camera/page.html",
         page=page,
         clock=clock,
         zone_name=state.settings.timezone,
-        people=camera_words.people_words(page.pose.reference.counted, page.pose.reference.hours),
+        people=camera_words.people_words(learned.counted, learned.hours),
+        few_hours=camera_words.few_hours_words(learned.counted, learned.wanted, learned.hours),
         headline=camera_words.headline(page.facts, clock),
         drawings=draw_camera(
             page.camera, page.pose, page.tracks, page.misplaced, page.snapshot, page.zones
@@ -209,9 +211,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         misplaced=moves.misplaced_words(page.misplaced),
         flags=_flags(page, clock),
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],
-        connect=None
-        if page.pose.reference.ready
-        else how_to_connect(request, state.settings, camera_id),
+        connect=None if learned.ready else how_to_connect(request, state.settings, camera_id),
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,

@@ -13,7 +13,7 @@ from service.cameras.connecting import view_connection
 from service.enums import TokenScope
 from service.settings import Settings
 from service.wording import connecting as words
-from service.wording.camera import people_words
+from service.wording.camera import few_hours_words
 from service.wording.times import Clock
 
 router = APIRouter(include_in_schema=False)
@@ -29,7 +29,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         "camera/posts.html",
         found=found,
         learned=learned,
-        people=people_words(learned.counted, learned.hours),
+        few_hours=few_hours_words(learned.counted, learned.wanted, learned.hours),
         words=words,
         clock=Clock(now=found.now, zone=state.settings.zone),
     )

@@ -138,6 +138,18 @@ def people_words(people: int, hours: int) -> str:
     return f"{of_all} of {'a single hour' if hours == 1 else f'{hours} different hours'}"
 
 
+def few_hours_words(counted: int, wanted: int, hours: int) -> str:
+    """What people of a few hours leave unknown; empty while most are still to come."""
+    if not 0 < hours < _FEW_HOURS or 2 * counted < wanted:
+        return ""
+    when = "a single hour" if hours == 1 else f"{hours} hours"
+    return (
+        f"The reference is of {when} only, as of one morning: people of another time of day may "
+        "walk elsewhere, and that may look as if something had changed. With more people "
+        "(reference_tracks) it is of a whole day."
+    )
+
+
 def fleet_line(
     state: PoseState,
     kinds: Sequence[AlertKind],

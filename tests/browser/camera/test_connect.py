@@ -181,6 +181,9 @@ def test_a_token_is_made_there_and_posts_for_this_camera_alone(browser, closed, 
         assert walk_by(page.locator("#python").inner_text(), tmp_path) == 0
         expect(page.locator("#posted")).to_contain_text("5 taken")
         expect(page.locator(".headline")).to_have_text("Learning: 5 of 200 people.")
+        bridge = page.locator("#bridge").inner_text()
+        assert "export SUREFOOT_TOKEN=TOKEN" in bridge  # this one cannot read
+        assert "export SUREFOOT_MQTT_CAMERAS=corner=corner" in bridge
         assert axe(page) == []
         shoot(page, "connect-token")
         (made,) = [each for each in server.http.get("/tokens").json()["items"] if each["cameras"]]

@@ -10,11 +10,13 @@ from sqlalchemy import update
 
 from service.cameras.connecting import view_connection
 from service.cameras.post_log import PostLog
+from service.setting_values import read_camera_names
+from service.settings import Settings
 from service.store import references
 from service.store.engines.store import Store
 from service.store.tracks import TrackRecord
 from service.wording.connecting import delay_words, ready_words
-from tests.conftest import track
+from tests.conftest import CAMERA, track
 from tests.service.bench import moved
 
 URL = "/ui/cameras/corner"
@@ -43,6 +45,42 @@ def test_a_new_camera_has_commands_with_its_address_id_and_size(corner):
     assert "none yet" in posts(corner)
 
 
+def test_the_bridges_settings_are_this_cameras(http, monkeypatch):
+    http.post("/cameras", json=CAMERA | {"id": "town-centre"}).raise_for_status()
+    page = http.get("/ui/cameras/town-centre").text
+    block = html.unescape(re.sub(r"<[^>]+>", "", page.split('id="bridge"')[1].split("</pre>")[0]))
+    *lines, last = block.partition(">")[2].strip().splitlines()
+    assert last == "surefoot bridge"
+    given = dict(line.removeprefix("export ").split("=", 1) for line in lines)
+    assert given.pop("SUREFOOT_URL") == "http://testserver"
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    settings = Settings()
+    assert settings.mqtt_url == "mqtt://BROKER:1883"
+    assert read_camera_names(settings.mqtt_cameras) == {"town_centre": "town-centre"}
+
+
+def test_a_reference_of_one_morning_says_so_once_most_people_are_there(corner, settings):
+    batch = [track(str(n), start_s=time.time() - 3600 - n) for n in range(150)]
+    corner.post("/cameras/corner/tracks", json={"tracks": batch}).raise_for_status()
+    store = Store(settings)
+
+    def said(**known):
+        with store.write() as session:
+            reference = references.newest(session, "corner")
+            for name, value in known.items():
+                setattr(reference, name, value)
+        return posts(corner), text_of(corner.get(URL).text)
+
+    assert all("of 3 hours only, as of one morning" in page for page in said(hours=3))
+    assert all("of a single hour only" in page for page in said(hours=1))
+    assert not any("hours only" in page for page in said(hours=9))
+    assert not any("hours only" in page for page in said(hours=3, pieces=80))  # of 70 people
+    ready = {"ready_at": datetime.now(UTC), "tracks": 200, "data": b"made up", "pieces": 0}
+    assert all("of 3 hours only" in page for page in said(**ready, walking_speed_mps=1.3))
+    store.close()
+
+
 def test_the_first_command_tries_the_connection_and_stores_nothing(corner):
     page = corner.get(URL).text
     command = html.unescape(re.sub(r"<[^>]+>", "", page.split('id="try"')[1].split("</pre>")[0]))
@@ -66,7 +104,7 @@ def test_what_was_refused_is_said_with_what_would_mend_it(corner):
     assert "<b>brief</b>: too_short: 2 points over 0.4 s" in said
     assert "5.0 tracks a minute" in said
     assert re.search(r"Tracks come 1[2-9] s after their end: the clocks agree", said), said
-    assert "5 people of" in said
+    assert "5 of 200 people: ready" in said
     assert "ready in about 39 minutes at this rate" in said  # 195 people at 5 a minute
 
 
