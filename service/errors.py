@@ -104,6 +104,26 @@ class PreconditionRequiredError(_VersionError):
     status, code = 428, "precondition_required"
 
 
+def check_version(what: str, now: str, asked: str | None) -> None:
+    """Refuse a change that was not made of what is stored.
+
+    Args:
+        what: is changed, "the camera is".
+        now: its ETag.
+        asked: that of `If-Match`, or *; None where there was none.
+
+    Raises:
+        PreconditionRequiredError: none was asked for.
+        PreconditionFailedError: another one was.
+    """
+    if asked is None:
+        raise PreconditionRequiredError(
+            f"If-Match: the ETag as it was read is needed; {what} at {now}", now
+        )
+    if asked not in (now, "*"):
+        raise PreconditionFailedError(f"If-Match: {what} at {now}, got {asked}", now)
+
+
 class TooLargeError(ServiceError):
     """A request beyond a stated limit."""
 

@@ -7,11 +7,12 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
+from service.api.documented import ETAG
 from service.api.ground import HeldPoseOut
 from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import (
     BodyDep,
-    EtagDep,
+    IfMatch,
     ReadDep,
     WriteDep,
     media_type_of,
@@ -158,14 +159,14 @@ def show(
     return Response(content, media_type=media_type_of_zones(format_), headers=headers)
 
 
-@router.put("", openapi_extra=_DESCRIBED_BODY)
+@router.put("", openapi_extra=_DESCRIBED_BODY, responses={200: {"headers": ETAG}})
 def put(
     camera_id: str,
     request: Request,
     body: BodyDep,
-    etag: EtagDep,
     session: WriteDep,
     response: Response,
+    if_match: IfMatch = None,
     format_: _Format = None,
     on: Annotated[ZoneOn, Query(description="of zones that do not say it")] = ZoneOn.GROUND,
     drawn_at: Annotated[
@@ -183,6 +184,6 @@ def put(
         )
     kind = format_of(format_, media_type)
     document = parsed(body, media_type)
-    view = zones.draw_zones(session, camera_id, etag, kind, document, on, drawn_at)
+    view = zones.draw_zones(session, camera_id, if_match, kind, document, on, drawn_at)
     response.headers["ETag"] = view.etag
     return ZonesOut.from_value(view)

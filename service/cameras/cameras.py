@@ -20,9 +20,8 @@ from service.enums import Activity, AlertState, Origin, Outcome, PoseState
 from service.errors import (
     ConflictError,
     NotFoundError,
-    PreconditionFailedError,
-    PreconditionRequiredError,
     TooManyCamerasError,
+    check_version,
 )
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
@@ -188,7 +187,7 @@ def change_camera(
         PreconditionRequiredError: the client does not say what it has read.
     """
     record = require_camera(session, camera_id)
-    _check_etag(record, etag)
+    check_version("the camera is", etag_of(record), etag)
     changed = {
         field.name: getattr(change, field.name)
         for field in fields(change)
@@ -236,7 +235,7 @@ def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
         PreconditionRequiredError: the client does not say what it has read.
     """
     record = require_camera(session, camera_id)
-    _check_etag(record, etag)
+    check_version("the camera is", etag_of(record), etag)
     for alert in list_alerts(
         session, AlertFilter(state=AlertState.FIRING, camera_id=camera_id), _MANY
     ):
@@ -330,16 +329,6 @@ def _views(
         )
         for record, prior, model_id in cameras.all_as_set_up(session, statuses.keys())
     ]
-
-
-def _check_etag(record: CameraRecord, etag: str | None) -> None:
-    now = etag_of(record)
-    if etag is None:
-        raise PreconditionRequiredError(
-            f"If-Match: the ETag of the camera as read is needed, now {now}", now
-        )
-    if etag not in (now, "*"):
-        raise PreconditionFailedError(f"If-Match: the camera is at {now}, got {etag}", now)
 
 
 def _columns(lens: Intrinsics) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.cameras.held_poses import HeldPose, held_pose
 from service.enums import Activity, ZoneOn
-from service.errors import PreconditionFailedError
+from service.errors import check_version
 from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
 from service.formats.zones import Corner, Zone
 from service.store import cameras, zones
@@ -96,7 +96,7 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
 def draw_zones(
     session: Session,
     camera_id: str,
-    etag: str,
+    etag: str | None,
     kind: ZoneFormat | None,
     document: Any,
     on: ZoneOn,
@@ -108,12 +108,11 @@ def draw_zones(
         NotFoundError: there is no such camera.
         MalformedError: of the document.
         PreconditionFailedError: they were drawn anew since the client read them.
+        PreconditionRequiredError: no version was named.
     """
     lens = require_camera(session, camera_id).intrinsics
     record = zones.of_camera(session, camera_id)
-    current = _etag(camera_id, record)
-    if etag not in (current, "*"):
-        raise PreconditionFailedError(f"If-Match: the zones are at {current}, got {etag}")
+    check_version("the zones are", _etag(camera_id, record), etag)
     drawn = read_zones(kind, document, camera_id, (lens.width, lens.height), on)
     held, now = held_pose(session, camera_id, at), datetime.now(UTC)
     own = held.own if held.drifted else None

@@ -57,6 +57,7 @@ def made_examples() -> Examples:
     """Each schema's example, those of what has no schema by path, and problems by status."""
     with _run() as run:
         _cameras(run)
+        _ground(run)
         _alerts(run)
         _acts(run)
         _others(run)
@@ -75,10 +76,17 @@ class _Run:
         self._names: dict[str, str] = {}
         self._paths = http.get("/openapi.json").json()["paths"]
 
-    def ask(self, method: str, path: str, body: Any = None, **ids: str) -> Any:
+    def ask(
+        self,
+        method: str,
+        path: str,
+        body: Any = None,
+        headers: dict[str, str] | None = None,
+        **ids: str,
+    ) -> Any:
         """The answer to a request that is taken; both become examples."""
         operation = self._paths[path][method.lower()]
-        answer = self.http.request(method, path.format(**ids), json=body)
+        answer = self.http.request(method, path.format(**ids), json=body, headers=headers)
         assert answer.is_success, answer.text
         if body is not None:
             self._keep(operation["requestBody"]["content"], "application/json", body, method, path)
@@ -182,6 +190,24 @@ def _cameras(run: _Run) -> None:
     run.keep("GET", "/events", "text/event-stream", b"".join(lines).decode())
     bench.store.close()
     bench.queue.close()
+
+
+def _ground(run: _Run) -> None:
+    one = {"camera_id": "corner"}
+    run.ask("POST", "/cameras/{camera_id}/ground", {"points": [[640.0, 500.0], [900, 40]]}, **one)
+    run.ask("POST", "/cameras/{camera_id}/image", {"points": [[12.0, 14.5]]}, **one)
+    path = "/cameras/{camera_id}/zones"
+    door = {"id": "door", "on": "ground", "points": [[300, 400], [500, 410], [480, 600]]}
+    any_version = {"If-Match": "*"}
+    run.ask("PUT", path, {"zones": [door]}, headers=any_version, **one)
+    run.ask("GET", path, **one)
+    for form in ("geojson", "axis", "frigate"):
+        answer = run.http.get(path.format(**one), params={"format": form})
+        assert answer.is_success, answer.text
+        kind = answer.headers["content-type"].partition(";")[0]
+        value = answer.text if "yaml" in kind else answer.json()
+        run.keep("GET", path, kind, value)
+        run.keep("PUT", path, kind, value)
 
 
 def _alerts(run: _Run) -> None:
