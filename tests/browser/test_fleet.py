@@ -135,8 +135,8 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     page.keyboard.type("nor")
     assert shown(page) == ["North door", "North stairs"]
     assert page.locator("#found").inner_text() == "2 cameras"
-    # the chips of moved, unsure, maybe moved, no people, unconnected, learning
-    for _ in range(6):
+    # the chips of moved, unsure, maybe moved, no people, uncalibrated, unconnected, learning
+    for _ in range(7):
         page.keyboard.press("Tab")
     page.keyboard.press("Space")
     assert shown(page) == ["North door"]
