@@ -48,6 +48,7 @@ PUBLIC_MODELS = {
     "models.errors": "what a calibration may fail by",
     "models.geometry.footprint": "the ground in the picture",
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
+    "models.geometry.hints": "what a person marks in a picture",
     "models.geometry.intrinsics": "the lens",
     "models.geometry.outlines": "zones after a move",
     "models.geometry.pose": "the pose, its parameters and their names",

@@ -49,6 +49,7 @@ OTHERS = {
     ("api/ground.py", "pose"): "a tag of the API's description",
     ("api/maintenance.py", "maintenance"): "a tag of the API's description",
     ("api/poses.py", "pose"): "a tag of the API's description",
+    ("api/hints.py", "pose"): "a tag of the API's description",
     ("api/sources.py", "tracks"): "a tag of the API's description",
     ("api/tracks.py", "tracks"): "a tag and a field of the API's description",
     ("api/operation.py", "firing"): "part of a metric's name",

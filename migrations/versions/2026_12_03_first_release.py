@@ -109,7 +109,7 @@ table(
     *needed(Double, "height_m", "tilt_rad", "roll_rad", "heading_rad", "x_m", "y_m"),
     *needed(String, "origin"),
     *optional(String, "trusted_by"),
-    *needed(JSON, "given"),
+    *needed(JSON, "hints", "given"),
     *optional(JSON, "covariance"),
     *needed(DateTime, "created_at"),
     one_of("origin", "registered changed accepted assumed agreed"),

@@ -94,4 +94,3 @@ LEAST_TILT_RAD, MOST_TILT_RAD = math.radians(-15.0), math.radians(85.0)
 CALIBRATION_STARTS, CALIBRATION_ROUNDS = 4, 4
 CALIBRATED = 1e-3  # rad and log height of a round: less is the end
 LEAST_ACROSS = 0.05  # of steps go across the others' way; of directions that are 13 deg apart
-CALIBRATION_SD = np.array([math.radians(4.0), math.radians(4.0), 0.3])  # more is of no use

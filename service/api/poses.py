@@ -33,6 +33,7 @@ from service.api.schemas import (
 )
 from service.cameras import cameras, decisions, poses
 from service.cameras.poses import PoseView
+from service.cameras.proposals import Proposal
 from service.degrees import in_degrees
 from service.enums import PoseState
 from service.errors import ConflictError, MalformedError
@@ -42,7 +43,6 @@ from service.job_queue import JobQueue
 from service.reasons import code_of, values_of
 from service.settings import Settings
 from service.store.access import name_in
-from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
 from service.wording.times import from_seconds
 
@@ -109,14 +109,15 @@ class ProposedOut(BaseModel):
     updated_at: datetime
 
     @classmethod
-    def from_record(cls, record: ProposedPoseRecord) -> Self:
+    def from_value(cls, proposal: Proposal) -> Self:
         """The body of a proposed pose."""
+        sd = {"heading_deg": None} | in_degrees(proposal.sd)
         return cls(
-            pose=PoseOut.from_value(record.pose),
-            sd=SdOut(**in_degrees(record.sd), heading_deg=None),
-            tracks=record.tracks,
-            can_be_agreed=record.told,
-            updated_at=record.created_at,
+            pose=PoseOut.from_value(proposal.pose),
+            sd=SdOut(**sd),
+            tracks=proposal.tracks,
+            can_be_agreed=proposal.told,
+            updated_at=proposal.updated_at,
         )
 
 
@@ -156,7 +157,7 @@ class ServedPoseOut(BaseModel):
             camera_id=status.camera_id,
             state=status.state,
             pose=PoseOut.from_value(view.pose),
-            proposed=None if view.proposed is None else ProposedOut.from_record(view.proposed),
+            proposed=None if view.proposed is None else ProposedOut.from_value(view.proposed),
             estimated=[field for name, field in POSE_FIELDS.items() if name in status.identifiable],
             sd=None if estimate is None else SdOut.from_value(estimate.drift),
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),

@@ -12,6 +12,7 @@ from models.reasons import Reason, Value
 from models.walking.config import FEWEST_WALKERS
 from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
+from service.cameras.proposals import Proposal, proposal_of
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import Origin, PoseState
@@ -20,7 +21,6 @@ from service.reasons import Reasons, ServiceCode
 from service.references import wanted_tracks, window_beside
 from service.settings import Settings
 from service.store import cameras, estimates, references, windows
-from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
@@ -36,7 +36,7 @@ class PoseView:
 
     status: CameraStatus
     calibrated: bool
-    proposed: ProposedPoseRecord | None
+    proposed: Proposal | None
     reasons: Reasons
     pose: CameraPose
     reference: ReferenceView
@@ -62,7 +62,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
     reference = reference_views(session, settings, {camera_id: status})[camera_id]
     pose, calibrated = prior.pose, prior.origin != Origin.ASSUMED
-    proposed = None if calibrated else cameras.proposed_pose(session, prior.id)
+    proposed = None if calibrated else proposal_of(session, prior, camera.intrinsics)
     reasons = _reasons_of(session, settings, status, reference, proposed)
     if proposed is not None:
         pose = proposed.pose
@@ -113,7 +113,7 @@ def _reasons_of(
     settings: Settings,
     status: CameraStatus,
     learned: ReferenceView,
-    proposed: ProposedPoseRecord | None,
+    proposed: Proposal | None,
 ) -> Reasons:
     """Reasons of a camera's state: what is missing, what was told, who is there."""
     now = datetime.now(UTC)
@@ -150,7 +150,7 @@ def _of_alerts(status: CameraStatus) -> list[Reason]:
 
 
 def _why_uncalibrated(
-    status: CameraStatus, learned: ReferenceView, proposed: ProposedPoseRecord | None
+    status: CameraStatus, learned: ReferenceView, proposed: Proposal | None
 ) -> Reason:
     """What is missing until somebody can agree to a pose, or that somebody has to."""
     if proposed is None:

@@ -10,12 +10,12 @@ from models.geometry.intrinsics import Intrinsics
 from models.pose import SelfCalibration, self_calibrate
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from service.enums import EventType, Origin, PoseState
+from service.enums import Origin
 from service.estimation.evidence import Unpacked, walk_of
-from service.notifications.outbox import json_time
+from service.notifications.events import tell_proposed
 from service.references import window_of
 from service.settings import Settings
-from service.store import cameras, journal, references, windows
+from service.store import cameras, references, windows
 from service.store.cameras import CameraRecord, ProposedPoseRecord
 
 
@@ -70,7 +70,6 @@ def save_proposal(session: Session, camera_id: str, people: People, found: SelfC
     """Keep a pose for somebody to agree to, unless somebody has said one meanwhile."""
     if cameras.prior_pose(session, camera_id).id != people.prior_pose_id:
         return
-    now = datetime.now(UTC)
     record = ProposedPoseRecord(
         prior_pose_id=people.prior_pose_id,
         height_m=found.pose.height_m,
@@ -81,10 +80,7 @@ def save_proposal(session: Session, camera_id: str, people: People, found: SelfC
         tracks=len(people.tracks),
         walking_groups=found.walking_groups,
         newest_track_pk=people.newest_pk,
-        created_at=now,
+        created_at=datetime.now(UTC),
     )
     session.merge(record)
-    event = {
-        "camera_id": camera_id, "state": PoseState.UNCALIBRATED, "updated_at": json_time(now)
-    }  # fmt: skip
-    journal.add_event(session, EventType.POSE, event, now)
+    tell_proposed(session, camera_id)

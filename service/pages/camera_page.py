@@ -189,6 +189,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     zone = state.settings.zone
     clock = Clock(now=page.now, zone=zone)
     learned = page.pose.reference
+    proposal = page.pose.proposed
     answer = render(
         request,
         "camera/page.html",
@@ -201,7 +202,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         drawings=draw_camera(
             page.camera, page.pose, page.tracks, page.misplaced, page.snapshot, page.zones
         ),
-        proposed=None if page.pose.proposed is None else moves.proposed_rows(page.pose.proposed),
+        proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
         zones=_zone_rows(page.zones),
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate

@@ -1,6 +1,5 @@
 """Cameras, their prior poses, arrival models and still images."""
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -120,6 +119,7 @@ class PriorPoseRecord(Record):
     y_m: Mapped[float]
     origin: Mapped[Origin] = mapped_column(vocabulary(Origin, checked=False))
     trusted_by: Mapped[str | None]
+    hints: Mapped[list[dict[str, Any]]] = mapped_column(JSON, default=list)
     given: Mapped[list[str]] = mapped_column(JSON, default=list)
     covariance: Mapped[list[list[float]] | None] = mapped_column(JSON(none_as_null=True))
     created_at: Mapped[datetime]
@@ -171,19 +171,6 @@ class ProposedPoseRecord(Record):
     def pose(self) -> CameraPose:
         """As a value, over the world's origin and with no heading: people tell neither."""
         return CameraPose(height_m=self.height_m, tilt_rad=self.tilt_rad, roll_rad=self.roll_rad)
-
-    @property
-    def sd(self) -> dict[str, float]:
-        """Standard deviations, in radians and metres."""
-        tilt, roll, log_height = (
-            math.sqrt(row[place]) for place, row in enumerate(self.covariance)
-        )
-        return {"height_m": self.height_m * log_height, "tilt_rad": tilt, "roll_rad": roll}
-
-    @property
-    def told(self) -> bool:
-        """True where there is enough to agree to."""
-        return len(self.identifiable) == len(self.covariance)
 
 
 def newest_of(

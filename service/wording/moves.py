@@ -1,14 +1,13 @@
 """Moves of cameras in words: how far one turned or rose, how sure that is, what it means."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from models.geometry.ground import Misplacement
 from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
-from service.store.cameras import ProposedPoseRecord
 from service.store.estimates import EstimateRecord
 
 # Operators say pan. Height is told apart.
@@ -75,9 +74,8 @@ def moved_words(estimate: EstimateRecord, since: str = "") -> str:
     return " and ".join(part for part in parts if part)
 
 
-def proposed_rows(proposed: ProposedPoseRecord) -> list[tuple[str, str, str]]:
+def proposed_rows(pose: CameraPose, sd: Mapping[str, float]) -> list[tuple[str, str, str]]:
     """Name, value and half the 90 % interval of each number of a proposed pose."""
-    pose, sd = proposed.pose, proposed.sd
     return [
         ("Height", f"{pose.height_m:.1f} m", f"±{Z90 * sd['height_m']:.1f} m"),
         *(

@@ -295,6 +295,10 @@ def _agree(run: _Run, said: Any) -> None:
             )
         )
     store.close()
+    door = {"kind": "vertical", "points": [[400, 500], [401, 310]], "length_m": 2.1}
+    kerb = {"kind": "length", "points": [[300, 560], [900, 575]], "length_m": 6.0}
+    run.ask("PUT", "/cameras/{camera_id}/hints", [door, kerb], camera_id="gate")
+    run.ask("GET", "/cameras/{camera_id}/hints", camera_id="gate")
     run.ask("POST", "/cameras/{camera_id}/pose/agree", said, camera_id="gate")
 
 

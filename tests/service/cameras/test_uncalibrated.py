@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
-from tests.service.street import KNOCKED, PRIOR, Street
+from tests.service.street import KNOCKED, LENS, PRIOR, Street
 
 BARE = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
 
@@ -120,3 +121,54 @@ def test_a_lens_that_changes_leaves_it_uncalibrated(street):
     street.keep_to_lanes(PRIOR, 30)
     assert street.look()["state"] == "uncalibrated"
     assert math.isfinite(street.pose()["pose"]["height_m"])
+
+
+def marks():
+    """A vertical of 2.5 m and a length of 5 m of the street, as its true pose shows them."""
+    sine, cosine = math.sin(PRIOR.heading_rad), math.cos(PRIOR.heading_rad)
+
+    def at(forward_m, right_m, up_m=0.0):
+        return (forward_m * sine + right_m * cosine, forward_m * cosine - right_m * sine, up_m)
+
+    def seen(*places):
+        points, _ = LENS.project((np.array(places) - PRIOR.centre_m) @ PRIOR.rotation.T)
+        return points.tolist()
+
+    return [
+        {"kind": "vertical", "points": seen(at(12, -3), at(12, -3, 2.5)), "length_m": 2.5},
+        {"kind": "length", "points": seen(at(11, -2), at(11, 3)), "length_m": 5.0},
+    ]
+
+
+def test_a_person_helps_with_marks_and_takes_them_back(street):
+    path = "/cameras/corner/hints"
+    alone = street.http.put(path, json=marks()).json()
+    assert alone["proposed"]["tracks"] == 0
+    street.keep_to_lanes(PRIOR, 60)
+    by_people = street.look()["proposed"]
+    with_people = street.http.get(path).json()
+    assert by_people == with_people["proposed"]
+    assert max(mark["off_sd"] for mark in with_people["items"]) < 1.5
+    assert by_people["pose"]["height_m"] == pytest.approx(6.0, rel=0.05)
+    back = street.http.put(path, json=[]).json()
+    assert back["items"] == []
+    assert back["proposed"]["sd"]["height_m"] > 2 * by_people["sd"]["height_m"]
+    agreed = street.http.post("/cameras/corner/pose/agree")
+    assert agreed.status_code == 200
+    problem(street.http.put(path, json=marks()), 409, "conflict")
+
+
+@pytest.mark.parametrize(
+    "mark",
+    [
+        {"kind": "length", "points": [[1, 1], [2, 2]]},
+        {"kind": "horizon", "points": [[1, 1]]},
+        {"kind": "vertical", "points": [[1, 1], [1, 1]]},
+        {"kind": "map_point", "points": [[1, 1]], "x_m": 3.0},
+        {"kind": "door", "points": [[1, 1], [2, 2]]},
+        {"kind": "vertical", "points": [[640, -9e5], [640, -9.1e5]], "length_m": 2.0},
+    ],
+)
+def test_what_is_no_mark_is_refused(street, mark):
+    problem(street.http.put("/cameras/corner/hints", json=[mark]), 422, "malformed")
+    assert street.http.get("/cameras/corner/hints").json()["items"] == []
