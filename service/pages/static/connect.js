@@ -31,8 +31,9 @@ async function look() {
   live.replaceChildren(holder.content);
   live.removeAttribute("aria-busy");
   if (open) live.querySelector("details")?.setAttribute("open", "");
-  const { state, ready } = live.querySelector(".posts").dataset;
-  if (document.querySelector(".summary").dataset.state !== state) refreshSoon();
+  const { state, ready, people } = live.querySelector(".posts").dataset;
+  const shown = document.querySelector(".summary").dataset;
+  if (shown.state !== state || shown.people !== people) refreshSoon();
   if (ready === "yes") finish();
 }
 
