@@ -146,11 +146,12 @@ def bridge(
         str | None,
         typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes read and ingest, if needed."),
     ] = None,
+    data_dir: DataDir = None,
 ) -> None:
     """Carry tracks from an MQTT broker to a service, states and alerts back, until SIGTERM."""
     from service.commands.bridge import run_bridge
 
-    run_bridge(begin(), url, token)
+    run_bridge(begin(data_dir=data_dir), url, token)
 
 
 @app.command()

@@ -16,9 +16,10 @@ SERVE_LOCK, MIGRATE_LOCK, KEY_FILE = "serve.lock", "migrate.lock", "secret.key"
 ROUNDS = "rounds"  # of the worker that does the upkeep, which has a lock of its own
 ROUNDS_LOCK = f"{ROUNDS}.lock"
 DATABASE, WEIGHTS, COPIES = "surefoot.sqlite", "weights", "copies"
+BRIDGE = "bridge.sqlite"  # what the bridge has not posted yet
 COMPILED = "compiled"  # in the image: machine code of models/, where no other place can be written
 _OURS = (
-    *(DATABASE + end for end in ("", "-wal", "-shm", "-journal")),
+    *(name + end for name in (DATABASE, BRIDGE) for end in ("", "-wal", "-shm", "-journal")),
     *(WEIGHTS, COPIES, COMPILED, SERVE_LOCK, MIGRATE_LOCK, ROUNDS_LOCK, "worker-*.lock"),
     *(KEY_FILE, KEY_FILE + ".*", "restored", "restoring-*", "replaced-*"),
 )

@@ -200,7 +200,13 @@ class Settings(BaseSettings):
         "frigate", pattern=f"{_TOPIC}|^$", description="Frigate's topic_prefix; empty: no Frigate"
     )
     mqtt_cameras: Annotated[str, values.readable(values.read_camera_names)] = Field(
-        "", description="Frigate's names of cameras, where they are others: name=id, with commas"
+        "", description="sources' names of cameras, where they are others: name=id, with commas"
+    )
+    mqtt_feeds: str = Field(
+        "", description="topics of frames: axis:cameras/+/scene, onvif-grid:..., with commas"
+    )
+    mqtt_spool_mb: float = Field(
+        512.0, gt=0, description="MiB of tracks that the bridge keeps while the service is away"
     )
     mqtt_discovery: str = Field(
         "homeassistant",

@@ -4,24 +4,30 @@ import signal
 import threading
 from importlib.metadata import version
 
-from service.data_dir import StartError
+from service.data_dir import BRIDGE, StartError, make_private
 from service.setting_values import read_camera_names
 from service.settings import Settings
 from surefoot.bridge.broker import Address
-from surefoot.bridge.inward import Topics
+from surefoot.bridge.feeds import Topics, read_feeds
 from surefoot.bridge.run import Bridge
+from surefoot.bridge.spool import Spool, SpoolError
 
 
 def run_bridge(settings: Settings, url: str, token: str | None) -> None:
     """Run until SIGTERM or SIGINT.
 
     Raises:
-        StartError: no broker is named, or its certificates cannot be read.
+        StartError: no broker is named, its certificates cannot be read, or another bridge runs on
+            this data directory.
     """
     if settings.mqtt_url is None:
         raise StartError("SUREFOOT_MQTT_URL: mqtt://host:port of a broker is needed, got none")
     if settings.mqtt_ca_file is not None and not settings.mqtt_ca_file.is_file():
         raise StartError(f"SUREFOOT_MQTT_CA_FILE: a file is needed, got {settings.mqtt_ca_file}")
+    try:
+        feeds = read_feeds(settings.mqtt_feeds)
+    except ValueError as error:
+        raise StartError(f"SUREFOOT_MQTT_FEEDS: {error}") from error
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
@@ -36,10 +42,17 @@ def run_bridge(settings: Settings, url: str, token: str | None) -> None:
         prefix=settings.mqtt_prefix,
         frigate=settings.mqtt_frigate or None,
         cameras=read_camera_names(settings.mqtt_cameras),
+        feeds=feeds,
     )
+    make_private(settings.data_dir)
+    try:
+        spool = Spool(settings.data_dir / BRIDGE, int(settings.mqtt_spool_mb * 2**20))
+    except SpoolError as error:
+        raise StartError(f"data_dir: {error}") from error
     Bridge(
         address=address,
         topics=topics,
+        spool=spool,
         url=url,
         token=token,
         discovery=settings.mqtt_discovery or None,

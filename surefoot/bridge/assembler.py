@@ -1,28 +1,23 @@
 """Frames in, whole tracks out: on an end, after a silence, or when there is no more room.
 
-A finished track waits until it is confirmed, so that what `state` gives holds every detection that
-was added and is not stored by the service yet: save it, then acknowledge the messages. A detection
-that comes twice changes nothing, even after its track was finished.
+The same calls with the same times give the same tracks: a saved `state` and what came after it are
+all that a restart needs. A detection that comes twice changes nothing, even after its track was
+finished.
 """
 
 from __future__ import annotations
 
 import math
 from array import array
-from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
 
-from surefoot.bridge.values import Detection, Ended, Found, WholeTrack
+from surefoot.bridge.values import Detection, Ended, WholeTrack
 
-_VERSION = 1
+_VERSION = 2
 _COLUMNS = 5  # time and box
-
-
-class FullError(Exception):
-    """Finished tracks that nobody has confirmed fill the memory: come back when some are."""
 
 
 class StateError(Exception):
@@ -38,19 +33,9 @@ class _Open(msgspec.Struct, array_like=True):
     rows: Any  # array of floats; bytes where saved
 
 
-class _Waiting(msgspec.Struct, array_like=True):
-    camera: str
-    track_id: str
-    label: str | None
-    form: str
-    size: tuple[float, float] | None
-    rows: bytes
-
-
 class _State(msgspec.Struct, array_like=True):
     version: int
     open: list[_Open]
-    waiting: list[_Waiting]
     done: list[tuple[str, str, float, float]]
 
 
@@ -60,7 +45,7 @@ class Assembler:
 
     `silence_s` ends a track: by the clock of who assembles, and between two detections by theirs.
     Of open tracks the one that was heard of longest ago is finished where `max_tracks` or
-    `max_points` of open or of finished ones would be exceeded; a point takes 40 bytes.
+    `max_points` would be exceeded; a point takes 40 bytes.
     """
 
     silence_s: float = 5.0
@@ -68,36 +53,19 @@ class Assembler:
     max_points: int = 1_000_000
     max_track_points: int = 10_000  # what the service takes
     _open: dict[tuple[str, str], _Open] = field(default_factory=dict)  # longest unheard first
-    _waiting: deque[WholeTrack] = field(default_factory=deque)
+    _finished: list[WholeTrack] = field(default_factory=list)
     # First and last time of what was finished last: brokers send again what was not acknowledged.
     _done: dict[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
     _open_points: int = 0
-    _waiting_points: int = 0
 
     @property
     def open_tracks(self) -> int:
         """How many tracks are under way."""
         return len(self._open)
 
-    @property
-    def full(self) -> bool:
-        """True where nothing is taken in until finished tracks are confirmed."""
-        return len(self._waiting) >= self.max_tracks or self._waiting_points >= self.max_points
-
-    def add(self, found: Found, now_s: float) -> None:
-        """Take in what an adapter found; `now_s` is the time of the caller's clock (time.time()).
-
-        Raises:
-            FullError: too much waits to be confirmed; nothing was taken in.
-        """
-        if self.full:
-            raise FullError(
-                f"{len(self._waiting)} tracks of {self._waiting_points} points wait to be posted; "
-                f"at most {self.max_tracks} of {self.max_points} are kept"
-            )
-        if isinstance(found, WholeTrack):
-            self._wait(found)
-        elif isinstance(found, Ended):
+    def add(self, found: Detection | Ended, now_s: float) -> None:
+        """Take in what an adapter found; `now_s` is the caller's time (time.time())."""
+        if isinstance(found, Ended):
             self._finish((found.camera, found.track_id))
         else:
             self._detected(found, now_s)
@@ -116,40 +84,23 @@ class Assembler:
         for key in list(self._open):
             self._finish(key)
 
-    def waiting(self, most: int) -> list[WholeTrack]:
-        """The finished tracks that wait longest, of one camera and one size: one post."""
-        if not self._waiting:
-            return []
-        first = self._waiting[0]
-        same = (each for each in self._waiting if each.camera == first.camera)
-        found = []
-        for track in same:
-            if track.size == first.size:
-                found.append(track)
-            if len(found) == most:
-                break
-        return found
+    def take(self) -> list[WholeTrack]:
+        """The tracks that were finished since they were taken last."""
+        taken, self._finished = self._finished, []
+        return taken
 
-    def confirm(self, tracks: list[WholeTrack]) -> None:
-        """Forget tracks that `waiting` gave: the service has stored or refused them."""
-        gone = {id(track) for track in tracks}
-        kept = deque(track for track in self._waiting if id(track) not in gone)
-        self._waiting_points = sum(len(each.rows) // each.columns for each in kept)
-        self._waiting = kept
+    def hear_all(self, now_s: float) -> None:
+        """Count all silences from now: what came while nobody listened is still to be heard."""
+        for each in self._open.values():
+            each.heard_s = now_s
 
     def state(self) -> bytes:
-        """All that was added and not confirmed, to be saved."""
+        """All that was added and not finished, to be saved once what is finished was taken."""
         opened = [
             msgspec.structs.replace(each, rows=each.rows.tobytes()) for each in self._open.values()
         ]
-        waiting = [
-            _Waiting(
-                each.camera, each.track_id, each.label, each.form, each.size, each.rows.tobytes()
-            )
-            for each in self._waiting
-        ]
         done = [(*key, *times) for key, times in self._done.items()]
-        return msgspec.msgpack.encode(_State(_VERSION, opened, waiting, done))
+        return msgspec.msgpack.encode(_State(_VERSION, opened, done))
 
     def restore(self, saved: bytes) -> None:
         """Go on from a saved state, in place of what is there.
@@ -164,23 +115,11 @@ class Assembler:
             opened = {(each.camera, each.track_id): each for each in found.open}
             for each in found.open:
                 each.rows = _rows(each.rows, _COLUMNS)
-            waiting = deque(
-                WholeTrack(
-                    each.camera,
-                    each.track_id,
-                    each.label,
-                    each.form,
-                    _rows(each.rows, 5 if each.form == "boxes" else 3),
-                    each.size,
-                )
-                for each in found.waiting
-            )
         except (msgspec.MsgspecError, ValueError, TypeError) as error:
             raise StateError(f"no saved state of an assembler: {error}") from error
-        self._open, self._waiting = opened, waiting
+        self._open, self._finished = opened, []
         self._done = {(camera, name): (first, last) for camera, name, first, last in found.done}
         self._open_points = sum(len(each.rows) // _COLUMNS for each in opened.values())
-        self._waiting_points = sum(len(each.rows) // each.columns for each in waiting)
 
     def _detected(self, found: Detection, now_s: float) -> None:
         key = (found.camera, found.track_id)
@@ -204,8 +143,10 @@ class Assembler:
 
     def _is_another(self, track: _Open, found: Detection) -> bool:
         """True where a known id is of somebody else, or seen in another picture, by now."""
+        first_s, last_s = track.rows[0], track.rows[-_COLUMNS]
+        # Within it is what was sent again, however long ago that was.
         return (
-            abs(found.time_s - track.rows[-_COLUMNS]) > self.silence_s
+            not first_s - self.silence_s <= found.time_s <= last_s + self.silence_s
             or found.size != track.size
             or len(track.rows) >= self.max_track_points * _COLUMNS
         )
@@ -220,11 +161,7 @@ class Assembler:
         self._done[key] = (rows[0], rows[-_COLUMNS])
         if len(self._done) > self.max_tracks:
             del self._done[next(iter(self._done))]
-        self._wait(WholeTrack(*key, track.label, "boxes", rows, track.size))
-
-    def _wait(self, track: WholeTrack) -> None:
-        self._waiting.append(track)
-        self._waiting_points += len(track.rows) // track.columns
+        self._finished.append(WholeTrack(*key, track.label, "boxes", rows, track.size))
 
 
 def _in_order(rows: array[float]) -> array[float]:

@@ -1,6 +1,6 @@
 """DeepStream's minimal JSON (`msg-conv-payload-type=1`): objects in pixels of the muxer."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 from surefoot.bridge.values import (
     Detection,
@@ -18,7 +18,7 @@ _CELLS = 6  # id, x1, y1, x2, y2, label; attributes after them
 
 
 def read_frame(
-    message: bytes, cameras: Mapping[str, str], size: tuple[float, float]
+    message: bytes, camera_of: Callable[[str], str | None], size: tuple[float, float]
 ) -> list[Detection]:
     """The tracked objects of a frame.
 
@@ -27,14 +27,14 @@ def read_frame(
 
     Args:
         message: as it came.
-        cameras: our names of sensors; frames of others are empty.
+        camera_of: our name of a sensor; frames of those without one are empty.
         size: (width, height) of the muxer, which no message says.
 
     Raises:
         MessageError: it is no such message.
     """
     frame = table(parsed_json(message), "frame")
-    camera = cameras.get(text(frame.get("sensorId"), "sensorId"))
+    camera = camera_of(text(frame.get("sensorId"), "sensorId"))
     if camera is None:
         return []
     time_s = moment(frame.get("@timestamp"), "@timestamp")

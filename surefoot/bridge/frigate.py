@@ -1,14 +1,13 @@
 """Frigate's `frigate/events`: the whole path of a person, out of the message that ends it."""
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import TypeAlias
 
 import msgspec
 
 from surefoot.bridge.values import NORMALISED, MessageError, WholeTrack, check_size, text
 
-SOURCE = "frigate"
 _Point: TypeAlias = tuple[tuple[float, float], float]
 # Feet as low as this are cut off by the picture's edge: they are no feet.
 _LOWEST = 0.99
@@ -30,11 +29,11 @@ class _Event(msgspec.Struct):
 _read = msgspec.json.Decoder(_Event).decode
 
 
-def read_event(message: bytes, cameras: Mapping[str, str]) -> WholeTrack | None:
+def read_event(message: bytes, camera_of: Callable[[str], str]) -> WholeTrack | None:
     """The path of a person whose event has ended; None of any other message, and of no foot.
 
-    Points are `[time_s, x, y]`, the bottom centre as a share of the picture. `cameras` maps
-    Frigate's names to ours; others are the same, in lower case and with hyphens.
+    Points are `[time_s, x, y]`, the bottom centre as a share of the picture. `camera_of` gives
+    our name of a camera of Frigate's.
 
     Raises:
         MessageError: it is none of Frigate's, or of one before 0.16.
@@ -55,6 +54,6 @@ def read_event(message: bytes, cameras: Mapping[str, str]) -> WholeTrack | None:
             rows.extend((time_s, x, y))
     if not rows:
         return None
-    camera = cameras.get(after.camera, after.camera.lower().replace("_", "-"))
+    camera = camera_of(after.camera)
     track_id = text(after.id, "after.id")
     return WholeTrack(camera, track_id, after.label, "points", rows, NORMALISED)

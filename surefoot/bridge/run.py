@@ -5,9 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from surefoot.bridge.broker import Address, Broker
-from surefoot.bridge.inward import Topics, carry
+from surefoot.bridge.feeds import Topics
+from surefoot.bridge.inward import Inward
 from surefoot.bridge.outward import Outward
+from surefoot.bridge.posting import Posting
 from surefoot.bridge.service import Service
+from surefoot.bridge.spool import Spool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +19,7 @@ class Bridge:
 
     address: Address
     topics: Topics
+    spool: Spool
     url: str
     token: str | None
     discovery: str | None
@@ -24,7 +28,7 @@ class Bridge:
     def run(self, stopping: threading.Event) -> None:
         """Carry tracks in, states and alerts out, until the event is set.
 
-        What is under way then is not acknowledged: the broker sends it again.
+        What is not in the spool then is not acknowledged: the broker sends it again.
         """
         prefix = self.topics.prefix
         availability = f"{prefix}/bridge/availability"
@@ -36,6 +40,7 @@ class Bridge:
             discovery=self.discovery,
             version=self.version,
         )
+        inward = Inward(inbox=broker.inbox, topics=self.topics, spool=self.spool)
         failures: list[Exception] = []
 
         def part(work: Callable[[Service], None]) -> None:
@@ -48,7 +53,8 @@ class Bridge:
                 stopping.set()
 
         works: tuple[Callable[[Service], None], ...] = (
-            lambda service: carry(broker.inbox, self.topics, service, stopping),
+            lambda _: inward.carry(stopping),
+            lambda service: Posting(spool=self.spool, service=service).run(stopping),
             lambda service: outward.tell(service, stopping),
             lambda service: outward.listen(service, stopping),
         )

@@ -1,13 +1,11 @@
-"""The service as the bridge and the command line ask it: posts, pictures' sizes, alerts, events."""
+"""The service as the bridge and the command line ask it: posts, states, alerts, events."""
 
-import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import httpx
 
 _TIMEOUT_S = 60.0
-_SIZE_HOLDS_S = 60.0  # after which a camera's picture, or that there is no camera, is asked anew
 _HEARTBEATS_S = 30.0  # three of the service's: a stream that is silent for longer is none
 # Refusals that another token, or another hour, may end.
 _FOR_NOW = frozenset({401, 403, 408, 429})
@@ -45,7 +43,6 @@ class Service:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         self._http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT_S)
         self.heard: str | None = None
-        self._sizes: dict[str, tuple[float, tuple[float, float] | RefusedError]] = {}
 
     def post_tracks(self, camera_id: str, body: bytes) -> dict[str, Any]:
         """The receipt of a post.
@@ -83,28 +80,6 @@ class Service:
             RefusedError: there is none.
         """
         return self._ask("GET", "/readyz", told_by_503=True)
-
-    def size_of(self, camera_id: str) -> tuple[float, float]:
-        """Width and height in pixels of a camera's picture, as asked a minute ago at most.
-
-        Raises:
-            LaterError: it cannot be told for now.
-            RefusedError: there is no such camera.
-        """
-        now_s = time.monotonic()
-        asked_s, size = self._sizes.get(camera_id, (-_SIZE_HOLDS_S, None))
-        if size is None or now_s - asked_s >= _SIZE_HOLDS_S:
-            try:
-                lens = self.get(f"/cameras/{camera_id}")["intrinsics"]
-                size = (float(lens["width"]), float(lens["height"]))
-            except RefusedError as error:
-                size = error
-            if len(self._sizes) >= 10_000:  # names of cameras are whatever a topic says
-                self._sizes.clear()
-            self._sizes[camera_id] = (now_s, size)
-        if isinstance(size, RefusedError):
-            raise size
-        return size
 
     def events(self, after: str | None) -> Iterator[Event | None]:
         """Events as they happen, from the one after that on; None at once and with heartbeats.
@@ -167,5 +142,5 @@ def _check(answer: httpx.Response) -> None:
         raise RefusedError(status, code, detail)
     wait = answer.headers.get("retry-after", "")
     wait_s = float(wait) if wait.isdecimal() else None
-    away = status not in (429, 500)  # too much of one camera; what one body trips over
+    away = status != 500  # which one body alone may trip over
     raise LaterError(f"{status} {code}: {detail}", away=away, wait_s=wait_s)

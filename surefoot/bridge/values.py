@@ -2,6 +2,7 @@
 
 import math
 from array import array
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple, TypeAlias
 
@@ -28,7 +29,7 @@ class MessageError(Exception):
         super().__init__(self.detail)
 
 
-class Detection(NamedTuple):
+class Detection(msgspec.Struct, frozen=True, array_like=True, tag="seen"):
     """One object in one frame: its box (x1, y1, x2, y2), y down, in a picture of that size.
 
     `size` is (width, height) in pixels that count from 0 at the centre of the first, `NORMALISED`
@@ -44,7 +45,7 @@ class Detection(NamedTuple):
     size: tuple[float, float] | None
 
 
-class Ended(NamedTuple):
+class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
     """Word of a source that an object will not be seen again, or not by this id."""
 
     camera: str
@@ -69,25 +70,29 @@ class WholeTrack(NamedTuple):
         """Numbers of a row."""
         return 5 if self.form == "boxes" else 3
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> bytes:
         """The track as it stands in a body of `POST /cameras/{id}/tracks`."""
         step = self.columns
-        rows = [list(self.rows[at : at + step]) for at in range(0, len(self.rows), step)]
+        rows = [self.rows[at : at + step].tolist() for at in range(0, len(self.rows), step)]
         track: dict[str, Any] = {"id": self.track_id, self.form: rows}
-        return track if self.label is None else track | {"class": self.label}
+        return msgspec.json.encode(track if self.label is None else track | {"class": self.label})
+
+    def head(self, source: str) -> bytes:
+        """What a body says of all its tracks, as JSON: tracks of one head go in one post."""
+        head: dict[str, Any] = {"source": source}
+        if self.size == NORMALISED:
+            head["normalised"] = True
+        elif self.size is not None:
+            head["size"] = self.size
+        return msgspec.json.encode(head)
 
 
 Found: TypeAlias = Detection | Ended | WholeTrack
 
 
-def body_of(tracks: list[WholeTrack], source: str) -> dict[str, Any]:
-    """The body of a post of tracks of one camera and one size."""
-    size = tracks[0].size
-    assert all(track[0] == tracks[0].camera and track.size == size for track in tracks)
-    body: dict[str, Any] = {"source": source, "tracks": [track.to_json() for track in tracks]}
-    if size == NORMALISED:
-        return body | {"normalised": True}
-    return body if size is None else body | {"size": list(size)}
+def body_of(head: bytes, tracks: Sequence[bytes]) -> bytes:
+    """The body of a post of tracks of one camera and one head."""
+    return b'%s,"tracks":[%s]}' % (head[:-1], b",".join(tracks))
 
 
 def number(value: Any, what: str) -> float:

@@ -1,6 +1,6 @@
 """A small message of each source, made by its specification, and one way to read each."""
 
-from surefoot.bridge import axis, deepstream, onvif, rows
+from surefoot.bridge import axis, deepstream, frames, onvif, rows
 from surefoot.bridge.onvif import Profile
 from surefoot.bridge.rows import Clock
 
@@ -49,6 +49,10 @@ DEEPSTREAM = b"""{"version": "4.0", "id": "1252", "@timestamp": "2026-11-20T08:0
  "sensorId": "yard-1", "objects": ["7|480|540|576|810|Person|#|male|adult|#|0.9",
   "18446744073709551615|0|0|10|10|Vehicle"]}"""
 
+# A plain topic's: docs/guides/mqtt.md
+FRAME = b"""{"time_s": 1795161600.25, "size": [1920, 1080], "ended": ["3"],
+ "detections": [{"id": 7, "box": [480, 540, 576, 810], "class": "person"}]}"""
+
 SUPERVISION_CSV = (
     b"x_min,y_min,x_max,y_max,class_id,confidence,tracker_id,class_name,frame_number\r\n"
     b"480.0,540.0,576.0,810.0,0,0.9,7,person,5\r\n"
@@ -73,7 +77,8 @@ READERS = {
         lambda message: onvif.read_json(message, "yard", Profile.TRANSFORMED),
     ),
     "onvif_xml": (ONVIF_XML, lambda message: onvif.read_xml(message, "yard", Profile.TRANSFORMED)),
-    "deepstream": (DEEPSTREAM, lambda m: deepstream.read_frame(m, {"yard-1": "yard"}, _HD)),
+    "deepstream": (DEEPSTREAM, lambda m: deepstream.read_frame(m, {"yard-1": "yard"}.get, _HD)),
+    "frames": (FRAME, lambda message: frames.read_frame(message, "yard")),
     "supervision_csv": (
         SUPERVISION_CSV,
         lambda file: list(rows.read_supervision_csv(file, "yard", _FRAMES, _HD)),

@@ -56,6 +56,7 @@ class RunningBridge:
         given = {f"SUREFOOT_MQTT_{name.upper()}": value for name, value in settings.items()}
         self._environment = os.environ | given
         self._command = [sys.executable, "-m", "service.cli", "bridge", "--url", service_url]
+        self._command += ["--data-dir", str(folder / "bridge")]
         self.process: subprocess.Popen[bytes]
 
     def start(self) -> None:

@@ -112,7 +112,7 @@ def test_frames_of_a_camera_become_tracks():
         for found in axis.read_frame(message, {1: "yard"}):
             assembler.add(found, n)
     assembler.finish_all()
-    (track,) = assembler.waiting(9)
+    (track,) = assembler.take()
     assert (track.track_id, len(track.rows) // 5, track.size) == ("a1b2", 6, NORMALISED)
 
 
@@ -173,7 +173,7 @@ def _places(value, path=()):
 
 @pytest.mark.parametrize(
     "source",
-    ["axis", "onvif_json", "deepstream", "supervision_json", "ultralytics_summary"],
+    ["axis", "onvif_json", "deepstream", "frames", "supervision_json", "ultralytics_summary"],
 )
 @given(data=st.data())
 def test_json_with_anything_anywhere(source, data):

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from surefoot.bridge.feeds import Topics
 from surefoot.bridge.frigate import read_event
 from surefoot.bridge.values import MAX_MESSAGE_BYTES, MessageError
 from tests.surefoot.bridge.stand import frigate_event
@@ -15,7 +16,9 @@ PATH = [[[0.5, 0.4 + 0.1 * n], 1_700_000_000.5 + n] for n in range(5)]
 
 
 def read(document, cameras=None):
-    return read_event(json.dumps(document).encode(), cameras or {})
+    topics = Topics(prefix="surefoot", frigate="frigate", cameras=cameras or {})
+    _, found = topics.read("frigate/events", json.dumps(document).encode())
+    return found[0] if found else None
 
 
 def test_the_end_of_a_person_is_a_track_of_the_feet():
@@ -70,7 +73,7 @@ def test_cameras_are_mapped_or_spelled_as_ids_are():
 )
 def test_what_is_none_of_frigates_is_named(message):
     with pytest.raises(MessageError) as caught:
-        read_event(message, {})
+        read_event(message, str)
     assert caught.value.code == ("too_large" if len(message) > MAX_MESSAGE_BYTES else "malformed")
 
 

@@ -1,0 +1,50 @@
+"""The plain topic's frames: `{"time_s", "size" or "normalised", "detections", "ended"}`."""
+
+from surefoot.bridge.values import (
+    NORMALISED,
+    Detection,
+    Ended,
+    MessageError,
+    listed,
+    number,
+    parsed_json,
+    table,
+    text,
+)
+
+
+def read_frame(message: bytes, camera: str) -> list[Detection | Ended]:
+    """The detections `{"id", "box": [x1, y1, x2, y2], "class"}` of a frame, and ids that ended.
+
+    Boxes are pixels of `size` [width, height], shares where `normalised` is true, else pixels of
+    the camera's own picture.
+
+    Raises:
+        MessageError: it is no such frame.
+    """
+    frame = table(parsed_json(message), "frame")
+    time_s = number(frame.get("time_s"), "time_s")
+    size: tuple[float, float] | None = None
+    if frame.get("normalised") is True:
+        size = NORMALISED
+    elif frame.get("size") is not None:
+        width, height = _numbers(frame["size"], 2, "size")
+        size = (width, height)
+    found: list[Detection | Ended] = []
+    for at, each in enumerate(listed(frame.get("detections"), "detections")):
+        where = f"detections/{at}"
+        seen = table(each, where)
+        track_id = text(seen.get("id"), f"{where}/id")
+        label = None if seen.get("class") is None else text(seen["class"], f"{where}/class")
+        x1, y1, x2, y2 = _numbers(seen.get("box"), 4, f"{where}/box")
+        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size))
+    for at, each in enumerate(listed(frame.get("ended"), "ended")):
+        found.append(Ended(camera, text(each, f"ended/{at}")))
+    return found
+
+
+def _numbers(value: object, count: int, what: str) -> list[float]:
+    if not isinstance(value, list) or len(value) != count:
+        needed = f"{count} numbers are needed"
+        raise MessageError("malformed", f"{what}: {needed}, got {value!r:.40}")
+    return [number(each, what) for each in value]

@@ -1,0 +1,97 @@
+"""Tracks from the spool to the service, as long as it takes: what fails is told, and waits."""
+
+import logging
+import threading
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from surefoot.bridge.service import LaterError, RefusedError, Service
+from surefoot.bridge.spool import Group, Spool
+from surefoot.bridge.values import body_of
+
+log = logging.getLogger("surefoot.bridge")
+
+_GATHER_S = 1.0  # so that what ends at about the same time is one post
+_FIRST_S, _LONGEST_S = 0.5, 30.0  # between two attempts
+MOST_HELD = 1_000  # tracks that the service trips over, before all is left to wait
+
+
+@dataclass(kw_only=True)
+class Posting:
+    """What is posted, and what the service has failed on: that goes by itself, later and later."""
+
+    spool: Spool
+    service: Service
+    _held: dict[int, tuple[float, float]] = field(default_factory=dict)  # again at, then after, s
+
+    def run(self, stopping: threading.Event) -> None:
+        """Post what the spool has until the event is set."""
+        delay_s = _FIRST_S
+        while not stopping.is_set():
+            self.spool.wait(_GATHER_S)
+            wait_s = self._post_all(stopping)
+            if wait_s is None:
+                delay_s = _FIRST_S
+                stopping.wait(_GATHER_S)
+                continue
+            wait_s = min(max(delay_s, wait_s), _LONGEST_S)
+            stopping.wait(wait_s)
+            delay_s = min(2 * delay_s, _LONGEST_S)
+
+    def _post_all(self, stopping: threading.Event) -> float | None:
+        """None once nothing is left, else how long the service wants to be left alone."""
+        while not stopping.is_set():
+            now_s = time.monotonic()
+            resting = [number for number, (again_s, _) in self._held.items() if again_s > now_s]
+            group = self.spool.next(resting, self._held)
+            if group is None:
+                return None
+            try:
+                self._post(group)
+            except LaterError as error:
+                extra = {"camera_id": group.camera, "reason": str(error)}
+                log.warning("tracks_wait", extra={**extra, "waiting": self.spool.waiting})
+                if error.away or len(self._held) + len(group.tracks) > MOST_HELD:
+                    return error.wait_s or 0.0
+                self._hold(group, now_s)
+        return None
+
+    def _post(self, group: Group) -> None:
+        """Post a group, and forget it.
+
+        Raises:
+            LaterError: nothing of it is stored yet.
+        """
+        bodies = list(group.tracks.values())
+        body = body_of(group.head, bodies) if group.head else bodies[0]
+        try:
+            receipt = self.service.post_tracks(group.camera, body)
+            _tell_rejected(group.camera, receipt["rejected"])
+        except RefusedError as error:
+            _tell_refused(group, error)
+        self.spool.drop(group)
+        for number in group.tracks:
+            self._held.pop(number, None)
+
+    def _hold(self, group: Group, now_s: float) -> None:
+        for number in group.tracks:
+            _, delay_s = self._held.get(number, (0.0, _FIRST_S / 2))
+            delay_s = min(2 * delay_s, _LONGEST_S)
+            self._held[number] = (now_s + delay_s, delay_s)
+
+
+def _tell_rejected(camera: str, rejected: list[dict[str, Any]]) -> None:
+    if rejected:
+        codes = dict(Counter(each["code"] for each in rejected))
+        extra = {"camera_id": camera, "codes": codes, "first": rejected[0]["detail"]}
+        log.info("tracks_rejected", extra=extra)
+
+
+def _tell_refused(group: Group, error: RefusedError) -> None:
+    # People who passed too shortly are everyday's.
+    level = logging.INFO if error.code == "nothing_taken" else logging.WARNING
+    extra = {"status": error.status, "code": error.code, "detail": error.detail}
+    count = len(group.tracks)
+    log.log(level, "tracks_refused", extra={"camera_id": group.camera, "tracks": count, **extra})
