@@ -147,11 +147,12 @@ def bridge(
         typer.Option(envvar="SUREFOOT_TOKEN", help="Of the scopes read and ingest, if needed."),
     ] = None,
     data_dir: DataDir = None,
+    follow_stdin: FollowStdin = False,
 ) -> None:
     """Carry tracks from an MQTT broker to a service, states and alerts back, until SIGTERM."""
     from service.commands.bridge import run_bridge
 
-    run_bridge(begin(data_dir=data_dir), url, token)
+    run_bridge(begin(data_dir=data_dir), url, token, follow_stdin=follow_stdin)
 
 
 @app.command()

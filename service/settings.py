@@ -181,7 +181,8 @@ class Settings(BaseSettings):
     public_url: str | None = Field(None, description="where people reach this service, for links")
 
     mqtt_url: Annotated[str, values.readable(values.read_mqtt_url)] | None = Field(
-        None, description="mqtt://host:1883 or mqtts://host:8883: the broker of `surefoot bridge`"
+        None,
+        description="mqtt://host:1883 or mqtts://host:8883: a broker; `serve` then runs a bridge",
     )
     mqtt_user: str | None = Field(None, description="its user at the broker")
     mqtt_password: str | None = Field(None, repr=False, description="and the password")

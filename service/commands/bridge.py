@@ -1,6 +1,7 @@
 """`surefoot bridge`: between an MQTT broker and a running service."""
 
 import signal
+import sys
 import threading
 from importlib.metadata import version
 
@@ -13,8 +14,10 @@ from surefoot.bridge.run import Bridge
 from surefoot.bridge.spool import Spool, SpoolError
 
 
-def run_bridge(settings: Settings, url: str, token: str | None) -> None:
-    """Run until SIGTERM or SIGINT.
+def run_bridge(
+    settings: Settings, url: str, token: str | None, *, follow_stdin: bool = False
+) -> None:
+    """Run until SIGTERM or SIGINT, or with `follow_stdin` until that ends.
 
     Raises:
         StartError: no broker is named, its certificates cannot be read, or another bridge runs on
@@ -31,6 +34,8 @@ def run_bridge(settings: Settings, url: str, token: str | None) -> None:
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
+    if follow_stdin:
+        threading.Thread(target=_follow_stdin, args=(stopping,), daemon=True).start()
     address = Address(
         url=settings.mqtt_url,
         client_id=settings.mqtt_client_id,
@@ -58,3 +63,8 @@ def run_bridge(settings: Settings, url: str, token: str | None) -> None:
         discovery=settings.mqtt_discovery or None,
         version=version("surefoot"),
     ).run(stopping)
+
+
+def _follow_stdin(stopping: threading.Event) -> None:
+    sys.stdin.buffer.read()
+    stopping.set()

@@ -15,6 +15,7 @@ import uvicorn
 
 from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.api.middleware.hosts import auth_on, is_loopback
+from service.commands.local_bridge import LocalBridge
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
@@ -68,8 +69,11 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         def give_up() -> None:
             server.should_exit = True
 
-        with LocalWorkers(settings, give_up) as workers:
-            host, port = listener.getsockname()[:2]
+        host, port = listener.getsockname()[:2]
+        with (
+            LocalWorkers(settings, give_up) as workers,
+            LocalBridge(settings, host, port),
+        ):
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             settle_collector()
             # So long waits each step of the loop for threads that compute.

@@ -1,0 +1,74 @@
+"""The bridge that `surefoot serve` starts where a broker is named, minds and ends."""
+
+import logging
+import subprocess
+import sys
+import threading
+import time
+from typing import Self
+
+from service.settings import Settings
+from service.workers.processes import exits
+from service.workers.processes.local_workers import pause_s
+
+log = logging.getLogger("surefoot.serve")
+
+_STOP_S = 10.0
+_TICK_S = 0.2
+_SETTLED_S = 60.0  # who lives for so long did not die of how it starts
+_ANY = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+
+
+class LocalBridge:
+    """A process that ends with this one, by the end of its stdin; one that dies is started anew.
+
+    `serve` goes on without it: its log says that it died, and why.
+    """
+
+    def __init__(self, settings: Settings, host: str, port: int) -> None:
+        host = _ANY.get(host, host)
+        self._url = f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+        self._settings = settings
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._keep, daemon=True)
+
+    def __enter__(self) -> Self:
+        if self._settings.mqtt_url is not None:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _keep(self) -> None:
+        deaths = 0
+        while not self._stopping.is_set():
+            begun_s = time.monotonic()
+            status = self._run()
+            if self._stopping.is_set():
+                return
+            deaths = 1 if time.monotonic() - begun_s > _SETTLED_S else deaths + 1
+            rest_s = pause_s(deaths)
+            fields = {"status": status, "why": exits.words_of(status), "again_in_s": rest_s}
+            log.error("bridge_ended", extra=fields)
+            self._stopping.wait(rest_s)
+
+    def _run(self) -> int:
+        """Run it until it ends or is to end; returns its exit status."""
+        command = [sys.executable, "-m", "service.cli", "bridge", "--url", self._url]
+        with subprocess.Popen(
+            [*command, "--follow-stdin"],
+            stdin=subprocess.PIPE,
+            env=self._settings.as_environment(),
+        ) as process:
+            while process.poll() is None and not self._stopping.wait(_TICK_S):
+                pass
+            if process.poll() is None:
+                process.terminate()
+                try:
+                    process.wait(_STOP_S)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+            return process.wait()
