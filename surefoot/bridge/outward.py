@@ -1,7 +1,7 @@
 """States and alerts of cameras to retained topics, as the service's stream of events tells of them.
 
-An event says whose state is to be asked for: what is published is what the API says, and after an
-outage what it says by then.
+An event says whose state is to be asked for: what is published is what the API says. Whenever the
+stream begins anew all are asked for: no event that was missed leaves a topic behind.
 """
 
 import json
@@ -36,6 +36,7 @@ class Outward:
     version: str
     _known: set[str] = field(default_factory=set)
     _changed: set[str] = field(default_factory=set)
+    _all_changed: bool = True
     _news: threading.Condition = field(default_factory=threading.Condition)
 
     def listen(self, service: Service, stopping: threading.Event) -> None:
@@ -44,8 +45,12 @@ class Outward:
         delay_s = _FIRST_S
         while not stopping.is_set():
             try:
+                begun = False
                 for event in service.events(after):
                     delay_s = _FIRST_S
+                    if not begun:
+                        begun = True
+                        self._note_all()
                     self.say(self.availability, "online")
                     if stopping.is_set():
                         return
@@ -63,10 +68,11 @@ class Outward:
         refreshed_s = -_REFRESH_S
         while not stopping.is_set():
             with self._news:
-                self._news.wait_for(lambda: self._changed, _GATHER_S)
+                self._news.wait_for(lambda: self._changed or self._all_changed, _GATHER_S)
                 changed, self._changed = self._changed, set()
+                every, self._all_changed = self._all_changed, False
             try:
-                if time.monotonic() - refreshed_s >= _REFRESH_S:
+                if every or time.monotonic() - refreshed_s >= _REFRESH_S:
                     changed |= self._find_cameras(service)
                     refreshed_s = time.monotonic()
                 self._tell(service, changed)
@@ -81,6 +87,11 @@ class Outward:
         cameras = [event.get("camera_id"), *(event.get("camera_ids") or ())]
         with self._news:
             self._changed.update(each for each in cameras if each is not None)
+            self._news.notify()
+
+    def _note_all(self) -> None:
+        with self._news:
+            self._all_changed = True
             self._news.notify()
 
     def _find_cameras(self, service: Service) -> set[str]:
