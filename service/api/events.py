@@ -28,7 +28,8 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Poses, alerts and trainings as they happen; with `Last-Event-ID`, all since that one.
 
-    `after` says the same for who cannot send a header with the first request: browsers.
+    `after` says the same for who cannot send a header with the first request: browsers. A pose's
+    event without a state says that its camera was registered, changed or removed.
     """
     given = (last_event_id or "").strip()
     seen = min(int(given), _MAX_ID) if _ID.fullmatch(given) else after

@@ -25,6 +25,7 @@ from service.errors import (
 )
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
+from service.notifications.events import tell_of_camera
 from service.references import begin_reference
 from service.settings import Settings
 from service.store import cameras, references, tracks
@@ -131,6 +132,7 @@ def register_camera(
         begin_reference(session, camera_id, Origin.REGISTERED, from_s=None)
         train_by_itself(session, queue, settings, camera_id)
     note(session, Activity.CAMERA_REGISTERED, by=None, camera_id=camera_id)
+    tell_of_camera(session, camera_id)
     return view_camera(session, settings, camera_id)
 
 
@@ -222,6 +224,7 @@ def change_camera(
         )
     details = {"fields": list(changed)}
     note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
+    tell_of_camera(session, camera_id)
     session.flush()
     return view_camera(session, settings, camera_id)
 
@@ -242,6 +245,7 @@ def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
         end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
     details = {"name": record.name}
     note(session, Activity.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
+    tell_of_camera(session, camera_id, removed=True)
     session.delete(record)
 
 

@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.cameras.proposals import Proposal, proposal_of
-from service.enums import Activity, Origin
+from service.enums import Activity, Origin, PoseState
 from service.errors import ConflictError, MalformedError
-from service.notifications.events import tell_proposed
+from service.notifications.events import tell_of_camera
 from service.store import cameras
 
 
@@ -57,5 +57,5 @@ def keep_hints(session: Session, camera_id: str, kept: list[dict[str, Any]]) -> 
         )
     details = {"fields": ["hints"]}
     note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
-    tell_proposed(session, camera_id)
+    tell_of_camera(session, camera_id, state=PoseState.UNCALIBRATED)
     return view

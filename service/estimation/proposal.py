@@ -10,9 +10,9 @@ from models.geometry.intrinsics import Intrinsics
 from models.pose import SelfCalibration, self_calibrate
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from service.enums import Origin
+from service.enums import Origin, PoseState
 from service.estimation.evidence import Unpacked, walk_of
-from service.notifications.events import tell_proposed
+from service.notifications.events import tell_of_camera
 from service.references import window_of
 from service.settings import Settings
 from service.store import cameras, references, windows
@@ -83,4 +83,4 @@ def save_proposal(session: Session, camera_id: str, people: People, found: SelfC
         created_at=datetime.now(UTC),
     )
     session.merge(record)
-    tell_proposed(session, camera_id)
+    tell_of_camera(session, camera_id, state=PoseState.UNCALIBRATED)

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.wording.times import Clock
-from tests.browser.conftest import axe, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide, watched
 from tests.running import served
 from tests.service.fleet_bench import Fleet, afternoon
 
@@ -100,6 +100,26 @@ def test_a_camera_that_comes_and_one_that_goes(page, fleet, server):
     fleet.add("beta", "Beta", state="learning")
     page.locator("#row-beta").wait_for()
     assert shown(page) == ["Beta", "Alpha"]
+
+
+def test_open_pages_follow_what_is_changed_and_removed(page, fleet, server, browser):
+    """They were wrong for two minutes: no event told of it."""
+    fleet.add("alpha", "Alpha")
+    fleet.add("beta", "Beta")
+    page.goto("/")
+    page.get_by_text("Live").wait_for()
+    with watched(browser, server) as (its_page, wrong):
+        its_page.goto("/ui/cameras/beta")
+        its_page.get_by_text("Live").wait_for()
+        path, any_version = "/cameras/beta", {"If-Match": "*"}
+        server.http.patch(path, json={"name": "Bravo"}, headers=any_version).raise_for_status()
+        page.get_by_text("Bravo").wait_for()
+        its_page.get_by_role("heading", name="Bravo").wait_for()
+        server.http.delete(path, headers=any_version).raise_for_status()
+        page.locator("#row-beta").wait_for(state="detached")
+        its_page.get_by_text("there is no camera").wait_for()
+        wrong.clear()  # the browser says of the page's 404
+    assert shown(page) == ["Alpha"]
 
 
 def test_it_comes_back_by_itself_and_has_missed_nothing(page, fleet, server):

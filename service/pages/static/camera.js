@@ -17,6 +17,7 @@ for (const part of document.querySelectorAll("[data-part]")) was.set(part, part.
 /** Exchange the parts of the page that have changed; what is open stays open, focus stays. */
 async function refresh() {
   const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
+  if (answer.status === 404) return location.reload(); // somebody has removed it
   if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   document.title = fresh.title;

@@ -47,7 +47,9 @@ def told(bench):
         "pose": {name: pose[name] for name in POSE},
         "history": [{name: point[name] for name in POINT} for point in history["items"]],
         "alerts": [alert["drift"] for alert in bench.alerts()],
-        "events": [e["drift"] for kind in ("pose", "alert") for e in bench.events(kind)],
+        "events": [
+            e["drift"] for kind in ("pose", "alert") for e in bench.events(kind) if e["state"]
+        ],
         "messages": [each["payload"]["data"]["drift"] for each in deliveries],
         "metrics": [line for line in text.splitlines() if line.startswith("surefoot_camera_drift")],
         "rows": [html.unescape(re.sub(r"<[^>]*>", " ", row)) for row in rows],
