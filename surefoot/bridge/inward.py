@@ -17,6 +17,7 @@ log = logging.getLogger("surefoot.bridge")
 
 _WAIT_S = 0.5
 _TELL_S = 60.0
+_MOST_TOPICS = 10_000
 _Given = dict[str, list[Detection | Ended]]  # by source
 _given = msgspec.msgpack.Decoder(_Given)
 _states = msgspec.msgpack.Decoder(dict[str, bytes])
@@ -31,6 +32,7 @@ class Inward:
     spool: Spool
     _assemblers: dict[str, Assembler] = field(default_factory=dict)
     _told_s: float = -_TELL_S
+    _refused_s: dict[tuple[str, str], float] = field(default_factory=dict)
 
     def carry(self, stopping: threading.Event) -> None:
         """Keep what comes until the event is set.
@@ -68,8 +70,7 @@ class Inward:
             try:
                 read = self.topics.read(message.topic, message.payload)
             except MessageError as error:
-                extra = {"topic": message.topic, "code": error.code, "detail": error.detail}
-                log.warning("mqtt_message_refused", extra=extra)
+                self._tell_refused(message.topic, error)
                 continue
             if isinstance(read, Body):
                 parts.append(Part(read.camera, b"", read.content))
@@ -108,6 +109,17 @@ class Inward:
 
     def _state(self) -> bytes:
         return msgspec.msgpack.encode({name: one.state() for name, one in self._assemblers.items()})
+
+    def _tell_refused(self, topic: str, error: MessageError) -> None:
+        """Log a refusal, once a minute of a topic and code: profiles are wrong in each frame."""
+        now_s = time.monotonic()
+        if now_s - self._refused_s.get((topic, error.code), -_TELL_S) < _TELL_S:
+            return
+        if len(self._refused_s) >= _MOST_TOPICS:  # wildcards match whatever others think of
+            self._refused_s.clear()
+        self._refused_s[topic, error.code] = now_s
+        extra = {"topic": topic, "code": error.code, "detail": error.detail}
+        log.warning("mqtt_message_refused", extra=extra)
 
     def _tell_full(self) -> None:
         if time.monotonic() - self._told_s >= _TELL_S:

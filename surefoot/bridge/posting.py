@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from surefoot.bridge.backlog import Backlog
 from surefoot.bridge.service import LaterError, RefusedError, Service
 from surefoot.bridge.spool import Group, Spool
 from surefoot.bridge.values import body_of
@@ -24,6 +25,7 @@ class Posting:
 
     spool: Spool
     service: Service
+    _backlog: Backlog = field(default_factory=Backlog)
     _held: dict[int, tuple[float, float]] = field(default_factory=dict)  # again at, then after, s
 
     def run(self, stopping: threading.Event) -> None:
@@ -47,12 +49,14 @@ class Posting:
             resting = [number for number, (again_s, _) in self._held.items() if again_s > now_s]
             group = self.spool.next(resting, self._held)
             if group is None:
+                if not self._held:
+                    self._backlog.end(time.time())
                 return None
             try:
                 self._post(group)
             except LaterError as error:
-                extra = {"camera_id": group.camera, "reason": str(error)}
-                log.warning("tracks_wait", extra={**extra, "waiting": self.spool.waiting})
+                told = {"camera_id": group.camera, "reason": str(error)}
+                self._backlog.tell(time.time(), **told, waiting=self.spool.waiting)
                 if error.away or len(self._held) + len(group.tracks) > MOST_HELD:
                     return error.wait_s or 0.0
                 self._hold(group, now_s)
