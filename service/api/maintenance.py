@@ -1,9 +1,9 @@
 """`/cameras/{id}/maintenance`: when somebody is at a camera."""
 
 from datetime import UTC, datetime
-from typing import Self
+from typing import Annotated, Self
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.api.ignored import NamingRoute
@@ -119,6 +119,12 @@ def change(
 
 
 @router.delete("/{window_id}", status_code=204)
-def end(camera_id: str, window_id: str, state: StateDep, session: WriteDep) -> None:
+def end(
+    camera_id: str,
+    window_id: str,
+    state: StateDep,
+    session: WriteDep,
+    by: Annotated[Who | None, Query(description="who ends it")] = None,
+) -> None:
     """End a window now, or take back one that has not begun."""
-    maintenance.end_window(session, state.queue, camera_id, window_id)
+    maintenance.end_window(session, state.queue, camera_id, window_id, by)

@@ -103,7 +103,9 @@ def change_window(
     return record
 
 
-def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str) -> None:
+def end_window(
+    session: Session, queue: JobQueue, camera_id: str, window_id: str, by: str | None
+) -> None:
     """End a window that is under way, or take back one that has not begun; its plan stays kept.
 
     Raises:
@@ -115,10 +117,10 @@ def end_window(session: Session, queue: JobQueue, camera_id: str, window_id: str
     if record.until <= now:
         raise ConflictError(f"to: the window ended at {record.until.isoformat()} already")
     if record.from_at >= now:
-        _note(session, Activity.MAINTENANCE_WITHDRAWN, record, None)
+        _note(session, Activity.MAINTENANCE_WITHDRAWN, record, by)
         session.delete(record)
     else:
-        _note(session, Activity.MAINTENANCE_ENDED, record, None)
+        _note(session, Activity.MAINTENANCE_ENDED, record, by)
         record.ended_at = record.updated_at = now
     session.flush()
     request_estimate(session, queue, camera_id)

@@ -196,7 +196,9 @@ const ACTS = {
           : "The camera will be judged then as ever.",
       yes: state === "under way" ? "End it now" : "Take it back",
     });
-    if (yes) await put("Done.", "DELETE", `${path}/maintenance/${id}`);
+    const body = yes && (await asMe());
+    const who = body?.by ? `?by=${encodeURIComponent(body.by)}` : "";
+    if (body) await put("Done.", "DELETE", `${path}/maintenance/${id}${who}`);
   },
 
   async "still-remove"() {

@@ -141,3 +141,4 @@ def test_maintenance_and_trainings(seen, knocked):
     seen.get_by_role("button", name="End it now").click()
     seen.locator("#confirm-yes").click()
     expect(seen.locator('[data-part="maintenance"]')).to_contain_text("Over")
+    expect(seen.locator('[data-part="log"]')).to_contain_text("Ada ended the maintenance")

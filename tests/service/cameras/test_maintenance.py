@@ -71,7 +71,9 @@ def test_it_is_ended_early_taken_back_or_moved(corner):
     problem(corner.delete(url), 409, "conflict")
     problem(corner.patch(url, json={"to": at(3)}), 422, "malformed")
     assert corner.patch(url, json={"to": at(-1)}).json()["state"] == "under_way"
-    assert corner.delete(url).status_code == 204
+    assert corner.delete(url, params={"by": "Ada"}).status_code == 204
+    entries = corner.get("/activity").json()["items"]
+    assert ("maintenance.ended", "Ada") in [(each["what"], each["by"]) for each in entries]
     (left,) = corner.get(URL).json()["items"]
     assert (left["id"], left["state"]) == (window["id"], "over")
     planned = begin(corner, from_h=-1, to_h=-2)
