@@ -169,7 +169,7 @@ def test_who_follows_hears_all_of_what_happens_once_across_a_killed_service(runn
     finally:
         following.terminate()
         assert following.wait(20) == 0
-    assert {each["event"] for each in heard()} == {"training", "alert"}
+    assert {each["event"] for each in heard()} == {"pose", "training", "alert"}
     ids = [int(each["id"]) for each in heard()]
     assert ids == list(range(ids[0], ids[-1] + 1))
 
