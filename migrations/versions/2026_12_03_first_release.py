@@ -120,7 +120,7 @@ table(
     key("prior_pose_id", NUMBER, of("prior_poses.id")),
     *needed(Double, "height_m", "tilt_rad", "roll_rad"),
     *needed(JSON, "covariance", "identifiable"),
-    *needed(NUMBER, "tracks", "walking_groups", "newest_track_pk"),
+    *needed(NUMBER, "tracks", "walking_groups"),
     *needed(DateTime, "created_at"),
 )
 table(

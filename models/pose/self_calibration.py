@@ -37,16 +37,14 @@ from models.walking.speed_reference import assumed_speed_reference, channels_of,
 class SelfCalibration:
     """Tilt, roll, log height (3,) with their covariance (3, 3), by people alone.
 
-    `identifiable` names those that are known well enough to be of use. `walkers` tracks were used,
-    of `walking_groups` who walked independently; `boxes` says why statures are used or not.
+    `identifiable` names those that are known well enough to be of use, by so many people or groups
+    who walked independently.
     """
 
     values: Array
     covariance: Array
     identifiable: tuple[str, ...]
-    walkers: int
     walking_groups: int
-    boxes: str
 
     @property
     def pose(self) -> CameraPose:
@@ -108,9 +106,7 @@ class _End:
 
     log_posterior: float
     normal: Normal
-    walkers: int
     walking_groups: int
-    boxes: str
     enough: bool
 
 
@@ -138,9 +134,7 @@ def _end_of(tracks: Observations, start: Array, walk: WalkConfig, known: Normal)
     return _End(
         log_posterior=fit.log_likelihood / walking.ASSUMED_INFLATION,
         normal=Normal(mean=candidate, covariance=covariance + np.diag(walking.PLAUSIBLE_OFFSET**2)),
-        walkers=tracks.walkers,
         walking_groups=groups,
-        boxes=reference.boxes,
         enough=groups >= walking.FEWEST_GROUPS
         and (len(channels) > 1 or _across(speeds_at_end) >= config.LEAST_ACROSS),
     )
@@ -177,9 +171,7 @@ def _mixed(ends: Sequence[_End]) -> SelfCalibration:
         values=middle,
         covariance=covariance,
         identifiable=tuple(name for name, sure in named if sure),
-        walkers=best.walkers,
         walking_groups=best.walking_groups,
-        boxes=best.boxes,
     )
 
 

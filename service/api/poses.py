@@ -97,9 +97,10 @@ class DriftOut(SdOut):
 
 
 class ProposedOut(BaseModel):
-    """The pose that people told of a camera without a prior pose, and standard deviations.
+    """The pose that people and hints tell of a camera without a prior pose, with its deviations.
 
-    It can be `agreed` to where they tell enough. It is over the world's origin and has no heading.
+    It can be agreed to where they tell enough. Unless two points of a map tell where it stands, it
+    is over the world's origin and heads along its Y.
     """
 
     pose: PoseOut

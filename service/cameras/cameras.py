@@ -217,7 +217,7 @@ def change_camera(
         prior = cameras.prior_pose(session, camera_id)
         pose, origin = change.prior_pose or prior.pose, Origin.CHANGED
         given: Sequence[str] = ()
-        if change.prior_pose is None and prior.origin == Origin.ASSUMED:
+        if change.prior_pose is None and prior.assumed:
             origin, given = Origin.ASSUMED, prior.given
         renew_prior_pose(
             session, queue, settings, camera_id, pose, origin, from_s=from_s, by=None, given=given
@@ -325,7 +325,7 @@ def _views(
         CameraView(
             record=record,
             prior_pose=prior.pose,
-            calibrated=prior.origin != Origin.ASSUMED,
+            calibrated=not prior.assumed,
             tracks=counts.get(record.id, 0),
             model_id=model_id,
             state=statuses[record.id].state,

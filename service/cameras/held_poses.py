@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import PARAMETERS, CameraPose
 from models.geometry.propagation import restricted
 from models.geometry.rotation import Array
-from service.enums import Origin, PoseState
+from service.enums import PoseState
 from service.store import alerts, cameras, estimates
 from service.store.cameras import PriorPoseRecord
 from service.store.estimates import EstimateRecord
@@ -54,7 +54,7 @@ def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> H
     """
     at = at or datetime.now(UTC)
     prior = cameras.prior_pose_at(session, camera_id, at)
-    if prior.origin == Origin.ASSUMED:
+    if prior.assumed:
         return _held(prior, since=prior.created_at)
     drift = alerts.drift_at(session, camera_id, at)
     if drift is None:
@@ -97,5 +97,5 @@ def _held(
         own=own if names else None,
         prior=None if prior.covariance is None else _four(prior.covariance),
         prior_pose_id=prior.id,
-        assumed=prior.origin == Origin.ASSUMED,
+        assumed=prior.assumed,
     )

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.cameras.proposals import Proposal, proposal_of
-from service.enums import Activity, Origin, PoseState
+from service.enums import Activity, PoseState
 from service.errors import ConflictError, MalformedError
 from service.notifications.events import tell_of_camera
 from service.store import cameras
@@ -29,11 +29,11 @@ def view_hints(session: Session, camera_id: str) -> HintsView:
     Raises:
         NotFoundError: there is no such camera.
     """
-    camera = require_camera(session, camera_id)
+    lens = require_camera(session, camera_id).intrinsics
     prior = cameras.prior_pose(session, camera_id)
-    if prior.origin != Origin.ASSUMED:
+    if not prior.assumed:
         return HintsView(kept=(), proposed=None)
-    return HintsView(kept=prior.hints, proposed=proposal_of(session, prior, camera.intrinsics))
+    return HintsView(kept=prior.hints, proposed=proposal_of(session, prior, lens))
 
 
 def keep_hints(session: Session, camera_id: str, kept: list[dict[str, Any]]) -> HintsView:
@@ -44,18 +44,17 @@ def keep_hints(session: Session, camera_id: str, kept: list[dict[str, Any]]) -> 
         ConflictError: it has a prior pose.
         MalformedError: they fit no pose.
     """
-    require_camera(session, camera_id)
+    lens = require_camera(session, camera_id).intrinsics
     prior = cameras.prior_pose(session, camera_id)
-    if prior.origin != Origin.ASSUMED:
+    if not prior.assumed:
         raise ConflictError("hints: the camera has a prior pose already")
     prior.hints = kept
-    session.flush()
-    view = view_hints(session, camera_id)
-    if kept and (view.proposed is None or view.proposed.off_sd is None):
+    proposed = proposal_of(session, prior, lens)
+    if kept and (proposed is None or proposed.off_sd is None):
         raise MalformedError.of_field(
             "hints", "they fit no pose: one that should be on the ground is above the horizon"
         )
     details = {"fields": ["hints"]}
     note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
     tell_of_camera(session, camera_id, state=PoseState.UNCALIBRATED)
-    return view
+    return HintsView(kept=kept, proposed=proposed)

@@ -15,7 +15,7 @@ from service.cameras.cameras import no_camera, require_camera
 from service.cameras.proposals import Proposal, proposal_of
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
-from service.enums import Origin, PoseState
+from service.enums import PoseState
 from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import wanted_tracks, window_beside
@@ -61,7 +61,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     camera, prior, model_id = set_up
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
     reference = reference_views(session, settings, {camera_id: status})[camera_id]
-    pose, calibrated = prior.pose, prior.origin != Origin.ASSUMED
+    pose, calibrated = prior.pose, not prior.assumed
     proposed = None if calibrated else proposal_of(session, prior, camera.intrinsics)
     reasons = _reasons_of(session, settings, status, reference, proposed)
     if proposed is not None:

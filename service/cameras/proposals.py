@@ -1,6 +1,5 @@
 """The pose that is proposed for a camera without a prior pose: by its people, and by hints."""
 
-import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.errors import DegenerateGeometryError
-from models.geometry.hints import Hint, HintedPose, HintKind, with_hints
+from models.geometry.hints import Hint, HintKind, with_hints
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
@@ -52,31 +51,34 @@ def proposal_of(
     hints = [hint_of(each) for each in prior.hints]
     if people is None and not hints:
         return None
-    mean, covariance = _known(prior, people)
-    hinted = None
+    mean, known = _known(prior, people)
+    off_sd: tuple[float, ...] | None
     try:
-        hinted = with_hints(mean, covariance, hints, intrinsics)
+        found = with_hints(mean, known, hints, intrinsics)
+        off_sd = found.off_sd
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         if people is None:
             return None
-    pose = CameraPose(height_m=math.exp(mean[2]), tilt_rad=float(mean[0]), roll_rad=float(mean[1]))
-    identifiable = () if people is None else tuple(people.identifiable)
-    heading: dict[str, float] = {}
-    if hinted is not None and hints:
-        pose, covariance = hinted.pose, hinted.covariance[:3, :3]
-        heading = _heading_sd(hinted)
-        sd = np.sqrt(np.diag(covariance))
-        named = zip(PLANE_PARAMETERS, sd <= AGREED_SD, strict=True)
-        identifiable = tuple(name for name, known in named if known)
-    tilt, roll, log_height = np.sqrt(np.diag(covariance)).tolist()
+        hints, off_sd = [], None
+        found = with_hints(mean, known, hints, intrinsics)
+    sd = np.sqrt(np.diag(found.covariance))
+    if hints or people is None:
+        named = zip(PLANE_PARAMETERS, sd[:3] <= AGREED_SD, strict=True)
+        identifiable = tuple(name for name, known_well in named if known_well)
+    else:
+        identifiable = tuple(people.identifiable)
+    pose, (tilt, roll, log_height, heading) = found.pose, sd[:4].tolist()
+    by_name = {"tilt_rad": tilt, "roll_rad": roll, "height_m": pose.height_m * log_height}
+    if heading > 0:  # a map tells it
+        by_name["heading_rad"] = heading
     return Proposal(
         pose=pose,
-        covariance=covariance.tolist(),
-        sd={"height_m": pose.height_m * log_height, "tilt_rad": tilt, "roll_rad": roll, **heading},
+        covariance=found.covariance[:3, :3].tolist(),
+        sd=by_name,
         identifiable=identifiable,
         tracks=0 if people is None else people.tracks,
         walking_groups=0 if people is None else people.walking_groups,
-        off_sd=None if hinted is None else hinted.off_sd,
+        off_sd=off_sd,
         updated_at=prior.created_at if people is None else people.created_at,
     )
 
@@ -100,8 +102,3 @@ def _known(prior: PriorPoseRecord, people: ProposedPoseRecord | None) -> tuple[A
     told = len(people.identifiable) == len(PLANE_PARAMETERS)
     covariance = np.array(people.covariance) * (1.0 if told else _UNTOLD)
     return plane_parameters_of(people.pose), covariance
-
-
-def _heading_sd(hinted: HintedPose) -> dict[str, float]:
-    variance = float(hinted.covariance[3, 3])
-    return {"heading_rad": math.sqrt(variance)} if variance > 0 else {}

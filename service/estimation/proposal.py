@@ -10,7 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.pose import SelfCalibration, self_calibrate
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
-from service.enums import Origin, PoseState
+from service.enums import PoseState
 from service.estimation.evidence import Unpacked, walk_of
 from service.notifications.events import tell_of_camera
 from service.references import window_of
@@ -21,17 +21,13 @@ from service.store.cameras import CameraRecord, ProposedPoseRecord
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class People:
-    """The newest people before a camera, in the order of their ends, and what was measured of it.
-
-    `newest_pk` is the newest of their tracks.
-    """
+    """The newest people before a camera, by their ends, and what was measured of its pose."""
 
     prior_pose_id: int
     intrinsics: Intrinsics
     walk: WalkConfig
     measured: dict[str, float]
     tracks: tuple[Trajectory, ...]
-    newest_pk: int
 
 
 def load_people(
@@ -43,7 +39,7 @@ def load_people(
     if camera is None or reference is None:
         return None
     prior = cameras.prior_pose(session, camera_id)
-    if prior.origin != Origin.ASSUMED:
+    if not prior.assumed:
         return None
     bounds = window_of(session, reference, settings)
     records = windows.window(session, bounds, unpacked.budget)
@@ -54,7 +50,6 @@ def load_people(
         walk=walk_of(camera),
         measured=prior.measured,
         tracks=tuple(unpacked.seen(record, intrinsics) for record in records),
-        newest_pk=max((record.id for record in records), default=0),
     )
 
 
@@ -79,7 +74,6 @@ def save_proposal(session: Session, camera_id: str, people: People, found: SelfC
         identifiable=list(found.identifiable),
         tracks=len(people.tracks),
         walking_groups=found.walking_groups,
-        newest_track_pk=people.newest_pk,
         created_at=datetime.now(UTC),
     )
     session.merge(record)

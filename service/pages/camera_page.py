@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.ground import Misplacement, misplacements
 from models.tracks.trajectory import Trajectory
+from service.access.tokens import Caller
 from service.alerts.alerts import list_alerts
 from service.alerts.data_gaps import DataGap, data_gap_of
 from service.api.middleware.dependencies import ReadDep, StateDep
@@ -20,7 +21,7 @@ from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
 from service.cameras.zones import ZonesView, view_zones
-from service.enums import AlertState, PoseState
+from service.enums import AlertState, PoseState, TokenScope
 from service.pages.camera_drawings import draw_camera
 from service.pages.connecting import how_to_connect
 from service.settings import Settings
@@ -189,6 +190,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     zone = state.settings.zone
     clock = Clock(now=page.now, zone=zone)
     learned = page.pose.reference
+    caller: Caller | None = request.state.caller
     proposal = page.pose.proposed
     answer = render(
         request,
@@ -213,6 +215,7 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         flags=_flags(page, clock),
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],
         connect=None if learned.ready else how_to_connect(request, state.settings, camera_id),
+        operates=caller is None or caller.may(TokenScope.OPERATE),
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,

@@ -142,6 +142,11 @@ class PriorPoseRecord(Record):
         )
 
     @property
+    def assumed(self) -> bool:
+        """True of one that nobody has said or agreed to."""
+        return self.origin == Origin.ASSUMED
+
+    @property
     def measured(self) -> dict[str, float]:
         """What was measured of a pose that is assumed."""
         return {name: getattr(self, name) for name in self.given}
@@ -164,7 +169,6 @@ class ProposedPoseRecord(Record):
     identifiable: Mapped[list[str]] = mapped_column(JSON)
     tracks: Mapped[int]
     walking_groups: Mapped[int]
-    newest_track_pk: Mapped[int]
     created_at: Mapped[datetime]
 
     @property

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import angle_between
-from service.enums import Origin, TrainingState
+from service.enums import TrainingState
 from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store import cameras, trainings
@@ -107,7 +107,7 @@ def _why_train(session: Session, camera: CameraRecord, steps: StepWatch) -> str 
     if trainings.unfinished(session, camera.id):
         return None
     prior = cameras.prior_pose(session, camera.id)
-    if prior.origin == Origin.ASSUMED:
+    if prior.assumed:
         return None
     ended_in_vain = (TrainingState.FAILED, TrainingState.CANCELLED)
     for newest in trainings.of_camera(session, camera.id, 1):

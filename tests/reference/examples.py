@@ -290,7 +290,7 @@ def _agree(run: _Run, said: Any) -> None:
                 **{"height_m": 5.8, "tilt_rad": 0.4, "roll_rad": 0.0},
                 covariance=[[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-3]],
                 identifiable=["tilt", "roll", "height"],
-                **{"tracks": 80, "walking_groups": 61, "newest_track_pk": 1},
+                **{"tracks": 80, "walking_groups": 61},
                 created_at=run.begun,
             )
         )

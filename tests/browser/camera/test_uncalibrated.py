@@ -15,6 +15,16 @@ from tests.service.street import LENS, PRIOR, Street
 pytestmark = pytest.mark.slow
 
 
+def people_tell(server):
+    """Have 60 people walk past the camera, and a look at them."""
+    street = Street(server.http, server.settings)
+    try:
+        street.keep_to_lanes(PRIOR, 60)
+        run_estimate(street.context, "corner")
+    finally:
+        street.close()
+
+
 @pytest.fixture
 def expect():
     return pytest.importorskip("playwright.sync_api").expect
@@ -33,12 +43,7 @@ def test_a_lens_is_registered_people_tell_the_pose_and_somebody_agrees(server, e
     page.wait_for_url(re.compile(URL))
     expect(page.locator("section[data-state]")).to_have_attribute("data-state", "unconnected")
 
-    street = Street(server.http, server.settings)
-    try:
-        street.keep_to_lanes(PRIOR, 60)
-        run_estimate(street.context, "corner")
-    finally:
-        street.close()
+    people_tell(server)
     proposed = page.locator("[data-part=proposed]")
     expect(proposed).to_contain_text("60 tracks")
     expect(page.locator("section[data-state]")).to_have_attribute("data-state", "uncalibrated")
@@ -58,12 +63,7 @@ def waiting(server, empty, page, expect):
     """The page of a camera that 60 people have told of."""
     bare = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
     server.http.post("/cameras", json=bare).raise_for_status()
-    street = Street(server.http, server.settings)
-    try:
-        street.keep_to_lanes(PRIOR, 60)
-        run_estimate(street.context, "corner")
-    finally:
-        street.close()
+    people_tell(server)
     page.goto(URL)
     return page
 
