@@ -17,6 +17,7 @@ from service.formats.zones_frigate import frigate_slots, frigate_template
 from service.formats.zones_geojson import geojson_slots, geojson_template
 
 _MOST_YAML = 64 * 1024  # bytes: PyYAML holds every thread up meanwhile
+_DEEPEST = 32  # levels; Frigate's have seven
 JSON_TYPE, YAML_TYPE = "application/json", "application/yaml"
 GEOJSON_TYPE, AXIS_TYPE = "application/geo+json", "application/vnd.surefoot.axis-zones+json"
 
@@ -108,13 +109,27 @@ def parsed(body: bytes, media_type: str) -> Any:
         if len(body) > _MOST_YAML:
             words = f"at most {_MOST_YAML} bytes of YAML are taken, got {len(body)}"
             raise TooLargeError(f"body: {words}")
-        # A few hundred bytes of aliases are gigabytes once they are written out.
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(body)):
-            raise ValueError("aliases are not taken")
-        return _plain(yaml.safe_load(body))
+        _check_yaml(body)
+        return _plain(yaml.load(body, Loader=yaml.CSafeLoader))
     except (ValueError, TypeError, RecursionError, yaml.YAMLError) as error:
         what = "YAML with keys that are text" if media_type == YAML_TYPE else "JSON"
         raise MalformedError(f"body: {what} is needed, {str(error):.100}") from error
+
+
+def _check_yaml(body: bytes) -> None:
+    """Refuse what is small as text alone.
+
+    A few hundred bytes of aliases are gigabytes once they are written out, and brackets within
+    brackets take the square of their number: 64 KiB of them half an hour.
+    """
+    depth = 0
+    for event in yaml.parse(body, Loader=yaml.CSafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError("aliases are not taken")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise ValueError(f"at most {_DEEPEST} levels are taken")
 
 
 def _plain(value: Any) -> Any:
