@@ -73,6 +73,7 @@ class AlertKind(StrEnum):
     UNSURE = "unsure"
     STALE = "stale"
     TRACKER = "tracker"
+    PICTURE = "picture"
 
 
 class AlertState(StrEnum):
@@ -91,6 +92,7 @@ class AlertSource(StrEnum):
     UPKEEP = "upkeep"
     GROUP = "group"
     TRACKS = "tracks"
+    PICTURE = "picture"
 
 
 class Severity(StrEnum):

@@ -158,8 +158,9 @@ class Settings(BaseSettings):
     )
     keep_events: int = Field(10_000, ge=1, description="events kept for /events to resume from")
 
-    snapshots: bool = Field(
-        False, description="keep a still image of a camera that somebody uploads for its page"
+    snapshots: Literal["off", "features", "pictures"] = Field(
+        "off",
+        description="still images of cameras, as a second witness: `features` keeps none of them",
     )
 
     webhook_allow: Networks = Field(

@@ -23,7 +23,7 @@ TABLES = sa.MetaData(
 )
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
-ALERT_KINDS = "drift no_data clock unsure stale tracker"
+ALERT_KINDS = "drift no_data clock unsure stale tracker picture"
 OUTCOMES = "put_back accepted false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.removed pose.agreed pose.accepted pose.put_back "
@@ -129,7 +129,31 @@ table(
     *needed(LargeBinary, "jpeg"),
     *needed(String(64), "sha256"),
     *needed(NUMBER, "width", "height"),
-    *needed(DateTime, "stored_at"),
+    *needed(DateTime, "taken_at", "stored_at"),
+    *optional(DateTime, "compared_at"),
+)
+table(
+    "picture_references",
+    key("id", NUMBER),
+    camera(),
+    prior_pose(),
+    *needed(LargeBinary, "features"),
+    *needed(DateTime, "taken_at"),
+    Index(None, "camera_id", "id"),
+)
+table(
+    "pictures",
+    key("camera_id", String(64), of("cameras.id")),
+    prior_pose(),
+    *needed(DateTime, "taken_at", "stored_at"),
+    *needed(String(64), "digest"),
+    *needed(DateTime, "same_since"),
+    *optional(JSON, "turn", "covariance"),
+    *optional(Double, "zoom", "zoom_sd"),
+    *needed(Boolean, "shifted"),
+    *optional(Double, "moved"),
+    *optional(Boolean, "has_moved"),
+    *optional(DateTime, "other_at"),
 )
 table(
     "zones",
@@ -307,7 +331,7 @@ table(
     *optional(String, "resolved_by", "outcome", "note"),
     one_of("kind", ALERT_KINDS),
     one_of("state", "firing resolved"),
-    one_of("source", "estimate reference rhythm upkeep group tracks"),
+    one_of("source", "estimate reference rhythm upkeep group tracks picture"),
     one_of("severity", "warning critical"),
     one_of("outcome", OUTCOMES),
     unique_where("uq_alerts_firing", "state = 'firing'", "camera_id", "kind"),

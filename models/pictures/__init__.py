@@ -1,1 +1,21 @@
-"""A camera's turn by two of its pictures, and what else a picture tells."""
+"""A camera's turn by two of its pictures, and what else a picture tells.
+
+What the rest of the house asks of it stands here.
+"""
+
+from models.pictures.features import Features, describe
+from models.pictures.gallery import best_turn, renewed
+from models.pictures.health import PictureFault, judge
+from models.pictures.turn import Turn, turned_covariance, turned_pose
+
+__all__ = [
+    "Features",
+    "PictureFault",
+    "Turn",
+    "best_turn",
+    "describe",
+    "judge",
+    "renewed",
+    "turned_covariance",
+    "turned_pose",
+]

@@ -44,7 +44,7 @@ from models.pose.pose_fit import (
 from models.pose.power import PEOPLE, smallest_told
 from models.pose.self_calibration import SelfCalibration, self_calibrate
 from models.pose.site import CameraSite, assume_site, learn_site
-from models.pose.states import WindowState, state_of
+from models.pose.states import WindowState, is_site_changed, state_of
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -106,6 +106,7 @@ __all__ = [
     "self_calibrate",
     "since_alarm",
     "smallest_told",
+    "is_site_changed",
     "state_of",
     "WindowState",
     "observe_walks",

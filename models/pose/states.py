@@ -39,13 +39,19 @@ def state_of(
     if drifting:
         return WindowState.DRIFTING
     if posterior.pictured and posterior.moved < LIKELY:
-        otherwise = fused.paths_changed or posterior.site_changed >= LIKELY
-        return WindowState.SITE_CHANGED if otherwise else WindowState.OK
+        changed = is_site_changed(posterior, fused)
+        return WindowState.SITE_CHANGED if changed else WindowState.OK
     if fused.paths_changed and not posterior.pictured:
         return WindowState.UNSURE
     if posterior.moved >= LIKELY:
         return WindowState.SUSPECTED
     return WindowState.OK if is_noticed(posterior, fused, mapped=mapped) else WindowState.LEARNING
+
+
+def is_site_changed(posterior: PosePosterior, fused: FusedEstimate) -> bool:
+    """True where a picture says that the camera stands, and people walk elsewhere all the same."""
+    stands = posterior.pictured and posterior.moved < LIKELY
+    return stands and (fused.paths_changed or posterior.site_changed >= LIKELY)
 
 
 def is_noticed(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:

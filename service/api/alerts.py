@@ -117,9 +117,18 @@ class AlertList(BaseModel):
 
 
 class OffsetOut(BaseModel):
-    """A pose less the prior pose, or standard deviations of that."""
+    """A pose less the prior pose."""
 
     height_m: float
+    tilt_deg: float
+    roll_deg: float
+    heading_deg: float
+
+
+class OffsetSdOut(BaseModel):
+    """Standard deviations of an offset; null where nothing tells the number, as pictures height."""
+
+    height_m: float | None
     tilt_deg: float
     roll_deg: float
     heading_deg: float
@@ -161,7 +170,7 @@ class EvidenceOut(BaseModel):
     moved: float
     hypotheses: list[HypothesisOut]
     offset: OffsetOut
-    offset_sd: OffsetOut
+    offset_sd: OffsetSdOut
     registered: bool
     prior_loss_sd: float
     rivals: list[RivalOut]

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from service.api.middleware.dependencies import (
     BodyDep,
@@ -13,7 +13,7 @@ from service.api.middleware.dependencies import (
     WriteDep,
     media_type_of,
 )
-from service.api.schemas import Out
+from service.api.schemas import Moment, Out
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
 from service.store.access import set_actor
@@ -25,6 +25,7 @@ class SnapshotOut(Out):
     sha256: str
     width: int
     height: int
+    taken_at: datetime
     stored_at: datetime
 
 
@@ -51,11 +52,15 @@ def put(
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
     caller: CallerDep,
+    taken_at: Annotated[Moment | None, Query(description="now, if not given")] = None,
 ) -> SnapshotOut:
-    """Keep a still image of what the camera sees, made anew without EXIF, at most 1920 px wide."""
+    """Take a still image of what the camera sees, made anew without EXIF, at most 1920 px wide.
+
+    It is compared with the pictures before it, and kept where the settings say so.
+    """
     with state.store.write(camera_id) as session:
         set_actor(session, caller)
-        facts = snapshots.put_snapshot(session, camera_id, still)
+        facts = snapshots.put_snapshot(session, state.queue, camera_id, still, taken_at)
     return SnapshotOut.model_validate(facts)
 
 

@@ -8,11 +8,21 @@ from sqlalchemy.orm import Session, defer
 from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.enums import Activity
-from service.errors import FieldError, MalformedError, NotFoundError, SwitchedOffError
+from service.errors import (
+    ConflictError,
+    FieldError,
+    MalformedError,
+    NotFoundError,
+    SwitchedOffError,
+)
+from service.estimate_queue import request_estimate
 from service.formats.still import Still
+from service.job_queue import JobQueue
+from service.notifications.outbox import json_time
 from service.settings import Settings
-from service.store import cameras
+from service.store import cameras, pictures
 from service.store.cameras import SnapshotRecord
+from service.store.pictures import PictureRecord
 
 _OTHER_SHAPE = 0.01  # of the ratio of its sides
 
@@ -23,17 +33,25 @@ def require_snapshots(settings: Settings) -> None:
     Raises:
         SwitchedOffError: the setting says so.
     """
-    if not settings.snapshots:
+    if settings.snapshots == "off":
         raise SwitchedOffError(
-            "snapshots: this service keeps no pictures; SUREFOOT_SNAPSHOTS=true allows one a camera"
+            "snapshots: this service takes no pictures; SUREFOOT_SNAPSHOTS=pictures allows one a "
+            "camera, SUREFOOT_SNAPSHOTS=features what is read of it"
         )
 
 
-def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotRecord:
-    """Keep a still image of a camera in place of the one there was.
+def put_snapshot(
+    session: Session,
+    queue: JobQueue,
+    camera_id: str,
+    still: Still,
+    taken_at: datetime | None = None,
+) -> SnapshotRecord:
+    """Keep a still image of a camera in place of the one there was, and have it compared.
 
     Raises:
         NotFoundError: there is no such camera.
+        ConflictError: there is a newer one.
         MalformedError: it is not of the camera's shape, so nothing would lie where it belongs.
     """
     camera = require_camera(session, camera_id)
@@ -46,6 +64,10 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotReco
         raise MalformedError(f"body: {reason}", (FieldError(pointer="", reason=reason),))
     digest = hashlib.sha256(still.jpeg).hexdigest()
     now = datetime.now(UTC)
+    taken_at = min(taken_at or now, now)  # a clock that is ahead makes no picture newer than now
+    last_at = newest_at(session, camera_id)
+    if last_at is not None and taken_at < last_at:
+        raise ConflictError(f"taken_at: a newer picture is kept, of {json_time(last_at)}")
     record = session.merge(
         SnapshotRecord(
             camera_id=camera_id,
@@ -53,9 +75,13 @@ def put_snapshot(session: Session, camera_id: str, still: Still) -> SnapshotReco
             sha256=digest,
             width=still.width,
             height=still.height,
+            taken_at=taken_at,
             stored_at=now,
+            compared_at=None,
         )
     )
+    session.flush()
+    request_estimate(session, queue, camera_id)
     note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
     return record
 
@@ -82,6 +108,7 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
         NotFoundError: there is no such camera, or none of it is kept.
     """
     require_camera(session, camera_id)
+    pictures.forget(session, camera_id)
     if not cameras.remove_snapshot(session, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
@@ -89,6 +116,14 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
 
 def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord | None:
     """Size and time of a camera's still image, without reading it; None where none may be shown."""
-    if not settings.snapshots:
+    if settings.snapshots != "pictures":
         return None
     return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+
+
+def newest_at(session: Session, camera_id: str) -> datetime | None:
+    """The time of a camera's newest picture, kept or compared; None where there is none."""
+    kept = session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+    compared = session.get(PictureRecord, camera_id)
+    times = [each.taken_at for each in (kept, compared) if each is not None]
+    return max(times, default=None)

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.geometry.pose import FIELDS, PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array
-from models.pose import PEOPLE, Hypothesis
+from models.pose import PEOPLE, Hypothesis, PosePosterior
 from service.estimation.finding import Finding
 
 _HYPOTHESES = 8
@@ -23,10 +23,8 @@ def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
         "from_s": finding.tracks[0].started_s,
         "to_s": finding.tracks[-1].ended_s,
         "moved": finding.posterior.moved,
-        "hypotheses": [
-            _hypothesis(each, prior) for each in finding.posterior.likeliest(_HYPOTHESES)
-        ],
-        "offset": _offset(fused.values - array_of(prior), prior),
+        "hypotheses": hypotheses_of(finding.posterior, prior),
+        "offset": offset_of(fused.values - array_of(prior), prior),
         "offset_sd": asdict(PoseParameters.sd_of_array(fused.covariance, prior.height_m)),
         "registered": fused.registered,
         "prior_loss_sd": fused.prior_loss,
@@ -40,6 +38,11 @@ def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
         },
         "creep": None if creep is None else {"statistic": creep.statistic, "level": creep.level},
     }
+
+
+def hypotheses_of(posterior: PosePosterior, prior: CameraPose) -> list[dict[str, Any]]:
+    """The likeliest hypotheses of what moved, with their weights."""
+    return [_hypothesis(each, prior) for each in posterior.likeliest(_HYPOTHESES)]
 
 
 def rivals_of(finding: Finding) -> list[dict[str, Any]]:
@@ -66,11 +69,11 @@ def _hypothesis(each: Hypothesis, prior: CameraPose) -> dict[str, Any]:
         "moved": list(each.moved),
         "far": each.far,
         "weight": each.weight,
-        "offset": _offset(each.offset, prior),
+        "offset": offset_of(each.offset, prior),
     }
 
 
-def _offset(offset: Array, prior: CameraPose) -> dict[str, float]:
+def offset_of(offset: Array, prior: CameraPose) -> dict[str, float]:
     """An offset (4,) of tilt, roll, log height, heading, named; within half a turn."""
     tilt, roll, log_height, heading = offset.tolist()
     return {

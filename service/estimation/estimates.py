@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import (
+    LIKELY,
     Drift,
     DriftVerdict,
     charted_clock,
@@ -20,7 +21,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import drift_of, state_of
+from models.pose import WindowState, drift_of, is_site_changed, state_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
@@ -96,17 +97,24 @@ def save_estimate(
         if finding.change is not None:
             reference.window_from_s = finding.change.ended_s
             reference.changed_after_s, reference.changed_s = _change_of(evidence, finding.change)
-        history = _history(session, reference)
+        history = history_of(session, reference)
         judgement = _judge(reference, history, evidence, finding, drift, camera.frame_rate_hz)
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
-        _update_alerts(session, settings, evidence, finding, drift, judgement)
+        kept = alert_evidence(finding, evidence.prior)
+        update_alerts(session, settings, camera.id, drift, judgement, kept)
     session.add(record)
+    tell_estimate(session, record, drift)
     if finding.last is not None:
         session.merge(finding.last)
     elif (last := session.get(LastPoseRecord, reference.id)) is not None:
         session.delete(last)
+    return record
+
+
+def tell_estimate(session: Session, record: EstimateRecord, drift: Drift) -> None:
+    """Add the event of an estimate that was stored."""
     payload = {
         "camera_id": record.camera_id,
         "state": record.state,
@@ -114,7 +122,6 @@ def save_estimate(
         "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
     }
     journal.add_event(session, EventType.POSE, payload, record.created_at)
-    return record
 
 
 def _counting_reference(
@@ -132,7 +139,8 @@ def _counting_reference(
     return reference
 
 
-def _history(session: Session, reference: SiteReferenceRecord) -> History:
+def history_of(session: Session, reference: SiteReferenceRecord) -> History:
+    """The earlier findings of a camera, and what of them counts against its reference."""
     camera_id = reference.camera_id
     last = estimates.newest(session, camera_id)
     if last is not None and not made_against(reference, last):
@@ -161,8 +169,13 @@ def _judge(
     reading, creep = finding.reading, finding.creep
     if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
         reading = None
-    verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=finding.enough)
+    enough = finding.enough or finding.posterior.pictured
+    if finding.posterior.pictured and drift.move.moved < LIKELY:
+        reading = None  # people walk otherwise, before a camera that stands
+    verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=enough)
+    otherwise = is_site_changed(finding.posterior, finding.fused) and not verdict.drifting
     reasons = some(
+        Reason(code=ServiceCode.SITE_CHANGED) if otherwise else None,
         finding.fused.reason if gone else None,
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
@@ -201,9 +214,11 @@ def _state(
     none of the paths is so until some are found to walk there again.
     """
     mapped = evidence.flow is not None
-    state = PoseState(
-        state_of(finding.posterior, finding.fused, drifting=verdict.drifting, mapped=mapped)
-    )
+    found = state_of(finding.posterior, finding.fused, drifting=verdict.drifting, mapped=mapped)
+    # People walk elsewhere before a camera that stands: the reasons say so.
+    state = PoseState.OK if found is WindowState.SITE_CHANGED else PoseState(found)
+    if finding.posterior.pictured:
+        return state
     fits = finding.enough and (finding.fused.registered or not mapped)
     if history.unsure and not fits and state != PoseState.DRIFTING:
         return PoseState.UNSURE
@@ -261,16 +276,15 @@ def _at(time_s: float | None) -> datetime | None:
     return None if time_s is None else from_seconds(time_s)
 
 
-def _update_alerts(
+def update_alerts(
     session: Session,
     settings: Settings,
-    evidence: Evidence,
-    finding: Finding,
+    camera_id: str,
     drift: Drift,
     judgement: Judgement,
+    evidence: dict[str, Any],
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
-    camera_id = evidence.camera_id
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
     if not verdict.drifting:
         unsure = judgement.state == PoseState.UNSURE
@@ -286,7 +300,7 @@ def _update_alerts(
                 identifiable_drift(drift),
                 None,
                 reasons=judgement.reasons,
-                evidence=alert_evidence(finding, evidence.prior),
+                evidence=evidence,
             )
         return
     # What was named a clock fault stays one until an angle has drifted too.
@@ -306,7 +320,7 @@ def _update_alerts(
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
             changed_after=judgement.after,
-            evidence=alert_evidence(finding, evidence.prior),
+            evidence=evidence,
         )
 
 
@@ -358,6 +372,8 @@ def _raw(finding: Finding) -> dict[str, Any]:
         raw["registered"] = {**_plane(registered), **heading}
     if averaged is not None:
         raw["averaged"] = {**_plane(averaged.value), "tracks": averaged.tracks}
+    if finding.picture is not None:
+        raw["picture"] = finding.picture.raw
     return raw
 
 

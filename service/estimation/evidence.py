@@ -15,6 +15,7 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
+from service.estimation.pictures import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
@@ -172,7 +173,7 @@ class Evidence:
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
-    estimate before ended.
+    estimate before ended, `picture` what the newest picture says.
     """
 
     camera_id: str
@@ -193,6 +194,7 @@ class Evidence:
     predictions: tuple[PredictionRecord, ...]
     before: npt.NDArray[np.int64] | None = None
     last: LastPoseRecord | None = None
+    picture: SeenPicture | None = None
 
 
 def load_evidence(
@@ -219,7 +221,8 @@ def load_evidence(
         newest=True,
     )
     records, model = gathered.records, trainings.newest_model(session, camera_id)
-    if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records):
+    picture = seen_picture(session, settings, reference)
+    if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records, picture):
         return None
     kept = session.get(FlowMapRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
@@ -254,6 +257,7 @@ def load_evidence(
         predictions=tuple(rows),
         before=gathered.before,
         last=session.get(LastPoseRecord, reference.id),
+        picture=picture,
     )
 
 
@@ -269,12 +273,15 @@ def _is_news(
     reference: SiteReferenceRecord,
     model: ModelRecord | None,
     records: Sequence[StoredTrack],
+    picture: SeenPicture | None,
 ) -> bool:
-    """True where the last estimate was of other tracks, another model or another reference."""
+    """True where the last estimate was of others: tracks, a picture, a model, a reference."""
     last = estimates.newest(session, reference.camera_id)
     if last is None or last.reference_id != reference.id:
         return True
     if reference.ready_at is not None and not made_against(reference, last):
+        return True
+    if picture is not None and not picture.was_told(last):
         return True
     seen = (None if model is None else model.id, max(r.id for r in records), len(records))
     return (last.model_id, last.newest_track_pk, last.tracks) != seen

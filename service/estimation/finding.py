@@ -50,6 +50,7 @@ from models.regression.averaging import (
 from models.walking.config import FEWEST_WALKERS
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import MOST_PIECES, Evidence, SeenTrack
+from service.estimation.pictures import SeenPicture
 from service.reasons import Reasons, ServiceCode
 from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord
@@ -103,6 +104,7 @@ class Finding:
     tracks after the change, or of all where these are too few; None where there is no chart. Where
     it alarms and the pose does not rule it out, the `tracks` are those that it is of. `creep` is
     what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
+    `picture` is the newest one, whether or not it counts beside the tracks.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """
@@ -117,6 +119,7 @@ class Finding:
     creep: Creep | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    picture: SeenPicture | None = None
     pieces: Reason | None = None
     failures: Reasons = ()
     last: LastPoseRecord | None = None
@@ -166,6 +169,9 @@ def compute_finding(
     found = replace(found, moved_prior=moved_prior)
     judged = partial(since_alarm, found, observed, site, reading)
     found = failures.unless_failed("chart", judged) or found
+    picture = _picture_of(evidence, found, reading)
+    if picture is not None:  # it speaks of the same as the chart, by which the prior may be raised
+        found = replace(found, moved_prior=moved_prior, picture=picture.evidence)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     return Finding(
@@ -179,10 +185,23 @@ def compute_finding(
         creep=creep,
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
+        picture=evidence.picture,
         pieces=walks.reason,
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
     )
+
+
+def _picture_of(
+    evidence: Evidence, found: PoseFinding, reading: ChartResult | None
+) -> SeenPicture | None:
+    """The newest picture, where it counts beside all tracks that the pose may be judged by."""
+    first = found.first
+    if reading is not None and reading.moved:
+        first = max(first, reading.track_idx)
+    ended_s = [track.ended_s for track in evidence.tracks[first:]]
+    picture = evidence.picture
+    return picture if picture is not None and picture.counts(ended_s) else None
 
 
 def _power(found: PoseFinding, site: CameraSite) -> Array:

@@ -171,7 +171,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
         zones=view_zones(session, camera_id),
-        snapshots_allowed=settings.snapshots,
+        snapshots_allowed=settings.snapshots == "pictures",
         newest_event_id=newest_event_id,
     )
 

@@ -370,7 +370,9 @@ class SnapshotRecord(Record):
     sha256: Mapped[str] = mapped_column(String(64))
     width: Mapped[int]
     height: Mapped[int]
+    taken_at: Mapped[datetime]
     stored_at: Mapped[datetime]
+    compared_at: Mapped[datetime | None]
 
 
 def remove_snapshot(session: Session, camera_id: str) -> bool:

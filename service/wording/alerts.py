@@ -16,6 +16,7 @@ KINDS = {
     AlertKind.NO_DATA: "No people come",
     AlertKind.STALE: "Its estimate fails or lacks tracks",
     AlertKind.TRACKER: "Another tracker posts",
+    AlertKind.PICTURE: "Its picture is not as it should be",
 }
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",

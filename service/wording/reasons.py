@@ -265,6 +265,17 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ServiceCode.LAST_IDENTIFIABLE: "when it was last told:",
     ServiceCode.MAINTENANCE: _maintenance,
     ServiceCode.WITHOUT_PART: lambda v: f"without the {v['part'].replace('_', ' ')}: {v['why']}",
+    ServiceCode.BY_PICTURE: "by a picture of {taken_at}, nobody having walked by since",
+    ServiceCode.SITE_CHANGED: (
+        "the picture says that it stands, and people walk elsewhere: the site changed"
+    ),
+    ServiceCode.PICTURE_FROZEN: "the same picture for {unchanged_s_in_h:.1f} h",
+    ServiceCode.PICTURE_BLACK: "its picture is black",
+    ServiceCode.PICTURE_BLINDED: "it is blinded: far more of its picture is white than ever",
+    ServiceCode.PICTURE_COVERED: "something covers its view",
+    ServiceCode.PICTURE_DEFOCUSED: "its picture is out of focus",
+    ServiceCode.PICTURE_UPSIDE_DOWN: "its picture is upside down",
+    ServiceCode.PICTURE_OTHER_SCENE: "its picture is of another scene: covered, or turned far",
     ServiceCode.SILENT_USUAL: _silent,
     ServiceCode.SILENT_UNUSUAL: _silent,
     ServiceCode.SILENT_UNKNOWN: (

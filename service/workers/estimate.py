@@ -26,7 +26,10 @@ from service.estimation.learning import (
     save_progress,
     save_reference,
 )
+from service.estimation.picture_estimates import save_by_picture
+from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
+from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
@@ -67,6 +70,7 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
             end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=left_out_by(budget))
         return
+    failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
         failures.add("averaged estimate", missing)
@@ -81,15 +85,35 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
     with store.write(camera_id) as session:
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
-            if record is not None:
-                fields = {"tracks": record.tracks, "state": record.state}
-                log.info("estimate_stored", extra={"camera_id": camera_id, **fields})
+            _log_estimate(record)
+        if finding is None or (evidence is not None and evidence.site is None):
+            _log_estimate(save_by_picture(session, settings, camera_id))
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
         end_look(
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
     _grow_unless_failed(context, camera_id, unpacked)
+
+
+def _log_estimate(record: EstimateRecord | None) -> None:
+    if record is not None:
+        fields = {"tracks": record.tracks, "state": record.state}
+        log.info("estimate_stored", extra={"camera_id": record.camera_id, **fields})
+
+
+def compare_if_due(context: JobContext, camera_id: str) -> None:
+    """Compare a camera's newest picture with its gallery, where nobody has yet."""
+    with context.store.read() as session:
+        new = load_picture(session, context.settings, camera_id)
+    if new is None:
+        return
+    compared = compare(new)
+    with context.store.write(camera_id) as session:
+        kept = save_picture(session, context.settings, new, compared)
+    if kept:
+        fields = {"matched": compared.record.offset is not None, "fault": compared.fault}
+        log.info("picture_compared", extra={"camera_id": camera_id, **fields})
 
 
 def propose_if_uncalibrated(context: JobContext, camera_id: str, unpacked: Unpacked) -> bool:

@@ -29,7 +29,7 @@ def started(folder, migrated, **changes):
         data_dir=folder / "data",
         workers=0,
         port=free_port(),
-        snapshots=True,
+        snapshots="pictures",
         allowed_hosts="cameras.test",
         caller_rate=0,
         **changes,

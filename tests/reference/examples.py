@@ -149,7 +149,7 @@ def _run() -> Iterator[_Run]:
         settings = Settings(
             data_dir=Path(folder) / "data",
             workers=0,
-            snapshots=True,
+            snapshots="pictures",
             webhook_allow="203.0.113.0/24",
             allowed_hosts="testserver",
             worker_lost_s=1e6,

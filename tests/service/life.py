@@ -71,7 +71,7 @@ class Life:
             data_dir=folder / "data",
             epochs=1,
             window_tracks=20,
-            snapshots=True,
+            snapshots="pictures",
             group_cameras=2,
             keep_days=20.0,
         )

@@ -73,7 +73,7 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
     expect = pytest.importorskip("playwright.sync_api").expect
     Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")
     Image.new("L", (720, 1280)).save(tmp_path / "upright.png")
-    with served(tmp_path, migrated, snapshots=True, window_tracks=20) as server:
+    with served(tmp_path, migrated, snapshots="pictures", window_tracks=20) as server:
         server.http.post("/cameras", json=CAMERA).raise_for_status()
         bench = Bench(server.http, server.settings)
         for _ in range(3):

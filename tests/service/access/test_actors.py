@@ -16,7 +16,7 @@ from tests.service.bench import Bench, moved
 @pytest.fixture
 def closed(settings):
     """The application with access on, asked by ada, who may do everything."""
-    on = settings.model_copy(update={"auth": "on", "snapshots": True})
+    on = settings.model_copy(update={"auth": "on", "snapshots": "pictures"})
     store = Store(on)
     with store.write() as session:
         made = tokens.make_token(session, TokenSpec(name="ada", scopes=("admin", "ingest")), None)

@@ -82,7 +82,7 @@ def failures_of(recorder):
 def watched(settings):
     changed = settings.model_copy(
         update={
-            "snapshots": True,
+            "snapshots": "pictures",
             "webhook_allow": "127.0.0.0/8",
             "worker_lost_s": 1e6,
             "caller_rate": 0,

@@ -27,7 +27,7 @@ def image(width=1280, height=720, form="JPEG", mode="RGB", **how):
 @pytest.fixture
 def allowed(settings):
     with TestClient(
-        create_app(settings.model_copy(update={"snapshots": True, "http_wait_s": 1}))
+        create_app(settings.model_copy(update={"snapshots": "pictures", "http_wait_s": 1}))
     ) as client:
         assert client.post("/cameras", json=CAMERA).status_code == 201
         yield client

@@ -1,0 +1,130 @@
+"""The estimate by a picture alone: of a camera that nobody has walked by since, or ever."""
+
+import math
+from dataclasses import asdict
+from datetime import UTC, datetime
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from models.geometry.pose import PoseParameters
+from models.monitoring.verdict import LIKELY, judge, pose_after, reason_of_drift
+from models.pose import PosePosterior, posterior_by_picture
+from models.reasons import Reason
+from service.enums import PoseState
+from service.estimation.alert_evidence import hypotheses_of, offset_of
+from service.estimation.estimates import Judgement, history_of, tell_estimate, update_alerts
+from service.estimation.pictures import SeenPicture, drift_by_picture, seen_picture
+from service.notifications.outbox import json_time
+from service.reasons import ServiceCode, some
+from service.references import drift_limits
+from service.settings import Settings
+from service.store import cameras, estimates, references, tracks
+from service.store.estimates import EstimateRecord
+from service.store.pictures import PictureRecord
+from service.wording.times import from_seconds
+
+
+def save_by_picture(session: Session, settings: Settings, camera_id: str) -> EstimateRecord | None:
+    """Judge a camera by its newest picture; None where there is none, or it was judged already."""
+    reference = references.newest_if_any(session, camera_id)
+    if reference is None:
+        return None
+    picture = seen_picture(session, settings, reference)
+    last = estimates.newest(session, camera_id)
+    if picture is None or picture.evidence is None or picture.was_told(last):
+        return None
+    prior = cameras.prior_pose(session, camera_id).pose
+    posterior = posterior_by_picture(prior, picture.evidence, settings.moved_prior)
+    drift, limits = drift_by_picture(posterior), drift_limits(settings)
+    history = history_of(session, reference)
+    drifted = history.drifted
+    if drifted and last is not None and last.reference_id == reference.id:
+        drifted = tuple(last.drifted)  # while it learns, too, by pictures alone
+    verdict = judge(drift, limits, drifted)
+    if reference.ready_at is None and not verdict.drifting and not drifted:
+        return None  # it learns what is usual, and stands
+    state = PoseState.SUSPECTED if posterior.moved >= LIKELY else PoseState.OK
+    taken_at = from_seconds(picture.taken_s)
+    by = Reason(code=ServiceCode.BY_PICTURE, values={"taken_at": json_time(taken_at)})
+    judgement = Judgement(
+        state=PoseState.DRIFTING if verdict.drifting else state,
+        reasons=some(by, reason_of_drift(drift, verdict, limits)),
+        verdict=verdict,
+        after=_stood_at(session, camera_id) if verdict.drifting else None,
+        since=taken_at if verdict.drifting else None,
+    )
+    if verdict.drifting and drifted and last is not None:
+        judgement = _begun(judgement, last)
+    record = EstimateRecord(
+        camera_id=camera_id,
+        prior_pose_id=reference.prior_pose_id,
+        reference_id=reference.id,
+        state=judgement.state,
+        reasons=judgement.reasons,
+        identifiable=list(drift.identifiable),
+        pose=PoseParameters.of_pose(pose_after(drift, prior)),
+        pose_sd=drift.sd,
+        covariance=posterior.covariance.tolist(),
+        drift_by=drift.by,
+        drift_angle_rad=drift.angle_rad,
+        suspected=False,
+        drift_streak=verdict.streak,
+        drifted=list(verdict.drifted),
+        moved=drift.move.moved,
+        moved_parameters=dict(drift.move.parameters),
+        rivals=[],
+        would_notice={},
+        drift_after=judgement.after,
+        drift_since=judgement.since,
+        raw={"picture": picture.raw},
+        tracks=0,
+        from_s=picture.taken_s,
+        to_s=picture.taken_s,
+        newest_track_pk=tracks.newest_pk(session, camera_id) or 0,
+        created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
+    )
+    update_alerts(session, settings, camera_id, drift, judgement, _evidence(posterior, picture))
+    session.add(record)
+    tell_estimate(session, record, drift)
+    return record
+
+
+def _stood_at(session: Session, camera_id: str) -> datetime | None:
+    found = session.get(PictureRecord, camera_id)
+    return None if found is None else found.other_at
+
+
+def _begun(judgement: Judgement, last: EstimateRecord) -> Judgement:
+    """A judgement of a drift that began before: when, as it was told."""
+    return Judgement(
+        state=judgement.state,
+        reasons=judgement.reasons,
+        verdict=judgement.verdict,
+        after=last.drift_after,
+        since=last.drift_since or judgement.since,
+    )
+
+
+def _evidence(posterior: PosePosterior, picture: SeenPicture) -> dict[str, object]:
+    """What an alert is by, as of people; without any."""
+    assert picture.evidence is not None
+    prior = posterior.prior
+    tilt, roll, heading = picture.evidence.offset.tolist()
+    sds = np.sqrt(np.diag(picture.evidence.covariance)).tolist()
+    sd = PoseParameters(height_m=math.inf, tilt_rad=sds[0], roll_rad=sds[1], heading_rad=sds[2])
+    return {
+        "tracks": 0,
+        "walking_groups": 0,
+        "from_s": picture.taken_s,
+        "to_s": picture.taken_s,
+        "moved": posterior.moved,
+        "hypotheses": hypotheses_of(posterior, prior),
+        "offset": offset_of(np.array([tilt, roll, 0.0, heading]), prior),
+        "offset_sd": asdict(sd) | {"height_m": None},
+        "registered": False,
+        "prior_loss_sd": 0.0,
+        "rivals": [],
+        "chart": None,
+        "creep": None,
+    }

@@ -1,0 +1,315 @@
+"""The newest picture of a camera against its gallery: how far it has turned, what is wrong with it.
+
+Three steps, as of an estimate: read in one transaction, computed in none, saved in another.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import cv2
+import numpy as np
+from sqlalchemy.orm import Session
+
+from models.errors import CheckpointError
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import ANGLES, CameraPose
+from models.monitoring.verdict import LIKELY, Drift, drift_between
+from models.pictures import (
+    Features,
+    PictureFault,
+    Turn,
+    best_turn,
+    describe,
+    judge,
+    renewed,
+    turned_covariance,
+    turned_pose,
+)
+from models.pose import PictureEvidence, PosePosterior, posterior_by_picture
+from models.reasons import Reason
+from service.alerts.alerts import end_alert, open_alert
+from service.enums import AlertKind, AlertSource, Outcome, Severity
+from service.reasons import ServiceCode
+from service.references import drift_limits, is_before, window_of
+from service.settings import Settings
+from service.store import alerts, cameras, pictures, references
+from service.store.cameras import CameraRecord, SnapshotRecord
+from service.store.estimates import EstimateRecord
+from service.store.pictures import PictureRecord, PictureReferenceRecord
+from service.store.references import SiteReferenceRecord
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewPicture:
+    """A picture that nobody has looked at, and what it is compared with.
+
+    Where the camera may not stand at its prior pose, or somebody is there, it begins no gallery.
+    """
+
+    snapshot: SnapshotRecord
+    intrinsics: Intrinsics
+    prior_pose_id: int
+    prior: CameraPose
+    gallery: tuple[tuple[int, Features], ...]
+    last: PictureRecord | None
+    may_begin: bool
+    limits_rad: float
+    moved_prior: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparedPicture:
+    """What a picture tells. `kept` of the gallery stay, and the `added` joins them."""
+
+    record: PictureRecord
+    fault: PictureFault | None
+    kept: tuple[int, ...]
+    added: Features | None
+
+
+def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPicture | None:
+    """The picture of a camera that waits to be compared; None where there is none."""
+    snapshot = session.get(SnapshotRecord, camera_id)
+    camera = session.get(CameraRecord, camera_id)
+    if snapshot is None or snapshot.compared_at is not None or camera is None:
+        return None
+    prior = cameras.prior_pose(session, camera_id)
+    if prior.assumed:
+        return None
+    now = datetime.now(UTC)
+    doubted = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
+    attended = references.maintenance_under_way(session, camera_id, now) is not None
+    return NewPicture(
+        snapshot=snapshot,
+        intrinsics=camera.intrinsics,
+        prior_pose_id=prior.id,
+        prior=prior.pose,
+        gallery=_gallery(session, prior.id),
+        last=session.get(PictureRecord, camera_id),
+        may_begin=not (doubted or attended),
+        limits_rad=drift_limits(settings).floor_rad,
+        moved_prior=settings.moved_prior,
+    )
+
+
+def _gallery(session: Session, prior_pose_id: int) -> tuple[tuple[int, Features], ...]:
+    """A gallery with the ids of its rows; one of another release begins anew."""
+    try:
+        return tuple(
+            (each.id, Features.from_bytes(each.features))
+            for each in pictures.gallery(session, prior_pose_id)
+        )
+    except CheckpointError:
+        return ()
+
+
+def compare(new: NewPicture) -> ComparedPicture:
+    """Compare a picture with the gallery."""
+    pixels = np.frombuffer(new.snapshot.jpeg, np.uint8)
+    grey: Any = cv2.imdecode(pixels, cv2.IMREAD_GRAYSCALE)  # a JPEG that we have made ourselves
+    now = describe(grey)
+    references_ = [features for _, features in new.gallery]
+    turn = best_turn(references_, now, new.intrinsics).turn
+    last = new.last if new.last and new.last.prior_pose_id == new.prior_pose_id else None
+    record = _result(new, now, turn, last)
+    unchanged_s = (record.taken_at - record.same_since).total_seconds()
+    fault = judge(
+        now.measures,
+        [each.measures for each in references_],
+        unchanged_s=unchanged_s,
+        matched=turn is not None,
+    )
+    after: Sequence[Features] = references_
+    if fault is None and (references_ or new.may_begin):
+        after = renewed(references_, now, turn)
+        if not references_:
+            record.has_moved = False  # where it stands is where all others are turned from
+    same = {id(each) for each in after}
+    return ComparedPicture(
+        record=record,
+        fault=fault,
+        kept=tuple(at for at, each in new.gallery if id(each) in same),
+        added=next((each for each in after if all(each is not old for old in references_)), None),
+    )
+
+
+def _result(
+    new: NewPicture, now: Features, turn: Turn | None, last: PictureRecord | None
+) -> PictureRecord:
+    """The record of a picture; of one that begins a gallery, there is nothing to tell."""
+    snapshot, digest = new.snapshot, now.measures.digest
+    same = last is not None and last.digest == digest
+    record = PictureRecord(
+        camera_id=snapshot.camera_id,
+        prior_pose_id=new.prior_pose_id,
+        taken_at=snapshot.taken_at,
+        stored_at=snapshot.stored_at,
+        digest=digest,
+        same_since=last.same_since if same and last else snapshot.taken_at,
+        shifted=turn is not None and turn.shifted,
+        has_moved=None if last is None else last.has_moved,
+        other_at=None if last is None else last.other_at,
+    )
+    if turn is None:
+        return record
+    covariance = turned_covariance(new.prior, turn)
+    evidence = PictureEvidence.of_poses(new.prior, turned_pose(new.prior, turn), covariance)
+    record.offset, record.covariance = evidence.offset.tolist(), covariance.tolist()
+    record.zoom = float(np.exp(turn.log_zoom))
+    record.zoom_sd = record.zoom * float(np.sqrt(turn.covariance[3, 3]))
+    posterior = posterior_by_picture(new.prior, evidence, new.moved_prior)
+    record.moved = posterior.moved
+    has_moved = posterior.moved >= LIKELY
+    if has_moved and drift_by_picture(posterior).angle_rad < new.limits_rad:
+        return record  # so little may be the light's
+    if last is not None and last.has_moved is not None and last.has_moved != has_moved:
+        record.other_at = last.taken_at
+    record.has_moved = has_moved
+    return record
+
+
+def drift_by_picture(posterior: PosePosterior) -> Drift:
+    """The drift by a picture alone: of the angles."""
+    return drift_between(
+        posterior.parameters, posterior.sd, ANGLES, posterior.prior, posterior.move
+    )
+
+
+def save_picture(
+    session: Session, settings: Settings, new: NewPicture, compared: ComparedPicture
+) -> bool:
+    """Keep what a picture tells, and its alert; False where another one has come meanwhile.
+
+    Where features alone are kept, the picture goes.
+    """
+    camera_id = new.snapshot.camera_id
+    snapshot = session.get(SnapshotRecord, camera_id)
+    newer = snapshot is None or snapshot.sha256 != new.snapshot.sha256
+    if newer or cameras.prior_pose(session, camera_id).id != new.prior_pose_id:
+        return False
+    if settings.snapshots == "features":
+        session.delete(snapshot)
+    elif snapshot is not None:
+        snapshot.compared_at = datetime.now(UTC)
+    pictures.keep_only(session, camera_id, compared.kept)
+    if compared.added is not None:
+        session.add(
+            PictureReferenceRecord(
+                camera_id=camera_id,
+                prior_pose_id=new.prior_pose_id,
+                features=compared.added.to_bytes(),
+                taken_at=new.snapshot.taken_at,
+            )
+        )
+    _cut_window(session, camera_id, new.last, compared.record)
+    session.merge(compared.record)
+    _tell_fault(session, settings, camera_id, compared)
+    return True
+
+
+def _cut_window(
+    session: Session, camera_id: str, last: PictureRecord | None, record: PictureRecord
+) -> None:
+    """Judge a camera that was turned between two pictures by whoever comes after the first."""
+    reference = references.newest_if_any(session, camera_id)
+    turned = last is not None and record.other_at is not None and record.other_at != last.other_at
+    if not turned or record.other_at is None or reference is None or reference.ready_at is None:
+        return
+    before_s = record.other_at.timestamp()
+    if before_s <= (reference.window_from_s or 0.0):
+        return
+    reference.window_from_s = before_s
+    moved = bool(record.has_moved)
+    reference.changed_after_s = before_s if moved else None
+    reference.changed_s = record.taken_at.timestamp() if moved else None
+
+
+def _tell_fault(
+    session: Session, settings: Settings, camera_id: str, compared: ComparedPicture
+) -> None:
+    fault, record = compared.fault, compared.record
+    if fault is None:
+        end_alert(session, camera_id, AlertKind.PICTURE, Outcome.CLEARED)
+        return
+    unchanged_s = (record.taken_at - record.same_since).total_seconds()
+    values = {"unchanged_s": unchanged_s} if fault is PictureFault.FROZEN else {}
+    open_alert(
+        session,
+        settings,
+        camera_id,
+        AlertKind.PICTURE,
+        Severity.WARNING,
+        {},
+        record.same_since if fault is PictureFault.FROZEN else record.taken_at,
+        reasons=(Reason(code=ServiceCode(f"picture_{fault.value}"), values=values),),
+        source=AlertSource.PICTURE,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenPicture:
+    """What the newest picture says for an estimate: of a time, in seconds since the epoch.
+
+    `raw` is what is told of it, `evidence` None where it matched none of the gallery.
+    """
+
+    taken_s: float
+    evidence: PictureEvidence | None
+    raw: dict[str, Any]
+
+    def counts(self, ended_s: Sequence[float]) -> bool:
+        """True where it is new enough beside people whose walks ended at such times.
+
+        Of a quarter of them nothing can have moved since that people would tell; of more, a knock
+        after it would wait for the next picture.
+        """
+        later = sum(each > self.taken_s for each in ended_s)
+        return self.evidence is not None and later <= _LATER * len(ended_s)
+
+    def was_told(self, last: EstimateRecord | None) -> bool:
+        """True where an estimate has had its word."""
+        told = {} if last is None else last.raw.get("picture") or {}
+        return bool(told.get("taken_at") == self.raw["taken_at"])
+
+
+_LATER = 0.25
+
+
+def seen_picture(
+    session: Session, settings: Settings, reference: SiteReferenceRecord
+) -> SeenPicture | None:
+    """The newest picture that was compared, where it is of now.
+
+    None where it is of before a reference, an answer or a change, or somebody was at the camera.
+    """
+    record = session.get(PictureRecord, reference.camera_id)
+    if record is None or record.prior_pose_id != reference.prior_pose_id:
+        return None
+    if reference.answered_at is not None and record.stored_at <= reference.answered_at:
+        return None
+    taken_s, bounds = record.taken_at.timestamp(), window_of(session, reference, settings)
+    attended = any(from_s <= taken_s < to_s for from_s, to_s in bounds.without)
+    if attended or is_before(taken_s, bounds):
+        return None
+    evidence = None
+    if record.offset is not None and record.covariance is not None:
+        evidence = PictureEvidence(
+            offset=np.array(record.offset), covariance=np.array(record.covariance)
+        )
+    return SeenPicture(taken_s=taken_s, evidence=evidence, raw=_raw(record))
+
+
+def _raw(record: PictureRecord) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "taken_at": record.taken_at.isoformat(),
+        "matched": record.offset is not None,
+    }
+    if record.offset is not None and record.covariance is not None:
+        sd = np.sqrt(np.diag(np.array(record.covariance))).tolist()
+        names = [f"{name}_rad" for name in ANGLES]
+        found |= dict(zip(names, record.offset, strict=True))
+        found["zoom"] = record.zoom
+        found["sd"] = dict(zip(names, sd, strict=True)) | {"zoom": record.zoom_sd}
+    return found

@@ -1,0 +1,79 @@
+"""What the pictures of a camera tell: the gallery by light, and the newest one's result."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, String, delete, select
+from sqlalchemy.orm import Mapped, Session, mapped_column
+
+from service.store.record import Record, camera_key, foreign_key
+
+
+class PictureReferenceRecord(Record):
+    """A picture that others are compared with: its features, of which no picture can be made.
+
+    The first of a prior pose is where the others' known turns begin.
+    """
+
+    __tablename__ = "picture_references"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    camera_id: Mapped[str] = camera_key()
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    features: Mapped[bytes] = mapped_column(LargeBinary)
+    taken_at: Mapped[datetime]
+
+    __table_args__ = (Index(None, "camera_id", "id"),)
+
+
+class PictureRecord(Record):
+    """The result of a camera's newest picture, against the gallery of its prior pose.
+
+    `offset` is how far it has turned from that, in tilt, roll and heading, with the covariance of
+    the three; None where it matched none of the gallery. `moved` is how likely that is by the
+    picture alone. `digest` is of its pixels, which were the same since `same_since`. `other_at` is
+    when the newest picture was taken by which it was the other way round: stood, or had moved.
+    """
+
+    __tablename__ = "pictures"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
+    taken_at: Mapped[datetime]
+    stored_at: Mapped[datetime]
+    digest: Mapped[str] = mapped_column(String(64))
+    same_since: Mapped[datetime]
+    offset: Mapped[list[Any] | None] = mapped_column("turn", JSON(none_as_null=True))
+    covariance: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
+    zoom: Mapped[float | None]
+    zoom_sd: Mapped[float | None]
+    shifted: Mapped[bool]
+    moved: Mapped[float | None]
+    has_moved: Mapped[bool | None]
+    other_at: Mapped[datetime | None]
+
+
+def gallery(session: Session, prior_pose_id: int) -> Sequence[PictureReferenceRecord]:
+    """The gallery of a prior pose, the first one first."""
+    return session.scalars(
+        select(PictureReferenceRecord)
+        .where(PictureReferenceRecord.prior_pose_id == prior_pose_id)
+        .order_by(PictureReferenceRecord.id)
+    ).all()
+
+
+def forget(session: Session, camera_id: str) -> None:
+    """Delete all that pictures have told of a camera."""
+    for record in (PictureReferenceRecord, PictureRecord):
+        session.execute(delete(record).where(record.camera_id == camera_id))
+
+
+def keep_only(session: Session, camera_id: str, ids: Sequence[int]) -> None:
+    """Delete what is of no use any more in a camera's gallery."""
+    kept = PictureReferenceRecord.id.in_(ids)
+    session.execute(
+        delete(PictureReferenceRecord).where(PictureReferenceRecord.camera_id == camera_id, ~kept)
+    )

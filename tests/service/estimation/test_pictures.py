@@ -1,0 +1,167 @@
+"""A picture beside the people, or alone: one tells a knock, and that a camera stands."""
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+from math import radians
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+from sqlalchemy import func, select
+
+from service.app import create_app
+from service.store.cameras import SnapshotRecord
+from service.store.pictures import PictureRecord, PictureReferenceRecord
+from tests.conftest import CAMERA
+from tests.models.pictures.given import seen_after, wall
+from tests.service.conftest import problem
+from tests.service.street import KNOCKED, LENS, PRIOR, Street, known_street
+
+SCENE = wall(lens=LENS)
+TURNED = replace(PRIOR, tilt_rad=PRIOR.tilt_rad + radians(3), heading_rad=radians(44))
+PATH = "/cameras/corner/snapshot"
+
+
+@pytest.fixture(params=["pictures"])
+def http(request, settings):
+    settings = settings.model_copy(update={"snapshots": request.param})
+    with TestClient(create_app(settings)) as client:
+        client.settings = settings
+        yield client
+
+
+def take(http, pose=PRIOR, *, before_s=0.0, gain=1.0, grey=None):
+    """Send the picture that a camera takes at a pose, with some noise of its own."""
+    grey = seen_after(SCENE, PRIOR, pose, LENS) if grey is None else grey
+    noise = np.random.default_rng(round(before_s * 10) + 7).normal(0, 2, grey.shape)
+    made = BytesIO()
+    Image.fromarray(np.clip(grey * gain + noise, 0, 255).astype(np.uint8)).save(made, "PNG")
+    at = datetime.now(UTC) - timedelta(seconds=before_s)
+    answer = http.put(
+        PATH,
+        content=made.getvalue(),
+        headers={"Content-Type": "image/png"},
+        params={"taken_at": at.isoformat()},
+    )
+    return answer.raise_for_status().json()
+
+
+def rows(street, record):
+    with street.context.store.read() as session:
+        return session.scalar(select(func.count()).select_from(record))
+
+
+def test_a_knock_is_told_by_one_picture_with_nobody_in_sight(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    take(http, before_s=7200)
+    assert street.look()["state"] == "unconnected"
+    take(http, before_s=3600, gain=0.8)
+    assert street.look()["state"] == "unconnected"
+    assert street.alerts() == []
+    take(http, TURNED)
+    found = street.look()
+    (alert,) = street.alerts()
+    assert (alert["kind"], alert["drift"]["height_m"]) == ("drift", None)
+    assert alert["drift"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
+    assert alert["drift"]["heading_deg"] == pytest.approx(4.0, abs=0.1)
+    assert alert["reason_code"] == "by_picture"
+    assert found["state"] == "drifting"
+    evidence = http.get(f"/alerts/{alert['id']}/evidence").raise_for_status().json()
+    assert (evidence["tracks"], evidence["offset_sd"]["height_m"]) == (0, None)
+    seen = found["estimates"]["picture"]
+    assert seen["matched"]
+    assert seen["tilt_deg"] == pytest.approx(3.0, abs=0.1)
+    assert seen["zoom"] == pytest.approx(1.0, abs=0.005)
+    # And one more tells that it was put back.
+    take(http)
+    street.look()
+    assert [each["state"] for each in street.alerts()] == ["resolved"]
+
+
+def test_a_picture_tells_a_knock_before_people_do_and_since_when(http):
+    street = known_street(http, http.settings, 60)
+    street.keep_to_lanes(PRIOR, 30)
+    take(http, before_s=7200)
+    assert street.look()["state"] == "ok"
+    take(http, before_s=3600)
+    before = street.look()
+    assert before["estimates"]["picture"]["matched"]
+    take(http, TURNED, before_s=60)
+    found = street.look()
+    assert found["state"] == "drifting"
+    assert found["drift"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
+    since = found["since"]
+    assert since["after"] == before["estimates"]["picture"]["taken_at"].replace("+00:00", "Z")
+    assert since["before"] == found["estimates"]["picture"]["taken_at"].replace("+00:00", "Z")
+
+
+def test_a_picture_that_says_it_stands_makes_other_paths_a_changed_site(http):
+    street = known_street(http, http.settings, 60)
+    take(http, before_s=7200)
+    street.look()
+    street.clock_s += 12_000
+    street.keep_to_lanes(KNOCKED, 40)
+    take(http)
+    found = street.look()
+    assert found["state"] == "ok"
+    assert found["reason_code"] == "site_changed"
+    assert street.alerts() == []
+
+
+def test_a_picture_of_before_the_people_counts_no_more(http):
+    street = known_street(http, http.settings, 60)
+    take(http, before_s=19_000)
+    street.look()
+    take(http, before_s=18_000)
+    street.look()
+    street.clock_s += 5_000
+    street.keep_to_lanes(KNOCKED, 60)
+    assert street.look()["state"] == "drifting"
+
+
+@pytest.mark.parametrize("http", ["features"], indirect=True)
+def test_features_alone_are_kept_where_the_setting_says_so(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    take(http, before_s=3600)
+    street.look()
+    assert (rows(street, SnapshotRecord), rows(street, PictureReferenceRecord)) == (0, 1)
+    problem(http.get(PATH), 404, "not_found")
+    take(http, TURNED)
+    street.look()
+    assert [each["kind"] for each in street.alerts()] == ["drift"]
+    assert (rows(street, SnapshotRecord), rows(street, PictureRecord)) == (0, 1)
+    http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
+    assert rows(street, PictureReferenceRecord) == rows(street, PictureRecord) == 0
+
+
+def test_what_is_wrong_with_a_picture_is_an_alert_of_its_own(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    take(http, before_s=7200)
+    street.look()
+    take(http, before_s=3600, grey=np.full((720, 1280), 4, np.uint8))
+    street.look()
+    (alert,) = street.alerts()
+    assert (alert["kind"], alert["reason_code"]) == ("picture", "picture_black")
+    take(http)
+    street.look()
+    assert [each["state"] for each in street.alerts()] == ["resolved"]
+
+
+def test_an_older_picture_than_the_newest_is_refused(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    take(http, before_s=60)
+    made = BytesIO()
+    Image.new("L", (1280, 720)).save(made, "PNG")
+    at = (datetime.now(UTC) - timedelta(seconds=90)).isoformat()
+    answer = http.put(
+        PATH,
+        content=made.getvalue(),
+        headers={"Content-Type": "image/png"},
+        params={"taken_at": at},
+    )
+    assert "a newer picture is kept" in problem(answer, 409, "conflict")["detail"]
