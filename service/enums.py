@@ -30,6 +30,7 @@ class Cause(StrEnum):
     REFERENCE = "reference"
     MAINTENANCE = "maintenance"
     PUT_BACK = "put_back"
+    MENDED = "mended"
     FALSE_ALARM = "false_alarm"
 
 
@@ -101,18 +102,21 @@ class Severity(StrEnum):
 
 
 class Answer(StrEnum):
-    """A person's answer on how a camera stands."""
+    """A person's answer on what an alert tells of; which of them there are hangs on its kind."""
 
     PUT_BACK = "put_back"
     ACCEPTED = "accepted"
+    MENDED = "mended"
     FALSE_ALARM = "false_alarm"
 
 
 class Outcome(StrEnum):
-    """The outcome of an alert: a person's answer, or something by itself."""
+    """The outcome of an alert: a person's answer or act, or something by itself."""
 
     PUT_BACK = Answer.PUT_BACK
     ACCEPTED = Answer.ACCEPTED
+    MENDED = Answer.MENDED
+    RELEARNED = "relearned"
     FALSE_ALARM = Answer.FALSE_ALARM
     CLEARED = "cleared"
     CAMERA_REMOVED = "camera_removed"
@@ -220,6 +224,7 @@ class Activity(StrEnum):
     POSE_AGREED = "pose.agreed"
     POSE_ACCEPTED = "pose.accepted"
     POSE_PUT_BACK = "pose.put_back"
+    POSE_MENDED = "pose.mended"
     POSE_FALSE_ALARM = "pose.false_alarm"
     REFERENCE_RESET = "reference.reset"
     REFERENCE_LEARNED = "reference.learned"

@@ -124,11 +124,15 @@ def end_alert(
 def close_pose_alerts(
     session: Session, camera_id: str, outcome: Outcome, by: str | None, note: str | None = None
 ) -> None:
-    """End the open alerts that measure a camera against its prior pose, if there are any."""
+    """End the open alerts that measure a camera against its prior pose, if there are any.
+
+    A clock is neither put back nor accepted: its alert is mended with the pose.
+    """
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            close_alert(session, record, outcome, note, by)
+            clock = kind == AlertKind.CLOCK and outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED)
+            close_alert(session, record, Outcome.MENDED if clock else outcome, note, by)
 
 
 def close_alert(

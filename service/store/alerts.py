@@ -22,7 +22,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
-from service.enums import AlertKind, AlertSource, AlertState, Outcome, Severity
+from service.enums import AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
@@ -106,6 +106,11 @@ class AlertRecord(Record):
 
 MOVED_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that say that a camera has moved, or its clock
 POSE_KINDS = (*MOVED_KINDS, AlertKind.UNSURE)  # that hold a camera against its prior pose
+# What came of an alert, of what a person may say of its kind; the first is that it was real.
+_OF_POSE = (Answer.PUT_BACK, Answer.ACCEPTED, Answer.FALSE_ALARM)
+_OF_OTHERS = (Answer.MENDED, Answer.FALSE_ALARM)
+# By which a person says that a camera is at its prior pose, and its clock is right.
+ANSWERS = (Outcome.PUT_BACK, Outcome.MENDED, Outcome.RELEARNED, Outcome.FALSE_ALARM)
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.
@@ -114,6 +119,11 @@ _FIRING = select(AlertRecord).where(
     AlertRecord.kind == bindparam("kind"),
     AlertRecord.state == AlertState.FIRING,
 )
+
+
+def answers_of(kind: AlertKind) -> tuple[Answer, ...]:
+    """What a person may say came of an alert: of a clock or a tracker no pose can be accepted."""
+    return _OF_POSE if kind in (AlertKind.DRIFT, AlertKind.UNSURE) else _OF_OTHERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,7 +228,7 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
         .where(
             AlertRecord.camera_id == camera_id,
             AlertRecord.kind.in_(POSE_KINDS),
-            AlertRecord.outcome.in_((Outcome.PUT_BACK, Outcome.FALSE_ALARM)),
+            AlertRecord.outcome.in_(ANSWERS),
         )
         .order_by(AlertRecord.resolved_at.desc())
         .limit(1)

@@ -20,6 +20,8 @@ KINDS = {
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",
     Outcome.ACCEPTED: "new pose accepted",
+    Outcome.MENDED: "put right",
+    Outcome.RELEARNED: "learned anew",
     Outcome.FALSE_ALARM: "false alarm",
     Outcome.CLEARED: "ended by itself",
     Outcome.CAMERA_REMOVED: "camera removed",
@@ -38,6 +40,7 @@ _DONE = {
     Activity.POSE_AGREED: "agreed to the pose that people told",
     Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
     Activity.POSE_PUT_BACK: "said that the camera is back at its prior pose",
+    Activity.POSE_MENDED: "said that the clock is mended",
     Activity.POSE_FALSE_ALARM: "said that the camera never moved",
     Activity.REFERENCE_RESET: "had the camera learned anew at its prior pose",
     Activity.SOURCE_USED: "said whose tracks count; the reference is learned anew",

@@ -19,6 +19,7 @@ _SINCE = {
     Cause.REFERENCE: "since the reference",
     Cause.MAINTENANCE: "since the maintenance",
     Cause.PUT_BACK: "since the camera was put back",
+    Cause.MENDED: "since the clock was mended",
     Cause.FALSE_ALARM: "since the alert was called a false alarm",
 }
 _GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)

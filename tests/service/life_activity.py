@@ -8,7 +8,8 @@ from hypothesis.stateful import (
     rule,
 )
 
-from service.store.alerts import POSE_KINDS
+from service.enums import Answer
+from service.store.alerts import POSE_KINDS, answers_of
 from tests.service.life import WANTED, still
 from tests.service.life_events import LifeEvents, has_camera, names, notes, said, some
 
@@ -46,7 +47,7 @@ class LifeActs(LifeEvents):
 
     @rule(
         n=some,
-        outcome=st.sampled_from(["put_back", "accepted", "false_alarm"]),
+        outcome=st.sampled_from(list(Answer)),
         by=names,
         note=notes,
     )
@@ -56,9 +57,10 @@ class LifeActs(LifeEvents):
             return
         members = [a["camera_id"] for a in self.firing() if a["group_id"] == alert["id"]]
         body = said(outcome=outcome, by=by, note=note)
-        answer = self.call("POST", f"/alerts/{alert['id']}/resolve", 409, json=body)
+        answer = self.call("POST", f"/alerts/{alert['id']}/resolve", 409, 422, json=body)
+        assert (answer.status_code == 422) == (outcome not in answers_of(alert["kind"]))
         if not answer.is_success:
-            assert outcome == "accepted"
+            assert answer.status_code == 422 or outcome == "accepted"
             return
         shown = self.life.call("GET", f"/alerts/{alert['id']}").json()
         assert (shown["state"], shown["outcome"], shown["resolved_by"]) == ("resolved", outcome, by)

@@ -230,8 +230,61 @@ def test_there_is_no_accepting_where_nothing_is_told(bench):
             reasons=as_said("3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
-    problem(bench.http.post(url, json={"outcome": "accepted"}), 409, "conflict")
+    problem(bench.http.post(url, json={"outcome": "accepted"}), 422, "malformed")
     assert len(bench.alerts(state="firing")) == 1
+
+
+@pytest.fixture
+def clocked(bench):
+    """A camera whose people seem to walk at another speed, and so at another height."""
+    bench.see(PRIOR)
+    for _ in range(3):
+        bench.see(moved(height_m=1.32))
+    assert [alert["kind"] for alert in bench.alerts(state="firing")] == ["clock"]
+    return bench
+
+
+def test_a_clock_fault_makes_no_false_height_the_pose(clocked):
+    """It did: 1.32 m too high, by "accept"; an alert's outcomes are those of its kind."""
+    (alert,) = clocked.alerts(state="firing")
+    url = f"/alerts/{alert['id']}/resolve"
+    for outcome in ("accepted", "put_back"):
+        said = problem(clocked.http.post(url, json={"outcome": outcome}), 422, "malformed")
+        assert said["errors"][0]["pointer"] == "/outcome"
+        assert "mended or false_alarm" in said["detail"]
+    problem(clocked.http.post("/cameras/corner/pose/accept"), 409, "conflict")
+    assert clocked.http.get("/cameras/corner").json()["prior_pose"]["height_m"] == 6.0
+    assert states(clocked.http) == {"drifting"}
+
+
+def test_a_mended_clock_is_judged_by_who_comes_then(clocked):
+    resolve(clocked, "mended", note="NTP was off")
+    (alert,) = clocked.alerts()
+    assert (alert["outcome"], alert["resolved_by"]) == ("mended", "Ada")
+    assert states(clocked.http) == {"learning"}
+    assert "since the clock was mended" in clocked.pose()["reason"]
+    assert "Ada said that the clock is mended. NTP was off" in told_history(clocked.http)
+    clocked.see(PRIOR)
+    assert states(clocked.http) == {"ok"}
+
+
+def test_learning_anew_is_kept_as_what_it_is(bench):
+    knock(bench)
+    bench.http.post("/cameras/corner/reference/reset", json={"by": "Ada"}).raise_for_status()
+    (alert,) = bench.alerts()
+    assert (alert["outcome"], alert["resolved_by"]) == ("relearned", "Ada")
+
+
+def test_other_alerts_are_mended_or_false(bench):
+    with bench.store.write() as session:
+        open_alert(
+            session, bench.settings, "corner", "no_data", "warning", {}, None,
+            reasons=as_said("nobody"), source=AlertSource.RHYTHM,
+        )  # fmt: skip
+    url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
+    problem(bench.http.post(url, json={"outcome": "put_back"}), 422, "malformed")
+    resolve(bench, "mended")
+    assert bench.alerts()[0]["outcome"] == "mended"
 
 
 def test_the_note_of_an_accepted_pose_is_kept(bench):
