@@ -131,6 +131,7 @@ class AlertActivity(StrEnum):
     SILENCED = "silenced"
     SILENCE_ENDED = "silence_ended"
     RESOLVED = "resolved"
+    REOPENED = "reopened"
 
 
 class WindowState(StrEnum):
@@ -226,6 +227,7 @@ class Activity(StrEnum):
     POSE_PUT_BACK = "pose.put_back"
     POSE_MENDED = "pose.mended"
     POSE_FALSE_ALARM = "pose.false_alarm"
+    POSE_UNDONE = "pose.undone"
     REFERENCE_RESET = "reference.reset"
     REFERENCE_LEARNED = "reference.learned"
     SOURCE_USED = "source.used"
@@ -236,6 +238,7 @@ class Activity(StrEnum):
     ALERT_SILENCED = "alert.silenced"
     ALERT_SILENCE_ENDED = "alert.silence_ended"
     ALERT_RESOLVED = "alert.resolved"
+    ALERT_REOPENED = "alert.reopened"
     MAINTENANCE_PLANNED = "maintenance.planned"
     MAINTENANCE_CHANGED = "maintenance.changed"
     MAINTENANCE_ENDED = "maintenance.ended"

@@ -27,13 +27,14 @@ ALERT_KINDS = "drift no_data clock unsure stale tracker"
 OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.removed pose.agreed pose.accepted pose.put_back "
-    "pose.mended pose.false_alarm reference.reset reference.learned source.used source.removed alert.opened "
-    "alert.escalated alert.acknowledged alert.silenced alert.silence_ended alert.resolved "
-    "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
-    "maintenance.over training.requested training.succeeded training.failed training.cancelled "
-    "snapshot.kept snapshot.removed zones.drawn webhook.added webhook.changed "
-    "webhook.secret_changed webhook.removed webhook.tested webhook.replayed token.added "
-    "token.revoked session.began session.ended login.refused"
+    "pose.mended pose.false_alarm pose.undone reference.reset reference.learned source.used "
+    "source.removed alert.opened alert.escalated alert.acknowledged alert.silenced "
+    "alert.silence_ended alert.resolved alert.reopened maintenance.planned maintenance.changed "
+    "maintenance.ended maintenance.withdrawn maintenance.over training.requested "
+    "training.succeeded training.failed training.cancelled snapshot.kept snapshot.removed "
+    "zones.drawn webhook.added webhook.changed webhook.secret_changed webhook.removed "
+    "webhook.tested webhook.replayed token.added token.revoked session.began session.ended "
+    "login.refused"
 )
 
 

@@ -42,6 +42,7 @@ _NOTIFIED_AS = {
     AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
     AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
     AlertActivity.RESOLVED: MessageType.ALERT_RESOLVED,
+    AlertActivity.REOPENED: MessageType.ALERT_OPENED,
 }
 
 
@@ -154,6 +155,16 @@ def close_alert(
     over = group is not None and not alerts.firing_members(session, group.id)
     if group is not None and group.state == AlertState.FIRING and over:
         close_alert(session, group, outcome, note, by)
+
+
+def reopen_alert(session: Session, record: AlertRecord, by: str | None) -> None:
+    """Have an alert fire on that was ended in error; one of a group that has ended, by itself."""
+    group = None if record.group_id is None else session.get(AlertRecord, record.group_id)
+    if group is not None and group.state != AlertState.FIRING:
+        record.group_id = None
+    record.state, record.outcome = AlertState.FIRING, None
+    record.note = record.resolved_by = record.resolved_at = None
+    note_on_alert(session, record, AlertActivity.REOPENED, by)
 
 
 def end_empty_groups(session: Session) -> None:

@@ -3,12 +3,11 @@
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
 
-from dataclasses import dataclass
-
 from sqlalchemy.orm import Session
 
 from service.access.activity import note as note_activity
 from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
+from service.cameras.answers import Decision, state_before
 from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.held_poses import held_pose
 from service.cameras.poses import PoseView, view_pose
@@ -21,15 +20,6 @@ from service.references import begin_reference, keep_answer
 from service.settings import Settings
 from service.store import alerts, tracks
 from service.store.alerts import AlertRecord
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decision:
-    """A person's answer about a camera: who, if they say so, and why."""
-
-    camera_id: str
-    by: str | None
-    note: str | None = None
 
 
 def accept_pose(
@@ -182,5 +172,6 @@ def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answe
 def _close(session: Session, decision: Decision, outcome: Outcome, what: Activity) -> None:
     """Close a camera's alerts about its pose, and keep who said what came of them."""
     camera_id, by, note = decision.camera_id, decision.by, decision.note
+    details = {"before": state_before(session, camera_id)}
     close_pose_alerts(session, camera_id, outcome, by, note)
-    note_activity(session, what, by=by, camera_id=camera_id, text=note)
+    note_activity(session, what, by=by, camera_id=camera_id, text=note, details=details)

@@ -23,7 +23,6 @@ from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
-
 _ANSWERED = (Cause.PUT_BACK, Cause.MENDED, Cause.FALSE_ALARM)
 
 

@@ -273,7 +273,8 @@ def _accept(run: _Run, said: Any) -> None:
     bench = Bench(run.http, run.settings.model_copy(update={"window_tracks": 20}))
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
-    run.ask("POST", "/cameras/{camera_id}/pose/accept", said, camera_id="corner")
+    for path in ("accept", "undo"):
+        run.ask("POST", f"/cameras/{{camera_id}}/pose/{path}", said, camera_id="corner")
     bench.store.close()
     bench.queue.close()
 

@@ -45,6 +45,15 @@ class LifeActs(LifeEvents):
         self.answered.add(camera_id)
         self.last_entry("reference.reset", camera_id, by, None)
 
+    @has_camera
+    @rule(n=some, by=names)
+    def take_back(self, n: int, by: str | None) -> None:
+        camera_id = self.camera(n)
+        url = f"/cameras/{camera_id}/pose/undo"
+        if self.call("POST", url, 409, json=said(by=by)).is_success:
+            self.answered.discard(camera_id)
+            self.last_entry("pose.undone", camera_id, by, None)
+
     @rule(
         n=some,
         outcome=st.sampled_from(list(Answer)),

@@ -64,6 +64,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "POST /cameras/{camera_id}/pose/accept",
         "POST /cameras/{camera_id}/pose/agree",
         "POST /cameras/{camera_id}/pose/put-back",
+        "POST /cameras/{camera_id}/pose/undo",
         "POST /cameras/{camera_id}/reference/reset",
         "POST /cameras/{camera_id}/sources/{source:path}/use",
         "DELETE /cameras/{camera_id}/sources/{source:path}",
