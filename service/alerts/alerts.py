@@ -290,6 +290,6 @@ def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
         return
     record.notified = True
     body = alert_body(record)
-    event = {name: body[name] for name in _EVENT_FIELDS}
+    event = {name: body[name] for name in _EVENT_FIELDS} | {"message": message}
     journal.add_event(session, EventType.ALERT, event, datetime.now(UTC))
     queue_alert(session, record, body, message)

@@ -4,9 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.enums import Activity, AlertKind, Outcome
+from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome
+from service.store.alerts import AlertRecord
+from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
 from service.wording.moves import NAMES
+from service.wording.reasons import in_words, percent
 from service.wording.times import Clock
 
 KINDS = {
@@ -17,6 +20,15 @@ KINDS = {
     AlertKind.STALE: "Its estimate fails or lacks tracks",
     AlertKind.TRACKER: "Another tracker posts",
 }
+# The same in a word, for a badge.
+BADGES = {
+    AlertKind.DRIFT: "Moved",
+    AlertKind.CLOCK: "Clock",
+    AlertKind.UNSURE: "Unsure",
+    AlertKind.NO_DATA: "No people",
+    AlertKind.STALE: "Not looked at",
+    AlertKind.TRACKER: "Tracker",
+}
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",
     Outcome.ACCEPTED: "new pose accepted",
@@ -25,6 +37,50 @@ OUTCOMES = {
     Outcome.FALSE_ALARM: "false alarm",
     Outcome.CLEARED: "ended by itself",
     Outcome.CAMERA_REMOVED: "camera removed",
+}
+_OF_POSE = {
+    Answer.PUT_BACK: (
+        "It was put back",
+        "It stands as it did. What was learned there stays; the next people tell.",
+    ),
+    Answer.ACCEPTED: (
+        "Keep the new aim",
+        "Where it looks now is right from now on, and is learned anew.",
+    ),
+    Answer.FALSE_ALARM: ("It did not move", "A false alarm. The next people tell."),
+}
+_AGAIN = "Should it go on, another alert opens."
+# What a person may answer: the button, and what it comes to.
+_ANSWERS = {
+    AlertKind.DRIFT: _OF_POSE,
+    AlertKind.UNSURE: _OF_POSE,
+    AlertKind.CLOCK: {
+        Answer.MENDED: (
+            "The clock is right again",
+            "Clock or frame rate was put right; the next people tell.",
+        ),
+        Answer.FALSE_ALARM: ("Nothing was wrong", "A false alarm. The next people tell."),
+    },
+    AlertKind.NO_DATA: {
+        Answer.MENDED: ("It works again", f"Camera or tracker was repaired. {_AGAIN}"),
+        Answer.FALSE_ALARM: ("Nobody was to come", "Such a silence counts as usual from now on."),
+    },
+    AlertKind.STALE: {
+        Answer.MENDED: ("It works again", _AGAIN),
+        Answer.FALSE_ALARM: ("Nothing was wrong", _AGAIN),
+    },
+    AlertKind.TRACKER: {
+        Answer.MENDED: ("The other one is off", "Only one tracker posts from now on."),
+        Answer.FALSE_ALARM: ("Both may post", "The one that counts counts; no alert of the other."),
+    },
+}
+# After "You" or a name, of an answer that can be taken back.
+ANSWERED = {
+    Activity.POSE_ACCEPTED: "kept the new aim",
+    Activity.POSE_PUT_BACK: "said that it was put back",
+    Activity.POSE_MENDED: "said that its clock is right again",
+    Activity.POSE_FALSE_ALARM: "called this a false alarm",
+    Activity.REFERENCE_RESET: "had it learned anew",
 }
 # Notes on alerts that ended by themselves.
 TRACKS_COME_AGAIN = "tracks come again"
@@ -85,6 +141,44 @@ class EvidenceRow:
     label: str
     share: float
     words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerWords:
+    """An answer to an alert as its button says it, and what it comes to."""
+
+    outcome: Answer
+    label: str
+    consequence: str
+
+
+def answers(kind: AlertKind) -> list[AnswerWords]:
+    """What a person may answer to an alert of a kind, that it was real first."""
+    return [
+        AnswerWords(outcome=answer, label=label, consequence=consequence)
+        for answer, (label, consequence) in _ANSWERS[kind].items()
+    ]
+
+
+def why_words(alert: AlertRecord, estimate: EstimateRecord | None, clock: Clock) -> str:
+    """Why an alert is believed, in one sentence without a statistic."""
+    if alert.source == AlertSource.ESTIMATE and estimate is not None:
+        people = f"the last {estimate.tracks} people"
+        if alert.kind == AlertKind.DRIFT:
+            return (
+                f"Where {people} walk, and how fast, fits a camera that has moved; that it still "
+                f"stands where it did is {percent(1 - estimate.moved)} likely."
+            )
+        if alert.kind == AlertKind.CLOCK:
+            return (
+                f"{people[0].upper()}{people[1:]} keep to their paths, but all of them seem to "
+                "walk too fast or too slowly. A clock or a frame rate does that by itself; a "
+                "camera seldom rises without turning."
+            )
+        if alert.kind == AlertKind.UNSURE:
+            return f"Of {people}, next to nobody keeps to a path that was learned."
+    words = in_words(alert.reasons, clock.zone)
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
 
 
 def evidence_rows(evidence: Mapping[str, Any]) -> list[EvidenceRow]:

@@ -3,14 +3,18 @@
 import html
 import re
 from datetime import UTC, datetime, timedelta
+from zoneinfo import ZoneInfo
 
 import pytest
+from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.alerts.alerts import open_alert
+from service.app import create_app
 from service.enums import AlertSource
 from service.reasons import as_said
 from service.store import references
+from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 
@@ -49,10 +53,12 @@ def states(http):
     """What each place says that the state is; one word where they agree."""
     page = http.get("/ui/cameras/corner").text
     row = re.search(r'<li class="row (\w+)" id="row-corner"', http.get("/").text)[1]
+    shown = re.search(r'<section class="summary (\w+)"', page)[1]
+    assert row == shown
     return {
         http.get("/cameras/corner/pose").json()["state"],
-        re.search(r'<section class="summary (\w+)"', page)[1],
-        row,
+        # Pages call a wrong clock a clock, and no move.
+        "drifting" if row == "clock" else row,
         *metric_states(http),
     }
 
@@ -223,6 +229,23 @@ def test_accepting_by_resolving_accepts_the_pose(bench):
     assert (alert["outcome"], alert["note"]) == ("accepted", "new mast")
 
 
+def test_a_page_says_times_by_the_zone_of_the_service(settings):
+    """ "Why" said 22:54Z on a page that was of Copenhagen, and Access was in UTC."""
+    with TestClient(create_app(settings.model_copy(update={"timezone": "Asia/Tokyo"}))) as http:
+        http.post("/cameras", json=CAMERA).raise_for_status()
+        to = datetime.now(UTC) + timedelta(hours=2)
+        body = {"to": to.isoformat()}
+        http.post("/cameras/corner/maintenance", json=body).raise_for_status()
+        page = http.get("/ui/cameras/corner").text
+        local = to.astimezone(ZoneInfo("Asia/Tokyo"))
+        assert f"maintenance is under way until {local:%Y-%m-%d %H:%M}" in page
+        assert f"{to:%H:%M}Z" not in page
+        http.post("/tokens", json={"name": "Ada", "scopes": ["read"]}).raise_for_status()
+        access = http.get("/ui/tokens").text
+        assert "Times are Asia/Tokyo" in access
+        assert f"{datetime.now(ZoneInfo('Asia/Tokyo')):%Y-%m-%d %H:}" in access
+
+
 def test_there_is_no_accepting_where_nothing_is_told(bench):
     with bench.store.write() as session:
         open_alert(
@@ -255,6 +278,12 @@ def test_a_clock_fault_makes_no_false_height_the_pose(clocked):
     problem(clocked.http.post("/cameras/corner/pose/accept"), 409, "conflict")
     assert clocked.http.get("/cameras/corner").json()["prior_pose"]["height_m"] == 6.0
     assert states(clocked.http) == {"drifting"}
+    page = clocked.http.get("/ui/cameras/corner").text
+    assert "<title>Clock: The corner" in page
+    assert 'data-outcome="mended"' in page
+    assert 'data-outcome="accepted"' not in page
+    assert re.search(r"<b>1</b> Clock", clocked.http.get("/").text)
+    assert moved_count(clocked.http) == 0
 
 
 def test_a_mended_clock_is_judged_by_who_comes_then(clocked):
