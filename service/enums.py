@@ -110,6 +110,19 @@ class Answer(StrEnum):
     FALSE_ALARM = "false_alarm"
 
 
+class Act(StrEnum):
+    """What can be done with many: the first three with alerts, the others with cameras."""
+
+    ACKNOWLEDGE = "acknowledge"
+    SILENCE = "silence"
+    RESOLVE = "resolve"
+    MAINTENANCE = "maintenance"
+    PUT_BACK = "put_back"
+    ACCEPT = "accept"
+    RESET = "reset"
+    UNDO = "undo"
+
+
 class Outcome(StrEnum):
     """The outcome of an alert: a person's answer or act, or something by itself."""
 

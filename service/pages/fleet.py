@@ -22,7 +22,7 @@ from service.enums import AlertKind, PoseState, Severity, TokenScope
 from service.pages.drawings.sparkline import sparkline
 from service.references import drift_limits, wanted_tracks
 from service.settings import Settings
-from service.store import fleet, journal
+from service.store import alerts, fleet, journal
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.trainings import TrainingRecord
@@ -248,7 +248,7 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
         "fleet.html",
         newest_event=newest,
         counts=[(each, word, count[each]) for each, word in STATES.items()],
-        waiting=sum(row.waiting for row in cameras) + sum(group.waits for group in groups),
+        waiting=alerts.count_waiting(session, datetime.now(UTC)),
         rows=cameras,
         groups=groups,
         **_words(request, state),

@@ -8,7 +8,7 @@ from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
-from service.wording.moves import NAMES
+from service.wording.moves import NAMES, offset_words
 from service.wording.reasons import in_words, percent
 from service.wording.times import Clock
 
@@ -150,6 +150,17 @@ class AnswerWords:
     outcome: Answer
     label: str
     consequence: str
+
+
+def alert_line(alert: AlertRecord) -> str:
+    """What an alert tells of, in a line of a list."""
+    if alert.kind == AlertKind.CLOCK and alert.camera_id is not None:
+        return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+    if alert.kind == AlertKind.UNSURE:
+        return "people walk on none of the learned paths: turned far, or they walk elsewhere"
+    if alert.kind == AlertKind.DRIFT and (moved := offset_words(alert.drift)):
+        return moved
+    return in_words(alert.reasons)
 
 
 def answers(kind: AlertKind) -> list[AnswerWords]:

@@ -219,6 +219,9 @@ def _alerts(run: _Run) -> None:
     silence = {"until": until, "reason": "a van stands before it", "by": "Ada"}
     run.ask("POST", "/alerts/{alert_id}/silence", silence, **one)
     run.ask("GET", "/alerts/{alert_id}", **one)
+    file = run.http.get("/alerts", params={"format": "csv", "limit": 1}).text
+    run.keep("GET", "/alerts", "text/csv", file)
+    run.ask("POST", "/acts", {"ids": [found["id"]], "act": "acknowledge", "by": "Ada"})
     given = {"outcome": "put_back", "note": "a ladder had leant on it", "by": "Ada"}
     run.ask("POST", "/alerts/{alert_id}/resolve", given, **one)
 
