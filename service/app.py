@@ -9,6 +9,7 @@ from fastapi import FastAPI
 
 from service.api import (
     activity,
+    acts,
     alerts,
     cameras,
     client,
@@ -42,7 +43,15 @@ from service.api.middleware.problems import FORESEEN, ProblemMiddleware, answer_
 from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
-from service.pages import access, api_docs, camera_page, connecting, fleet, registration
+from service.pages import (
+    access,
+    alerts_page,
+    api_docs,
+    camera_page,
+    connecting,
+    fleet,
+    registration,
+)
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -99,6 +108,7 @@ def create_app(settings: Settings) -> FastAPI:
         zones,
         trainings,
         alerts,
+        acts,
         maintenance,
         webhooks,
         events,
@@ -107,6 +117,7 @@ def create_app(settings: Settings) -> FastAPI:
         client,
         api_docs,
         fleet,
+        alerts_page,
         camera_page,
         connecting,
         registration,

@@ -30,6 +30,7 @@ class Cause(StrEnum):
     REFERENCE = "reference"
     MAINTENANCE = "maintenance"
     PUT_BACK = "put_back"
+    MENDED = "mended"
     FALSE_ALARM = "false_alarm"
 
 
@@ -103,18 +104,34 @@ class Severity(StrEnum):
 
 
 class Answer(StrEnum):
-    """A person's answer on how a camera stands."""
+    """A person's answer on what an alert tells of; which of them there are hangs on its kind."""
 
     PUT_BACK = "put_back"
     ACCEPTED = "accepted"
+    MENDED = "mended"
     FALSE_ALARM = "false_alarm"
 
 
+class Act(StrEnum):
+    """What can be done with many: the first three with alerts, the others with cameras."""
+
+    ACKNOWLEDGE = "acknowledge"
+    SILENCE = "silence"
+    RESOLVE = "resolve"
+    MAINTENANCE = "maintenance"
+    PUT_BACK = "put_back"
+    ACCEPT = "accept"
+    RESET = "reset"
+    UNDO = "undo"
+
+
 class Outcome(StrEnum):
-    """The outcome of an alert: a person's answer, or something by itself."""
+    """The outcome of an alert: a person's answer or act, or something by itself."""
 
     PUT_BACK = Answer.PUT_BACK
     ACCEPTED = Answer.ACCEPTED
+    MENDED = Answer.MENDED
+    RELEARNED = "relearned"
     FALSE_ALARM = Answer.FALSE_ALARM
     CLEARED = "cleared"
     CAMERA_REMOVED = "camera_removed"
@@ -129,6 +146,7 @@ class AlertActivity(StrEnum):
     SILENCED = "silenced"
     SILENCE_ENDED = "silence_ended"
     RESOLVED = "resolved"
+    REOPENED = "reopened"
 
 
 class WindowState(StrEnum):
@@ -222,7 +240,9 @@ class Activity(StrEnum):
     POSE_AGREED = "pose.agreed"
     POSE_ACCEPTED = "pose.accepted"
     POSE_PUT_BACK = "pose.put_back"
+    POSE_MENDED = "pose.mended"
     POSE_FALSE_ALARM = "pose.false_alarm"
+    POSE_UNDONE = "pose.undone"
     REFERENCE_RESET = "reference.reset"
     REFERENCE_LEARNED = "reference.learned"
     SOURCE_USED = "source.used"
@@ -233,6 +253,7 @@ class Activity(StrEnum):
     ALERT_SILENCED = "alert.silenced"
     ALERT_SILENCE_ENDED = "alert.silence_ended"
     ALERT_RESOLVED = "alert.resolved"
+    ALERT_REOPENED = "alert.reopened"
     MAINTENANCE_PLANNED = "maintenance.planned"
     MAINTENANCE_CHANGED = "maintenance.changed"
     MAINTENANCE_ENDED = "maintenance.ended"

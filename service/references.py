@@ -136,11 +136,11 @@ def keep_answer(session: Session, camera_id: str, answer: Answer, by: str | None
     """Judge a camera by tracks that are yet to come: a person says that it is at its prior pose.
 
     Its reference holds, if there is one. One that is being learned begins anew once the camera was
-    put back: nobody knows how it stood meanwhile. So does one in doubt.
+    put back, or its clock mended: nobody knows how it was meanwhile. So does one in doubt.
     """
     reference = references.newest(session, camera_id)
     newest_s = tracks.newest_end_s(session, camera_id)
-    if answer == Answer.PUT_BACK and (reference.ready_at is None or reference.doubts):
+    if answer != Answer.FALSE_ALARM and (reference.ready_at is None or reference.doubts):
         begin_reference(session, camera_id, Origin.PUT_BACK, from_s=newest_s, by=by)
     elif reference.ready_at is not None:
         if newest_s is not None:
@@ -237,7 +237,7 @@ def _move_of(record: AlertRecord, settings: Settings) -> SuspectedMove | None:
         to_s=record.resolved_at.timestamp(),
         resolved_at=record.resolved_at,
         excluded=record.outcome != Outcome.FALSE_ALARM,
-        by_person=record.outcome in (Outcome.PUT_BACK, Outcome.FALSE_ALARM),
+        by_person=record.outcome in alerts.ANSWERS,
     )
 
 

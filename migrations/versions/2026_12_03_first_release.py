@@ -24,16 +24,17 @@ TABLES = sa.MetaData(
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 ALERT_KINDS = "drift no_data clock unsure stale tracker picture"
-OUTCOMES = "put_back accepted false_alarm cleared camera_removed"
+OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.removed pose.agreed pose.accepted pose.put_back "
-    "pose.false_alarm reference.reset reference.learned source.used source.removed alert.opened "
-    "alert.escalated alert.acknowledged alert.silenced alert.silence_ended alert.resolved "
-    "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
-    "maintenance.over training.requested training.succeeded training.failed training.cancelled "
-    "snapshot.kept snapshot.removed zones.drawn webhook.added webhook.changed "
-    "webhook.secret_changed webhook.removed webhook.tested webhook.replayed token.added "
-    "token.revoked session.began session.ended login.refused"
+    "pose.mended pose.false_alarm pose.undone reference.reset reference.learned source.used "
+    "source.removed alert.opened alert.escalated alert.acknowledged alert.silenced "
+    "alert.silence_ended alert.resolved alert.reopened maintenance.planned maintenance.changed "
+    "maintenance.ended maintenance.withdrawn maintenance.over training.requested "
+    "training.succeeded training.failed training.cancelled snapshot.kept snapshot.removed "
+    "zones.drawn webhook.added webhook.changed webhook.secret_changed webhook.removed "
+    "webhook.tested webhook.replayed token.added token.revoked session.began session.ended "
+    "login.refused"
 )
 
 
@@ -208,7 +209,7 @@ table(
     *needed(DateTime, "created_at"),
     *optional(DateTime, "ready_at"),
     one_of("origin", "assumed agreed registered changed accepted reset put_back source"),
-    one_of("answer", "put_back false_alarm"),
+    one_of("answer", "put_back mended false_alarm"),
     Index(None, "camera_id", "id"),
 )
 table(

@@ -42,6 +42,7 @@ _NOTIFIED_AS = {
     AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
     AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
     AlertActivity.RESOLVED: MessageType.ALERT_RESOLVED,
+    AlertActivity.REOPENED: MessageType.ALERT_OPENED,
 }
 
 
@@ -124,11 +125,15 @@ def end_alert(
 def close_pose_alerts(
     session: Session, camera_id: str, outcome: Outcome, by: str | None, note: str | None = None
 ) -> None:
-    """End the open alerts that measure a camera against its prior pose, if there are any."""
+    """End the open alerts that measure a camera against its prior pose, if there are any.
+
+    A clock is neither put back nor accepted: its alert is mended with the pose.
+    """
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            close_alert(session, record, outcome, note, by)
+            clock = kind == AlertKind.CLOCK and outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED)
+            close_alert(session, record, Outcome.MENDED if clock else outcome, note, by)
 
 
 def close_alert(
@@ -150,6 +155,16 @@ def close_alert(
     over = group is not None and not alerts.firing_members(session, group.id)
     if group is not None and group.state == AlertState.FIRING and over:
         close_alert(session, group, outcome, note, by)
+
+
+def reopen_alert(session: Session, record: AlertRecord, by: str | None) -> None:
+    """Have an alert fire on that was ended in error; one of a group that has ended, by itself."""
+    group = None if record.group_id is None else session.get(AlertRecord, record.group_id)
+    if group is not None and group.state != AlertState.FIRING:
+        record.group_id = None
+    record.state, record.outcome = AlertState.FIRING, None
+    record.note = record.resolved_by = record.resolved_at = None
+    note_on_alert(session, record, AlertActivity.REOPENED, by)
 
 
 def end_empty_groups(session: Session) -> None:
@@ -275,6 +290,6 @@ def _tell(session: Session, record: AlertRecord, message: MessageType) -> None:
         return
     record.notified = True
     body = alert_body(record)
-    event = {name: body[name] for name in _EVENT_FIELDS}
+    event = {name: body[name] for name in _EVENT_FIELDS} | {"message": message}
     journal.add_event(session, EventType.ALERT, event, datetime.now(UTC))
     queue_alert(session, record, body, message)

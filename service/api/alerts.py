@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated, Any, Self
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query, Request
+from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, BeforeValidator, Field
 from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
+from service.api.alerts_csv import AlertFormat, alerts_csv
 from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
@@ -26,7 +28,8 @@ from service.api.schemas import (
 from service.cameras import decisions
 from service.degrees import in_degrees
 from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
-from service.notifications.outbox import alert_body
+from service.errors import MalformedError
+from service.notifications.outbox import alert_body, json_time
 from service.store.access import name_in
 from service.store.alerts import AlertFilter, AlertRecord
 from service.wording.times import from_seconds
@@ -111,9 +114,10 @@ class AlertDetail(AlertOut):
 
 
 class AlertList(BaseModel):
-    """Alerts, newest first."""
+    """Alerts, newest first; `next_cursor` leads to older ones."""
 
     items: list[AlertOut]
+    next_cursor: str | None
 
 
 class OffsetOut(BaseModel):
@@ -187,29 +191,83 @@ class EvidenceOut(BaseModel):
         return cls.model_validate(body | times)
 
 
-router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
+def cursor_after(record: AlertRecord) -> str:
+    """What leads to the alerts that were opened before one."""
+    return f"{json_time(record.opened_at)}~{record.id}"
 
 
-@router.get("")
-def list_all(
-    session: ReadDep,
+def _read_cursor(cursor: str) -> tuple[datetime, str]:
+    at, _, alert_id = cursor.partition("~")
+    try:
+        opened_at = datetime.fromisoformat(at)
+        if not alert_id or opened_at.tzinfo is None:
+            raise ValueError
+    except ValueError:
+        reason = f"the next_cursor of a page before is needed, got {cursor!r:.80}"
+        raise MalformedError.of_field("cursor", reason) from None
+    return opened_at, alert_id
+
+
+def chosen_alerts(
     state: AlertState | None = None,
+    kind: Annotated[list[AlertKind] | None, Query(description="one or several")] = None,
+    severity: Severity | None = None,
     camera_id: Text | None = None,
     group_id: Text | None = None,
     acknowledged: bool | None = None,
     silenced: bool | None = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-) -> AlertList:
-    """Alerts, newest first."""
-    wanted = AlertFilter(
+    from_: Annotated[Moment | None, Query(alias="from", description="opened at or after")] = None,
+    to: Annotated[Moment | None, Query(description="opened before")] = None,
+    cursor: Annotated[Text | None, Query(description="`next_cursor` of the page before")] = None,
+) -> AlertFilter:
+    """The choice of alerts that a query says, of the API as of the page."""
+    return AlertFilter(
         state=state,
+        kinds=kind or None,
+        severity=severity,
         camera_id=camera_id,
         group_id=group_id,
         acknowledged=acknowledged,
         silenced=silenced,
+        opened_from=from_,
+        opened_to=to,
+        before=None if cursor is None else _read_cursor(cursor),
     )
-    records = alerts.list_alerts(session, wanted, limit)
-    return AlertList.model_validate({"items": [alert_body(record) for record in records]})
+
+
+ChosenDep = Annotated[AlertFilter, Depends(chosen_alerts)]
+CSV = "text/csv"
+_MOST_LINES = 10_000
+_SAVED = {"Content-Disposition": 'attachment; filename="alerts.csv"'}
+router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
+
+
+@router.get("", response_model=AlertList, responses={200: {"content": {CSV: {}}}})
+def list_all(
+    request: Request,
+    session: ReadDep,
+    chosen: ChosenDep,
+    format_: Annotated[
+        AlertFormat | None, Query(alias="format", description="a file for a spreadsheet")
+    ] = None,
+    limit: Annotated[int | None, Query(ge=1, le=10_000, description="1,000 of JSON")] = None,
+) -> AlertList | Response:
+    """Alerts, newest first: 100 a page if unsaid, of CSV 10,000. A browser is led to the page."""
+    if format_ == AlertFormat.CSV:
+        found = alerts.list_alerts(session, chosen, limit or _MOST_LINES)
+        return Response(alerts_csv(found), media_type=CSV, headers=_SAVED)
+    if "text/html" in request.headers.get("accept", ""):
+        query = f"?{request.url.query}" if request.url.query else ""
+        return RedirectResponse(f"/ui/alerts{query}", status_code=303)
+    wanted = min(limit or 100, 1000)
+    records = alerts.list_alerts(session, chosen, wanted + 1)
+    page = records[:wanted]
+    return AlertList.model_validate(
+        {
+            "items": [alert_body(record) for record in page],
+            "next_cursor": cursor_after(page[-1]) if len(records) > wanted else None,
+        }
+    )
 
 
 @router.get("/{alert_id}")

@@ -32,8 +32,10 @@ from service.api.schemas import (
     Who,
 )
 from service.cameras import cameras, decisions, poses
+from service.cameras.answers import Decision
 from service.cameras.poses import PoseView
 from service.cameras.proposals import Proposal
+from service.cameras.undo import undo_answer
 from service.degrees import in_degrees
 from service.enums import PoseState
 from service.errors import ConflictError, MalformedError
@@ -66,6 +68,10 @@ class PutBackBody(_DecisionBody):
 
 class ResetBody(_DecisionBody):
     """Who says that the camera is at its prior pose and has to be learned anew there."""
+
+
+class UndoBody(_DecisionBody):
+    """Who takes the last answer about the pose back, and why."""
 
 
 class SdOut(BaseModel):
@@ -360,6 +366,14 @@ def put_back(
     return _decide(decisions.put_back, state, session, camera_id, body)
 
 
+@router.post("/pose/undo")
+def undo(
+    camera_id: str, state: StateDep, session: WriteDep, body: UndoBody | None = None
+) -> ServedPoseOut:
+    """Take the last answer about the pose back, for 15 minutes and until something hangs on it."""
+    return _decide(undo_answer, state, session, camera_id, body)
+
+
 @router.post("/reference/reset")
 def reset(
     camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
@@ -369,12 +383,12 @@ def reset(
 
 
 def _decide(
-    use_case: Callable[[Session, JobQueue, Settings, decisions.Decision], PoseView],
+    use_case: Callable[[Session, JobQueue, Settings, Decision], PoseView],
     state: AppState,
     session: Session,
     camera_id: str,
     body: _DecisionBody | None,
 ) -> ServedPoseOut:
     said = body or _DecisionBody()
-    decision = decisions.Decision(camera_id=camera_id, by=name_in(session, said.by), note=said.note)
+    decision = Decision(camera_id=camera_id, by=name_in(session, said.by), note=said.note)
     return ServedPoseOut.from_value(use_case(session, state.queue, state.settings, decision))

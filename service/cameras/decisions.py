@@ -3,33 +3,23 @@
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
 
-from dataclasses import dataclass
-
 from sqlalchemy.orm import Session
 
 from service.access.activity import note as note_activity
 from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
+from service.cameras.answers import Decision, state_before
 from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.held_poses import held_pose
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.zones import keep_drawn
-from service.enums import Activity, AlertState, Answer, Origin, Outcome
-from service.errors import ConflictError
+from service.enums import Activity, AlertKind, AlertState, Answer, Origin, Outcome
+from service.errors import ConflictError, MalformedError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.references import begin_reference, keep_answer
 from service.settings import Settings
 from service.store import alerts, tracks
 from service.store.alerts import AlertRecord
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decision:
-    """A person's answer about a camera: who, if they say so, and why."""
-
-    camera_id: str
-    by: str | None
-    note: str | None = None
 
 
 def accept_pose(
@@ -39,9 +29,15 @@ def accept_pose(
 
     Raises:
         NotFoundError: there is no such camera.
-        ConflictError: no pose has been estimated yet.
+        ConflictError: no pose has been estimated yet, or its height may be a wrong clock's.
     """
     view = view_pose(session, settings, decision.camera_id)
+    clock = alerts.firing(session, decision.camera_id, AlertKind.CLOCK)
+    if clock is not None:
+        raise ConflictError(
+            f"pose: its clock looks wrong, and a wrong clock looks like another height: end alert "
+            f"{clock.id} first, as mended or false_alarm"
+        )
     if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     held = held_pose(session, decision.camera_id)  # as long as the alert is open
@@ -118,7 +114,7 @@ def learn_anew(
         NotFoundError: there is no such camera.
     """
     require_camera(session, decision.camera_id)
-    _close(session, decision, Outcome.PUT_BACK, Activity.REFERENCE_RESET)
+    _close(session, decision, Outcome.RELEARNED, Activity.REFERENCE_RESET)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     begin_reference(session, decision.camera_id, Origin.RESET, from_s=from_s, by=decision.by)
     request_estimate(session, queue, decision.camera_id)
@@ -142,8 +138,16 @@ def resolve_alert(
     Raises:
         NotFoundError: there is none of that id.
         ConflictError: it is resolved, or there is no pose to accept.
+        MalformedError: nothing of its kind can come to that.
     """
     record = require_firing(session, alert_id)
+    known = alerts.answers_of(record.kind)
+    if answer not in known:
+        raise MalformedError.of_field(
+            "outcome",
+            f"{' or '.join(known)} is what an alert of kind {record.kind} can come to, "
+            f"got {answer}",
+        )
     for each in (*alerts.firing_members(session, record.id), record):
         if each.state != AlertState.FIRING:
             continue
@@ -160,8 +164,7 @@ def resolve_alert(
 
 def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answer) -> None:
     """Have a camera judged against its prior pose by whoever comes from now on."""
-    what = Activity.POSE_PUT_BACK if answer == Answer.PUT_BACK else Activity.POSE_FALSE_ALARM
-    _close(session, decision, Outcome(answer), what)
+    _close(session, decision, Outcome(answer), Activity(f"pose.{answer}"))
     keep_answer(session, decision.camera_id, answer, decision.by)
     request_estimate(session, queue, decision.camera_id)
 
@@ -169,5 +172,6 @@ def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answe
 def _close(session: Session, decision: Decision, outcome: Outcome, what: Activity) -> None:
     """Close a camera's alerts about its pose, and keep who said what came of them."""
     camera_id, by, note = decision.camera_id, decision.by, decision.note
+    details = {"before": state_before(session, camera_id)}
     close_pose_alerts(session, camera_id, outcome, by, note)
-    note_activity(session, what, by=by, camera_id=camera_id, text=note)
+    note_activity(session, what, by=by, camera_id=camera_id, text=note, details=details)

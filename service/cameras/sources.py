@@ -138,7 +138,8 @@ def use_source(
     from_s = _still_from_s(session, settings, reference)
     if reference.ready_at is not None and not _is_well(session, settings, reference):
         from_s = sources.newest_end_s(session, camera_id, name)
-    _count(session, queue, record, from_s, by)
+    # Who chose knows of the other one: it is not told of, though it goes on.
+    _count(session, queue, record, from_s, by, told_at=datetime.now(UTC))
 
 
 def remove_source(session: Session, camera_id: str, name: str, by: str | None) -> None:
@@ -226,14 +227,19 @@ def _make_room(session: Session, camera_id: str, name: str, most: int) -> None:
 
 
 def _count(
-    session: Session, queue: JobQueue, record: SourceRecord, from_s: float | None, by: str | None
+    session: Session,
+    queue: JobQueue,
+    record: SourceRecord,
+    from_s: float | None,
+    by: str | None,
+    told_at: datetime | None = None,
 ) -> None:
-    """Have a source's tracks make the reference from now on."""
+    """Have a source's tracks make the reference from now on; the former was `told_at` of."""
     camera_id, last = record.camera_id, references.newest(session, record.camera_id).source
     begin_reference(session, camera_id, Origin.SOURCE, from_s=from_s, by=by, source=record.name)
     former = None if last is None else sources.find(session, camera_id, last)
     if former is not None:
-        former.told_at = None  # should it come back, it is new again
+        former.told_at = told_at  # if not yet, it is new again should it come back
     words = source_change(record.name, last)
     end_alert(session, camera_id, AlertKind.TRACKER, Outcome.CLEARED, note=f"now counts: {words}")
     note(session, Activity.SOURCE_USED, by=by, camera_id=camera_id, text=words)

@@ -15,13 +15,15 @@ from sqlalchemy.orm import Session
 from models.monitoring.verdict import Drift
 from service.alerts.arrival_models import unpacked
 from service.alerts.data_gaps import is_no_data
-from service.enums import AlertSource, Answer, Cause, Origin, PoseState, Severity
+from service.enums import AlertSource, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
 from service.settings import Settings
 from service.store import fleet
 from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
+
+_ANSWERED = (Cause.PUT_BACK, Cause.MENDED, Cause.FALSE_ALARM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,9 +169,7 @@ def _cause(reference: SiteReferenceRecord, attended: Attendance, now: datetime) 
     if reference.answer is not None and reference.answered_at is not None:
         if left_s is not None and left_s > reference.answered_at.timestamp():
             return Cause.MAINTENANCE
-        if reference.answer == Answer.FALSE_ALARM:
-            return Cause.FALSE_ALARM
-        return Cause.PUT_BACK
+        return Cause(reference.answer)
     if left_s is not None and left_s > max(reference.from_s or 0.0, reference.to_s or 0.0):
         return Cause.MAINTENANCE
     return Cause.PUT_BACK if reference.origin == Origin.PUT_BACK else Cause.REFERENCE
@@ -199,6 +199,6 @@ def _since(
         return newest.estimate.drift_since
     if state == PoseState.NO_DATA and newest.last_track_s is not None:
         return datetime.fromtimestamp(newest.last_track_s, UTC)
-    if cause in (Cause.PUT_BACK, Cause.FALSE_ALARM) and reference.answered_at is not None:
+    if reference.answered_at is not None and cause in _ANSWERED:
         return reference.answered_at
     return reference.created_at if reference.ready_at is None else reference.ready_at

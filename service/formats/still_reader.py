@@ -9,7 +9,7 @@ import sys
 import warnings
 from io import BytesIO
 
-from PIL import Image, ImageOps
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from service.formats.confined import give_up_rights
 
@@ -50,6 +50,8 @@ def _read(body: bytes, form: str) -> tuple[dict[str, str | int], bytes]:
                 return {"pixels": pixels, "most": _MOST_PIXELS}, b""
             # A camera that was mounted on its side says so in EXIF, which is not kept.
             image = ImageOps.exif_transpose(found).convert("RGB")
+    except UnidentifiedImageError:  # its message names a Python object
+        return {"refused": f"not a {form} image"}, b""
     except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError) as error:
         return {"refused": f"not a whole {form} image: {error}"}, b""
     except MemoryError:

@@ -20,6 +20,7 @@ from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
 from service.cameras.sources import SourceView, rival_sources
+from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
 from service.enums import AlertState, PoseState, TokenScope
 from service.pages.camera_drawings import draw_camera
@@ -37,7 +38,7 @@ from service.wording import camera as camera_words
 from service.wording import moves
 from service.wording.camera import CameraFacts
 from service.wording.reasons import in_words
-from service.wording.times import Clock, next_morning
+from service.wording.times import Clock
 from service.wording.zones import corner_words, zone_words
 
 _TRACKS = 120  # more are a carpet
@@ -81,6 +82,7 @@ class CameraPage:
     zones: ZonesView
     snapshots_allowed: bool
     newest_event_id: int
+    answer: ActivityRecord | None
 
     @property
     def firing(self) -> tuple[AlertStory, ...]:
@@ -173,6 +175,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         zones=view_zones(session, camera_id),
         snapshots_allowed=settings.snapshots == "pictures",
         newest_event_id=newest_event_id,
+        answer=last_answer(session, camera_id, now),
     )
 
 
@@ -201,6 +204,8 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         people=camera_words.people_words(learned.counted, learned.hours),
         few_hours=camera_words.few_hours_words(learned.counted, learned.wanted, learned.hours),
         headline=camera_words.headline(page.facts, clock),
+        shown=camera_words.shown_as(page.pose.status.state, page.pose.status.alerts),
+        undo=_undo(page, caller),
         drawings=draw_camera(
             page.camera, page.pose, page.tracks, page.misplaced, page.snapshot, page.zones
         ),
@@ -220,12 +225,36 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         in_words=in_words,
         states=camera_words.STATES,
         chart_facts=_chart_facts(page),
-        tomorrow=next_morning(page.now, zone).isoformat(),
         charts_url=CHARTS_URL,
         newest_event=page.newest_event_id,
     )
     answer.headers["Content-Security-Policy"] += f"; style-src 'self' {_CHARTS_STYLE}"
     return answer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UndoWords:
+    """An answer that can be taken back: `who` gave it, named or "You"."""
+
+    by: str | None
+    who: str
+    words: str
+    at: datetime
+    until: datetime
+
+
+def _undo(page: CameraPage, caller: Caller | None) -> UndoWords | None:
+    entry = page.answer
+    if entry is None:
+        return None
+    own = caller is not None and caller.name == entry.by
+    return UndoWords(
+        by=entry.by,
+        who="You" if own else entry.by or "Someone",
+        words=alert_words.ANSWERED[entry.what],
+        at=entry.at,
+        until=entry.at + UNDO_WITHIN,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

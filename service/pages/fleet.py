@@ -12,20 +12,28 @@ from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
+from service.access.tokens import Caller
 from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.api.schemas import Text
 from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
-from service.enums import PoseState, Severity
+from service.enums import AlertKind, PoseState, Severity, TokenScope
 from service.pages.drawings.sparkline import sparkline
 from service.references import drift_limits, wanted_tracks
 from service.settings import Settings
-from service.store import fleet, journal
+from service.store import alerts, fleet, journal
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.trainings import TrainingRecord
-from service.wording.camera import STATES, fleet_alert_flags, fleet_flags, fleet_line
+from service.wording import alerts as alert_words
+from service.wording.camera import (
+    STATES,
+    fleet_alert_flags,
+    fleet_flags,
+    fleet_line,
+    shown_as,
+)
 from service.wording.reasons import group_in_words
 from service.wording.times import Clock, from_seconds
 
@@ -72,6 +80,16 @@ class FleetRow:
     def state(self) -> PoseState:
         """The camera's state."""
         return self.status.state
+
+    @property
+    def shown(self) -> PoseState | AlertKind:
+        """The word of `STATES` for it."""
+        return shown_as(self.state, self.status.alerts)
+
+    @property
+    def waiting(self) -> int:
+        """Its alerts that nobody has taken up, but for those that a group speaks for."""
+        return sum(waits(alert, self.now) for alert in self.status.alerts)
 
     @property
     def attended_until(self) -> datetime | None:
@@ -145,10 +163,14 @@ class FleetRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetGroup:
-    """An alert that blames a tracker or its clock for what many cameras show, by id and name."""
+    """An alert that blames a tracker or its clock for what many cameras show, by id and name.
+
+    It `waits` as long as nobody has taken it up.
+    """
 
     alert: AlertRecord
     cameras: tuple[tuple[str, str], ...]
+    waits: bool
 
     @property
     def since(self) -> datetime:
@@ -187,13 +209,14 @@ def list_fleet(
 
 def list_groups(session: Session) -> list[FleetGroup]:
     """The alerts that blame trackers, the newest first."""
-    groups = fleet.firing_groups(session)
+    now, groups = datetime.now(UTC), fleet.firing_groups(session)
     wanted = {camera_id for group in groups for camera_id in group.camera_ids or []}
     names = dict(fleet.names(session, wanted)) if wanted else {}
     return [
         FleetGroup(
             alert=group,
             cameras=tuple((i, names[i]) for i in group.camera_ids or [] if i in names),
+            waits=waits(group, now),
         )
         for group in groups
     ]
@@ -218,16 +241,17 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     # What happens from here on is an event that the page asks for, even if it is in here too.
     newest = journal.newest_event_id(session)
     cameras = list_fleet(session, state.settings)
-    count = Counter(camera.state for camera in cameras)
+    count = Counter(camera.shown for camera in cameras)
+    groups = list_groups(session)
     return render(
         request,
         "fleet.html",
         newest_event=newest,
         counts=[(each, word, count[each]) for each, word in STATES.items()],
-        urgent=count[PoseState.DRIFTING],
+        waiting=alerts.count_waiting(session, datetime.now(UTC)),
         rows=cameras,
-        groups=list_groups(session),
-        **_words(state),
+        groups=groups,
+        **_words(request, state),
     )
 
 
@@ -241,18 +265,24 @@ def rows(
     """The rows of some cameras, or of all; one that is gone has none."""
     wanted = None if ids is None else set(ids.split(","))
     found = list_fleet(session, state.settings, wanted)
-    return render(request, "_fleet_rows.html", rows=found, **_words(state))
+    return render(request, "_fleet_rows.html", rows=found, **_words(request, state))
 
 
 @router.get("/ui/fleet/banners")
 def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """The alerts that blame trackers."""
-    return render(request, "_fleet_banners.html", groups=list_groups(session), **_words(state))
+    return render(
+        request, "_fleet_banners.html", groups=list_groups(session), **_words(request, state)
+    )
 
 
-def _words(state: AppState) -> dict[str, Any]:
-    """The words that the templates say times, states and alerts with."""
+def _words(request: Request, state: AppState) -> dict[str, Any]:
+    """The words that the templates say times, states and alerts with, and what is offered."""
+    caller: Caller | None = request.state.caller
     return dict(
+        registers=caller is None or caller.may(TokenScope.ADMIN),
+        operates=caller is None or caller.may(TokenScope.OPERATE),
+        words=alert_words,
         clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
         states=STATES,
         in_words=group_in_words,

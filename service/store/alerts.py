@@ -1,6 +1,6 @@
 """Alerts."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -22,7 +22,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
 
-from service.enums import AlertKind, AlertSource, AlertState, Outcome, Severity
+from service.enums import AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
 from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
 
@@ -106,6 +106,11 @@ class AlertRecord(Record):
 
 MOVED_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that say that a camera has moved, or its clock
 POSE_KINDS = (*MOVED_KINDS, AlertKind.UNSURE)  # that hold a camera against its prior pose
+# What came of an alert, of what a person may say of its kind; the first is that it was real.
+_OF_POSE = (Answer.PUT_BACK, Answer.ACCEPTED, Answer.FALSE_ALARM)
+_OF_OTHERS = (Answer.MENDED, Answer.FALSE_ALARM)
+# By which a person says that a camera is at its prior pose, and its clock is right.
+ANSWERS = (Outcome.PUT_BACK, Outcome.MENDED, Outcome.RELEARNED, Outcome.FALSE_ALARM)
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.
@@ -116,13 +121,23 @@ _FIRING = select(AlertRecord).where(
 )
 
 
+def answers_of(kind: AlertKind) -> tuple[Answer, ...]:
+    """What a person may say came of an alert: of a clock or a tracker no pose can be accepted."""
+    return _OF_POSE if kind in (AlertKind.DRIFT, AlertKind.UNSURE) else _OF_OTHERS
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertFilter:
-    """A choice of alerts; None is any."""
+    """A choice of alerts; None is any. `before` is the last one of the page before."""
 
     state: AlertState | None = None
+    kinds: Collection[AlertKind] | None = None
+    severity: Severity | None = None
     camera_id: str | None = None
     group_id: str | None = None
+    opened_from: datetime | None = None
+    opened_to: datetime | None = None
+    before: tuple[datetime, str] | None = None
     acknowledged: bool | None = None
     silenced: bool | None = None
 
@@ -218,7 +233,7 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
         .where(
             AlertRecord.camera_id == camera_id,
             AlertRecord.kind.in_(POSE_KINDS),
-            AlertRecord.outcome.in_((Outcome.PUT_BACK, Outcome.FALSE_ALARM)),
+            AlertRecord.outcome.in_(ANSWERS),
         )
         .order_by(AlertRecord.resolved_at.desc())
         .limit(1)
@@ -229,9 +244,23 @@ def listed(
     session: Session, wanted: AlertFilter, now: datetime, limit: int
 ) -> Sequence[AlertRecord]:
     """Alerts, newest first."""
-    named = ("state", "camera_id", "group_id")
+    named = ("state", "severity", "camera_id", "group_id")
     chosen = {name: getattr(wanted, name) for name in named if getattr(wanted, name) is not None}
     query = select(AlertRecord).filter_by(**chosen)
+    if wanted.kinds is not None:
+        query = query.where(AlertRecord.kind.in_(wanted.kinds))
+    if wanted.opened_from is not None:
+        query = query.where(AlertRecord.opened_at >= wanted.opened_from)
+    if wanted.opened_to is not None:
+        query = query.where(AlertRecord.opened_at < wanted.opened_to)
+    if wanted.before is not None:
+        opened_at, alert_id = wanted.before
+        query = query.where(
+            or_(
+                AlertRecord.opened_at < opened_at,
+                and_(AlertRecord.opened_at == opened_at, AlertRecord.id < alert_id),
+            )
+        )
     if wanted.acknowledged is not None:
         seen = AlertRecord.acknowledged_at.is_not(None)
         query = query.where(seen if wanted.acknowledged else not_(seen))
@@ -239,7 +268,17 @@ def listed(
         until = AlertRecord.silenced_until
         silent = and_(until.is_not(None), until > now)
         query = query.where(silent if wanted.silenced else not_(silent))
-    return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()
+    order = AlertRecord.opened_at.desc(), AlertRecord.id.desc()
+    return session.scalars(query.order_by(*order).limit(limit)).all()
+
+
+def count_waiting(session: Session, now: datetime) -> int:
+    """Open alerts that nobody has taken up; a group counts for its members."""
+    quiet = and_(AlertRecord.silenced_until.is_not(None), AlertRecord.silenced_until > now)
+    waiting = _all_firing(
+        AlertRecord.acknowledged_at.is_(None), not_(quiet), AlertRecord.group_id.is_(None)
+    )
+    return session.scalar(select(func.count()).select_from(waiting.subquery())) or 0
 
 
 def forget(session: Session, before: datetime, limit: int) -> int:

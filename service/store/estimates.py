@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import JSON, ColumnElement, Index, bindparam, func, select
+from sqlalchemy import JSON, ColumnElement, Index, bindparam, delete, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose import PoseParameters
@@ -241,3 +241,12 @@ def _where_identifiable(
         "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
         "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
     }
+
+
+def forget_later(session: Session, camera_id: str, estimate_id: int) -> None:
+    """Delete the estimates of a camera that were made after one."""
+    session.execute(
+        delete(EstimateRecord).where(
+            EstimateRecord.camera_id == camera_id, EstimateRecord.id > estimate_id
+        )
+    )

@@ -6,7 +6,7 @@ by a lock before, in whose key is the last id that was given by then: as long as
 the end of the transaction, nobody reads beyond that id. No one ever waits for these locks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -124,6 +124,14 @@ def activity_after(
 def newest_activity(session: Session, camera_id: str, limit: int) -> Sequence[ActivityRecord]:
     """The newest entries of a camera, newest first."""
     return session.scalars(newest_first(ActivityRecord, camera_id).limit(limit)).all()
+
+
+def newest_of(
+    session: Session, camera_id: str, what: Collection[Activity]
+) -> ActivityRecord | None:
+    """The newest entry of a camera that is one of some; None where there is none."""
+    query = newest_first(ActivityRecord, camera_id).where(ActivityRecord.what.in_(what))
+    return session.scalars(query.limit(1)).first()
 
 
 def activity_of_subject(session: Session, subject_id: str) -> Sequence[ActivityRecord]:

@@ -12,6 +12,7 @@ from sqlalchemy import (
     Select,
     String,
     bindparam,
+    delete,
     exists,
     func,
     select,
@@ -74,7 +75,7 @@ class SiteReferenceRecord(Record):
     ready_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("answer", (Answer.PUT_BACK, Answer.FALSE_ALARM)),
+        one_of("answer", (Answer.PUT_BACK, Answer.MENDED, Answer.FALSE_ALARM)),
         Index(None, "camera_id", "id"),
     )
 
@@ -160,6 +161,21 @@ class FlowMapRecord(Record):
     weight: Mapped[float]
     to_s: Mapped[float]
     learned_at: Mapped[datetime]
+
+
+def map_learned_at(session: Session, reference_id: int) -> datetime | None:
+    """The time at which a reference's map was learned or grew last; None where it has none."""
+    record = session.get(FlowMapRecord, reference_id)
+    return None if record is None else record.learned_at
+
+
+def forget_later(session: Session, camera_id: str, reference_id: int) -> None:
+    """Delete the references of a camera that began after one, with what was learned and told."""
+    session.execute(
+        delete(SiteReferenceRecord).where(
+            SiteReferenceRecord.camera_id == camera_id, SiteReferenceRecord.id > reference_id
+        )
+    )
 
 
 class AnchorRecord(Record):

@@ -4,9 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service.enums import Activity, AlertKind, Outcome
+from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome
+from service.store.alerts import AlertRecord
+from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
-from service.wording.moves import NAMES
+from service.wording.moves import NAMES, offset_words
+from service.wording.reasons import in_words, percent
 from service.wording.times import Clock
 
 KINDS = {
@@ -18,12 +21,67 @@ KINDS = {
     AlertKind.TRACKER: "Another tracker posts",
     AlertKind.PICTURE: "Its picture is not as it should be",
 }
+# The same in a word, for a badge.
+BADGES = {
+    AlertKind.DRIFT: "Moved",
+    AlertKind.CLOCK: "Clock",
+    AlertKind.UNSURE: "Unsure",
+    AlertKind.NO_DATA: "No people",
+    AlertKind.STALE: "Not looked at",
+    AlertKind.TRACKER: "Tracker",
+}
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",
     Outcome.ACCEPTED: "new pose accepted",
+    Outcome.MENDED: "put right",
+    Outcome.RELEARNED: "learned anew",
     Outcome.FALSE_ALARM: "false alarm",
     Outcome.CLEARED: "ended by itself",
     Outcome.CAMERA_REMOVED: "camera removed",
+}
+_OF_POSE = {
+    Answer.PUT_BACK: (
+        "It was put back",
+        "It stands as it did. What was learned there stays; the next people tell.",
+    ),
+    Answer.ACCEPTED: (
+        "Keep the new aim",
+        "Where it looks now is right from now on, and is learned anew.",
+    ),
+    Answer.FALSE_ALARM: ("It did not move", "A false alarm. The next people tell."),
+}
+_AGAIN = "Should it go on, another alert opens."
+# What a person may answer: the button, and what it comes to.
+_ANSWERS = {
+    AlertKind.DRIFT: _OF_POSE,
+    AlertKind.UNSURE: _OF_POSE,
+    AlertKind.CLOCK: {
+        Answer.MENDED: (
+            "The clock is right again",
+            "Clock or frame rate was put right; the next people tell.",
+        ),
+        Answer.FALSE_ALARM: ("Nothing was wrong", "A false alarm. The next people tell."),
+    },
+    AlertKind.NO_DATA: {
+        Answer.MENDED: ("It works again", f"Camera or tracker was repaired. {_AGAIN}"),
+        Answer.FALSE_ALARM: ("Nobody was to come", "Such a silence counts as usual from now on."),
+    },
+    AlertKind.STALE: {
+        Answer.MENDED: ("It works again", _AGAIN),
+        Answer.FALSE_ALARM: ("Nothing was wrong", _AGAIN),
+    },
+    AlertKind.TRACKER: {
+        Answer.MENDED: ("The other one is off", "Only one tracker posts from now on."),
+        Answer.FALSE_ALARM: ("Both may post", "The one that counts counts; no alert of the other."),
+    },
+}
+# After "You" or a name, of an answer that can be taken back.
+ANSWERED = {
+    Activity.POSE_ACCEPTED: "kept the new aim",
+    Activity.POSE_PUT_BACK: "said that it was put back",
+    Activity.POSE_MENDED: "said that its clock is right again",
+    Activity.POSE_FALSE_ALARM: "called this a false alarm",
+    Activity.REFERENCE_RESET: "had it learned anew",
 }
 # Notes on alerts that ended by themselves.
 TRACKS_COME_AGAIN = "tracks come again"
@@ -39,7 +97,9 @@ _DONE = {
     Activity.POSE_AGREED: "agreed to the pose that people told",
     Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
     Activity.POSE_PUT_BACK: "said that the camera is back at its prior pose",
+    Activity.POSE_MENDED: "said that the clock is mended",
     Activity.POSE_FALSE_ALARM: "said that the camera never moved",
+    Activity.POSE_UNDONE: "took the last answer back",
     Activity.REFERENCE_RESET: "had the camera learned anew at its prior pose",
     Activity.SOURCE_USED: "said whose tracks count; the reference is learned anew",
     Activity.SOURCE_REMOVED: "removed a source of tracks with its tracks",
@@ -47,6 +107,7 @@ _DONE = {
     Activity.ALERT_SILENCED: "silenced {alert} until {until}",
     Activity.ALERT_SILENCE_ENDED: "ended the silence of {alert}",
     Activity.ALERT_RESOLVED: "closed {alert}: {outcome}",
+    Activity.ALERT_REOPENED: "opened {alert} again",
     Activity.MAINTENANCE_PLANNED: "planned maintenance until {until}",
     Activity.MAINTENANCE_CHANGED: "changed the maintenance: until {until}",
     Activity.MAINTENANCE_ENDED: "ended the maintenance that was planned until {until}",
@@ -81,6 +142,55 @@ class EvidenceRow:
     label: str
     share: float
     words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerWords:
+    """An answer to an alert as its button says it, and what it comes to."""
+
+    outcome: Answer
+    label: str
+    consequence: str
+
+
+def alert_line(alert: AlertRecord) -> str:
+    """What an alert tells of, in a line of a list."""
+    if alert.kind == AlertKind.CLOCK and alert.camera_id is not None:
+        return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+    if alert.kind == AlertKind.UNSURE:
+        return "people walk on none of the learned paths: turned far, or they walk elsewhere"
+    if alert.kind == AlertKind.DRIFT and (moved := offset_words(alert.drift)):
+        return moved
+    return in_words(alert.reasons)
+
+
+def answers(kind: AlertKind) -> list[AnswerWords]:
+    """What a person may answer to an alert of a kind, that it was real first."""
+    return [
+        AnswerWords(outcome=answer, label=label, consequence=consequence)
+        for answer, (label, consequence) in _ANSWERS[kind].items()
+    ]
+
+
+def why_words(alert: AlertRecord, estimate: EstimateRecord | None, clock: Clock) -> str:
+    """Why an alert is believed, in one sentence without a statistic."""
+    if alert.source == AlertSource.ESTIMATE and estimate is not None:
+        people = f"the last {estimate.tracks} people"
+        if alert.kind == AlertKind.DRIFT:
+            return (
+                f"Where {people} walk, and how fast, fits a camera that has moved; that it still "
+                f"stands where it did is {percent(1 - estimate.moved)} likely."
+            )
+        if alert.kind == AlertKind.CLOCK:
+            return (
+                f"{people[0].upper()}{people[1:]} keep to their paths, but all of them seem to "
+                "walk too fast or too slowly. A clock or a frame rate does that by itself; a "
+                "camera seldom rises without turning."
+            )
+        if alert.kind == AlertKind.UNSURE:
+            return f"Of {people}, next to nobody keeps to a path that was learned."
+    words = in_words(alert.reasons, clock.zone)
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
 
 
 def evidence_rows(evidence: Mapping[str, Any]) -> list[EvidenceRow]:

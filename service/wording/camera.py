@@ -15,8 +15,10 @@ from service.wording.moves import drift_words, moved_words, sure_words
 from service.wording.reasons import in_words
 from service.wording.times import Clock, duration
 
-STATES = {
+# What a camera is shown as: its state, but for a wrong clock, which moves no camera.
+STATES: dict[PoseState | AlertKind, str] = {
     PoseState.DRIFTING: "Moved",
+    AlertKind.CLOCK: "Clock",
     PoseState.UNSURE: "Unsure",
     PoseState.SUSPECTED: "Maybe moved",
     PoseState.NO_DATA: "No people",
@@ -32,6 +34,14 @@ _SPOKEN_FOR = {
     PoseState.UNSURE: (AlertKind.UNSURE,),
     PoseState.NO_DATA: (AlertKind.NO_DATA,),
 }
+
+
+def shown_as(state: PoseState, alerts: Sequence[AlertRecord]) -> PoseState | AlertKind:
+    """The word of `STATES` for a camera in a state, of which some alerts fire."""
+    kinds = {alert.kind for alert in alerts}
+    if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds and AlertKind.DRIFT not in kinds:
+        return AlertKind.CLOCK
+    return state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

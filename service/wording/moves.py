@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from models.geometry.ground import Misplacement
 from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
@@ -128,6 +129,19 @@ def drift_words(drift: Drift | None) -> str:
         parts.append(f"turned {math.degrees(abs(drift.angle_rad)):.1f}° ({named})")
     if "height" in drift.identifiable and abs(drift.by.height_m) >= 0.005:
         parts.append(height_change(drift.by.height_m))
+    return ", ".join(parts)
+
+
+def offset_words(drift: Mapping[str, Any]) -> str:
+    """An alert's kept drift in a line: "tilt +1.9°, pan −0.8°, 12 cm lower"; may be empty."""
+    parts = [
+        f"{NAMES[name]} {signed(math.degrees(drift[FIELDS[name]]), 1)}°"
+        for name in ("heading", "tilt", "roll")
+        if drift.get(FIELDS[name])
+    ]
+    height_m = drift.get(FIELDS["height"])
+    if height_m is not None and abs(height_m) >= _SAYS_M:
+        parts.append(height_change(height_m))
     return ", ".join(parts)
 
 

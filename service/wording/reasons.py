@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime, tzinfo
 from enum import StrEnum
 from typing import Any
 
@@ -19,16 +19,20 @@ _SINCE = {
     Cause.REFERENCE: "since the reference",
     Cause.MAINTENANCE: "since the maintenance",
     Cause.PUT_BACK: "since the camera was put back",
+    Cause.MENDED: "since the clock was mended",
     Cause.FALSE_ALARM: "since the alert was called a false alarm",
 }
 _GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)
 
 
-def in_words(reasons: Sequence[Reason]) -> str:
-    """Reasons as one sentence without its full stop; empty where there are none."""
+def in_words(reasons: Sequence[Reason], zone: tzinfo = UTC) -> str:
+    """Reasons as one sentence without its full stop; empty where there are none.
+
+    Times in them are said by a zone's clock.
+    """
     said = ""
     for number, reason in enumerate(reasons):
-        words, values = _WORDS[reason.code], _as_told(reason.values)
+        words, values = _WORDS[reason.code], {**_as_told(reason.values), "zone": zone}
         said += words.format(**values) if isinstance(words, str) else words(values)
         if number + 1 < len(reasons):
             said += " " if reason.code is ServiceCode.LAST_IDENTIFIABLE else "; "
@@ -64,10 +68,10 @@ def _numbers(v: _Values) -> str:
             said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
         elif f"{name}_deg" in v:
             said.append(f"{name} {v[f'{name}_deg']:+.2f} deg (sd {v[f'{name}_sd_deg']:.2f})")
-    return f"{', '.join(said)} against the prior pose; moved: {_percent(v['moved'])}"
+    return f"{', '.join(said)} against the prior pose; moved: {percent(v['moved'])}"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     """A probability in words, never quite sure: "97 %", "under 1 %", "over 99.9 %"."""
     if share < 0.01:
         return "under 1 %"
@@ -155,7 +159,8 @@ def _sure_of_pose(v: _Values) -> str:
 
 
 def _maintenance(v: _Values) -> str:
-    until = f"maintenance is under way until {datetime.fromisoformat(v['until']):%Y-%m-%d %H:%M}Z"
+    at = datetime.fromisoformat(v["until"]).astimezone(v["zone"])
+    until = f"maintenance is under way until {at:%Y-%m-%d %H:%M}{'Z' if v['zone'] is UTC else ''}"
     return f"{until} ({v['note']})" if v.get("note") else until
 
 

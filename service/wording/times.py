@@ -49,12 +49,6 @@ class Clock:
         return from_seconds(seconds)
 
 
-def next_morning(now: datetime, zone: tzinfo) -> datetime:
-    """Eight o'clock of tomorrow, by the cameras' clock."""
-    local = now.astimezone(zone) + timedelta(days=1)
-    return local.replace(hour=8, minute=0, second=0, microsecond=0)
-
-
 def duration(seconds: float) -> str:
     """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
     return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale="en")

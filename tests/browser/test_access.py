@@ -99,8 +99,10 @@ def test_a_person_logs_in_makes_a_token_and_logs_out(closed, browser):
     shoot(page, "tokens")
     page.set_viewport_size({"width": 360, "height": 700})
     assert too_wide(page) <= 0
-    page.get_by_role("button", name="Revoke the token of gate").click()
-    page.get_by_role("row").filter(has_text="gate").get_by_text("revoked 20").wait_for()
+    gate = page.get_by_role("row").filter(has_text="gate")
+    gate.get_by_text("Revoke…").click()  # it asks before it does
+    gate.get_by_role("button", name="Revoke it").click()
+    gate.get_by_text("revoked 20").wait_for()
     page.goto("/")
     page.get_by_text("Live").wait_for()  # the stream of events takes the cookie
     page.get_by_role("button", name="Log out").click()
@@ -121,6 +123,7 @@ def test_who_may_only_look_is_offered_no_acts(closed, browser):
         log_in(page, "/", make_token(closed.settings, scope, name=scope))
         page.get_by_text("Live").wait_for()
         page.goto("/ui/cameras/corner")
+        page.locator("#more > summary").click()
         page.get_by_role("heading", name="What can be done").wait_for()
         buttons = page.locator("[data-act]:visible").evaluate_all(
             "all => all.map(b => b.dataset.act)"

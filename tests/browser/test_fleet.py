@@ -34,7 +34,7 @@ def shown(page):
     return page.locator("li.row:not([hidden]) .who a").all_text_contents()
 
 
-def test_an_alert_comes_up_by_itself(page, fleet):
+def test_an_alert_comes_up_by_itself(page, fleet, server):
     for name in ("Alpha", "Beta", "Gamma"):
         fleet.add(name.lower(), name)
     page.goto("/")
@@ -52,6 +52,12 @@ def test_an_alert_comes_up_by_itself(page, fleet):
     assert page.locator('.chip[data-state="drifting"] b').inner_text() == "1"
     assert page.evaluate("window.same")  # not loaded anew
     assert fetched == ["ui/fleet/rows?ids=beta"]
+    page.evaluate("document.getElementById('announce').textContent = ''")
+    (alert,) = server.http.get("/alerts").json()["items"]
+    server.http.post(f"/alerts/{alert['id']}/acknowledge", json={"by": "Ada"}).raise_for_status()
+    page.get_by_text("seen by Ada").wait_for()
+    assert page.title().startswith("Cameras")  # the number fell, and nothing was called out
+    assert page.locator("#announce").inner_text() == ""
 
 
 @pytest.mark.parametrize("width", [920, 1280])
@@ -155,8 +161,8 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     page.keyboard.type("nor")
     assert shown(page) == ["North door", "North stairs"]
     assert page.locator("#found").inner_text() == "2 cameras"
-    # the chips of moved, unsure, maybe moved, no people, uncalibrated, unconnected, learning
-    for _ in range(7):
+    # the chips of moved, clock, unsure, maybe moved, no people, uncalibrated, unconnected, learning
+    for _ in range(8):
         page.keyboard.press("Tab")
     page.keyboard.press("Space")
     assert shown(page) == ["North door"]

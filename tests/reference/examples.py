@@ -219,6 +219,9 @@ def _alerts(run: _Run) -> None:
     silence = {"until": until, "reason": "a van stands before it", "by": "Ada"}
     run.ask("POST", "/alerts/{alert_id}/silence", silence, **one)
     run.ask("GET", "/alerts/{alert_id}", **one)
+    file = run.http.get("/alerts", params={"format": "csv", "limit": 1}).text
+    run.keep("GET", "/alerts", "text/csv", file)
+    run.ask("POST", "/acts", {"ids": [found["id"]], "act": "acknowledge", "by": "Ada"})
     given = {"outcome": "put_back", "note": "a ladder had leant on it", "by": "Ada"}
     run.ask("POST", "/alerts/{alert_id}/resolve", given, **one)
 
@@ -273,7 +276,8 @@ def _accept(run: _Run, said: Any) -> None:
     bench = Bench(run.http, run.settings.model_copy(update={"window_tracks": 20}))
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))
-    run.ask("POST", "/cameras/{camera_id}/pose/accept", said, camera_id="corner")
+    for path in ("accept", "undo"):
+        run.ask("POST", f"/cameras/{{camera_id}}/pose/{path}", said, camera_id="corner")
     bench.store.close()
     bench.queue.close()
 

@@ -8,7 +8,8 @@ from hypothesis.stateful import (
     rule,
 )
 
-from service.store.alerts import POSE_KINDS
+from service.enums import Answer
+from service.store.alerts import POSE_KINDS, answers_of
 from tests.service.life import WANTED, still
 from tests.service.life_events import LifeEvents, has_camera, names, notes, said, some
 
@@ -44,9 +45,18 @@ class LifeActs(LifeEvents):
         self.answered.add(camera_id)
         self.last_entry("reference.reset", camera_id, by, None)
 
+    @has_camera
+    @rule(n=some, by=names)
+    def take_back(self, n: int, by: str | None) -> None:
+        camera_id = self.camera(n)
+        url = f"/cameras/{camera_id}/pose/undo"
+        if self.call("POST", url, 409, json=said(by=by)).is_success:
+            self.answered.discard(camera_id)
+            self.last_entry("pose.undone", camera_id, by, None)
+
     @rule(
         n=some,
-        outcome=st.sampled_from(["put_back", "accepted", "false_alarm"]),
+        outcome=st.sampled_from(list(Answer)),
         by=names,
         note=notes,
     )
@@ -56,9 +66,10 @@ class LifeActs(LifeEvents):
             return
         members = [a["camera_id"] for a in self.firing() if a["group_id"] == alert["id"]]
         body = said(outcome=outcome, by=by, note=note)
-        answer = self.call("POST", f"/alerts/{alert['id']}/resolve", 409, json=body)
+        answer = self.call("POST", f"/alerts/{alert['id']}/resolve", 409, 422, json=body)
+        assert (answer.status_code == 422) == (outcome not in answers_of(alert["kind"]))
         if not answer.is_success:
-            assert outcome == "accepted"
+            assert answer.status_code == 422 or outcome == "accepted"
             return
         shown = self.life.call("GET", f"/alerts/{alert['id']}").json()
         assert (shown["state"], shown["outcome"], shown["resolved_by"]) == ("resolved", outcome, by)

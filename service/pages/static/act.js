@@ -31,17 +31,37 @@ export async function call(method, url, body, headers = {}) {
   throw new Refused(document ?? { title: `Error ${answer.status}`, detail: answer.statusText });
 }
 
+// What a person can do about an answer that programs read.
+const PLAIN = {
+  401: "You are not logged in any more. Log in again, in another tab if you have typed much.",
+  403: "You may look, but not do this. Whoever looks after the service can give you the right.",
+  409: "Somebody was faster, or it is not so any more: ",
+};
+
+/** A reason as a person says it: without the field's name, what was typed, and times of machines. */
+export function plainly(reason, zone = document.body.dataset.zone) {
+  const words = reason
+    .replace(/^[a-z_.]+: /, "")
+    .replace(/, got [^,]*$/, "")
+    .replace(/\d{4}-\d\d-\d\dT[\d:.]+(Z|[+-]\d\d:\d\d)/g, (at) =>
+      new Intl.DateTimeFormat("en-GB", { timeZone: zone, dateStyle: "medium", timeStyle: "short" }).format(new Date(at)),
+    );
+  return words[0].toUpperCase() + words.slice(1) + (/[.!?]$/.test(words) ? "" : ".");
+}
+
 /** Show what was refused and why. */
 export function showProblem(error) {
-  const problem = error.problem ?? { title: "Something went wrong", detail: String(error) };
+  const { status, detail } = error.problem ?? { detail: String(error) };
+  const said = PLAIN[status] ?? "";
   const dialog = document.getElementById("problem");
-  document.getElementById("problem-title").textContent = problem.title;
-  document.getElementById("problem-detail").textContent = problem.detail ?? "";
-  const reasons = problem.errors?.length > 1 ? problem.errors : [];
+  document.getElementById("problem-title").textContent = "That was not done";
+  document.getElementById("problem-detail").textContent =
+    status === 409 ? said + plainly(detail) : said || plainly(detail ?? "no reason was given");
+  const reasons = error.problem?.errors?.length > 1 ? error.problem.errors : [];
   document.getElementById("problem-errors").replaceChildren(
     ...reasons.map(({ pointer, reason }) => {
       const item = document.createElement("li");
-      item.textContent = `${pointer.slice(1)}: ${reason}`;
+      item.textContent = `${pointer.slice(1)}: ${plainly(reason)}`;
       return item;
     }),
   );
@@ -83,5 +103,8 @@ export async function guarded(button, what) {
   } finally {
     button?.removeAttribute("aria-busy");
     if (button) button.disabled = false;
+    // What is disabled loses the focus, and so would who uses a keyboard.
+    const held = document.activeElement;
+    if (button?.isConnected && (held === document.body || held.closest("dialog:not([open])"))) button.focus();
   }
 }

@@ -1,7 +1,8 @@
 // The page of a camera: what happens is fetched and exchanged part by part; actions are calls.
 
 import { Refused, announce, call, confirmed, guarded } from "./act.js";
-import { ask, myName, nameMe } from "./camera_dialogs.js";
+import { ALERT_ACTS, done, listen, planMaintenance } from "./alert_acts.js";
+import { myName, nameMe, signed } from "./dialogs.js";
 import { debounced, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 
@@ -35,9 +36,17 @@ function exchange(part, news) {
   const before = part.querySelector(".summary")?.dataset;
   const focused = part.contains(document.activeElement) ? keyOf(document.activeElement) : null;
   const open = [...part.querySelectorAll("details")].map((each) => each.open);
+  const typed = [...part.querySelectorAll("input[id]")].map(({ id, value }) => [id, value]);
   part.replaceChildren(...news.childNodes);
+  for (const [id, value] of typed) {
+    const field = document.getElementById(id);
+    if (field?.type === "text") field.value = value;
+  }
   part.querySelectorAll("details").forEach((each, at) => (each.open = open[at] ?? false));
-  if (focused) [...part.querySelectorAll("button, input, a, summary")].find((each) => keyOf(each) === focused)?.focus();
+  if (focused) {
+    const again = [...part.querySelectorAll("button, input, a, summary")].find((each) => keyOf(each) === focused);
+    (again ?? document.getElementById("main")).focus({ preventScroll: true });
+  }
   const after = part.querySelector(".summary")?.dataset;
   if (before && after && (before.state !== after.state || before.alerts !== after.alerts)) {
     announce(part.querySelector(".headline").textContent);
@@ -59,59 +68,21 @@ function showName() {
   for (const place of document.querySelectorAll("[data-by]")) {
     place.textContent = myName() || "nobody yet";
   }
+  const answered = document.querySelector("[data-who]");
+  if (answered && myName() && answered.dataset.who === myName()) answered.textContent = "You";
 }
 
-const signed = (body = {}) => (myName() ? { ...body, by: myName() } : body);
+/** Do something in somebody's name, and show what came of it. */
+const put = (words, method, url, body) => done(words, signed(method, url, body));
 
-/** The body of an act with the name of who does it, asked for once; null where it is called off. */
-async function asMe(body = {}) {
-  return (await nameMe()) ? signed(body) : null;
-}
-
-async function put(words, method, url, body) {
-  const done = await call(method, url, body);
-  announce(words);
-  await refresh();
-  return done;
-}
+document.addEventListener("acted", () => refresh().catch(() => {}));
 
 const ACTS = {
-  async acknowledge({ alert }) {
-    const body = await asMe();
-    if (body) await put("Acknowledged.", "POST", `/alerts/${alert}/acknowledge`, body);
-  },
-
-  async silence({ alert }) {
-    const said = await ask("silence-dialog");
-    if (!said) return;
-    const body = await asMe({ until: silentUntil(said), ...(said.reason && { reason: said.reason }) });
-    if (body) await put("Silenced.", "POST", `/alerts/${alert}/silence`, body);
-  },
-
-  async unsilence({ alert }) {
-    const body = await asMe({ until: null });
-    if (body) await put("The silence has ended.", "POST", `/alerts/${alert}/silence`, body);
-  },
-
-  async resolve({ alert, identifiable }) {
-    const said = await ask("resolve-dialog", { needsPose: identifiable === "yes" });
-    if (!said) return;
-    if (said.outcome === "accepted") return ACTS.accept({ note: said.note });
-    const body = await asMe({ outcome: said.outcome, ...(said.note && { note: said.note }) });
-    if (body) await put("Resolved.", "POST", `/alerts/${alert}/resolve`, body);
-  },
-
-  async accept({ note }) {
-    const yes = await confirmed({
-      title: "Accept the new pose?",
-      detail:
-        "The served pose becomes the prior pose, and open alerts about it are closed. " +
-        "A new reference is learned from people who come from now on. This cannot be undone.",
-      yes: "Accept the new pose",
-    });
-    const body = yes && (await asMe(note ? { note } : {}));
-    if (body) await put("Accepted: a new reference begins.", "POST", `${path}/pose/accept`, body);
-  },
+  ...ALERT_ACTS,
+  accept: () => put("Noted: it is learned anew.", "POST", `${path}/pose/accept`),
+  "put-back": () => put("Noted: the next people will tell.", "POST", `${path}/pose/put-back`),
+  relearn: () => put("Noted: it is learned anew.", "POST", `${path}/reference/reset`),
+  undo: () => put("Taken back: all is as it was.", "POST", `${path}/pose/undo`),
 
   async agree() {
     const yes = await confirmed({
@@ -122,34 +93,7 @@ const ACTS = {
         "against it from then on.",
       yes: "Agree to it",
     });
-    const body = yes && (await asMe());
-    if (!body) return;
-    await call("POST", `${path}/pose/agree`, body);
-    location.reload();
-  },
-
-  async "put-back"() {
-    const yes = await confirmed({
-      title: "Was the camera put back?",
-      detail:
-        "It is taken to stand at its prior pose again, and open alerts about it are closed. " +
-        "Whoever comes from now on tells how it stands, against what was learned there.",
-      yes: "It was put back",
-    });
-    const body = yes && (await asMe());
-    if (body) await put("Noted: the next people will tell.", "POST", `${path}/pose/put-back`, body);
-  },
-
-  async relearn() {
-    const yes = await confirmed({
-      title: "Learn it anew?",
-      detail:
-        "It is taken to stand at its prior pose, exactly, and open alerts about it are closed. " +
-        "What was learned so far is dropped and learned anew from now on. This cannot be undone.",
-      yes: "Learn it anew",
-    });
-    const body = yes && (await asMe());
-    if (body) await put("Noted: a new reference begins.", "POST", `${path}/reference/reset`, body);
+    if (yes && (await signed("POST", `${path}/pose/agree`)) !== undefined) location.reload();
   },
 
   async "use-source"({ source }) {
@@ -160,13 +104,12 @@ const ACTS = {
         "of tracks that were seen while the camera was where it should be.",
       yes: "Let it count",
     });
-    const body = yes && (await asMe());
     const url = `${path}/sources/${encodeURIComponent(source)}/use`;
-    if (body) await put("It counts from now on.", "POST", url, body);
+    if (yes) await put("It counts from now on.", "POST", url);
   },
 
   async train() {
-    await put("A training is queued.", "POST", `${path}/trainings`, signed());
+    await done("A training is queued.", call("POST", `${path}/trainings`, myName() ? { by: myName() } : {}));
   },
 
   async cancel({ training }) {
@@ -175,17 +118,10 @@ const ACTS = {
       detail: "What it has learned so far is lost. The model in use stays in use.",
       yes: "Cancel the training",
     });
-    if (yes) await put("The training is cancelled.", "DELETE", `/trainings/${training}`);
+    if (yes) await done("The training is cancelled.", call("DELETE", `/trainings/${training}`));
   },
 
-  async maintain() {
-    const said = await ask("maintain-dialog");
-    if (!said) return;
-    const times = { to: new Date(said.to).toISOString() };
-    if (said.from) times.from = new Date(said.from).toISOString();
-    const body = await asMe({ ...times, ...(said.reason && { reason: said.reason }) });
-    if (body) await put("Maintenance is planned.", "POST", `${path}/maintenance`, body);
-  },
+  maintain: () => planMaintenance((body) => signed("POST", `${path}/maintenance`, body)),
 
   async "end-window"({ window: id, state }) {
     const yes = await confirmed({
@@ -196,13 +132,13 @@ const ACTS = {
           : "The camera will be judged then as ever.",
       yes: state === "under way" ? "End it now" : "Take it back",
     });
-    const body = yes && (await asMe());
-    const who = body?.by ? `?by=${encodeURIComponent(body.by)}` : "";
-    if (body) await put("Done.", "DELETE", `${path}/maintenance/${id}${who}`);
+    if (!yes || !(await nameMe())) return;
+    const who = myName() ? `?by=${encodeURIComponent(myName())}` : "";
+    await done("Done.", call("DELETE", `${path}/maintenance/${id}${who}`));
   },
 
   async "still-remove"() {
-    await put("The still image is deleted.", "DELETE", `${path}/snapshot`);
+    await done("The still image is deleted.", call("DELETE", `${path}/snapshot`));
   },
 
   async name() {
@@ -211,16 +147,7 @@ const ACTS = {
   },
 };
 
-function silentUntil({ how, until }) {
-  if (how === "date") return new Date(until).toISOString();
-  if (how === "tomorrow") return root.dataset.tomorrow;
-  return new Date(Date.now() + Number(how) * 3_600_000).toISOString();
-}
-
-root.addEventListener("click", (event) => {
-  const button = event.target.closest("button[data-act]");
-  if (button) guarded(button, () => ACTS[button.dataset.act]({ ...button.dataset }));
-});
+listen(root, ACTS);
 
 root.addEventListener("change", (event) => {
   const file = event.target.dataset.act === "still" && event.target.files[0];

@@ -1,6 +1,7 @@
 // The fleet as it is now: rows that something happened to are fetched anew, the others stay.
 
 import { announce } from "./act.js";
+import { ALERT_ACTS, listen } from "./alert_acts.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 
@@ -12,6 +13,8 @@ const none = document.getElementById("none");
 const plainTitle = document.title.replace(/^\(\d+\) /, "");
 const MOST_IDS = 100; // more in one address is too long; then all are fetched
 const ALL_AGAIN_MS = 120_000; // states that time alone changes
+
+const CALLED_OUT = ["alert.opened", "alert.updated"];
 
 let state = "";
 
@@ -32,8 +35,8 @@ function sift() {
     chip.classList.toggle("empty-state", !count);
     chip.setAttribute("aria-pressed", String(chip.dataset.state === state));
   }
-  const urgent = counts.drifting ?? 0;
-  document.title = (urgent ? `(${urgent}) ` : "") + plainTitle;
+  const waiting = [...document.querySelectorAll("[data-waiting]")].reduce((sum, each) => sum + Number(each.dataset.waiting), 0);
+  document.title = (waiting ? `(${waiting}) ` : "") + plainTitle;
   none.hidden = shown > 0;
   if (!shown && list.children.length) none.textContent = "No camera is like that.";
   return shown;
@@ -102,7 +105,9 @@ async function look(events) {
     console.warn(error); // the next event or the next look at all comes soon
     return;
   }
-  const alert = events.findLast(({ type, data }) => type === "alert" && data.state === "firing");
+  sift();
+  // What somebody has done with an alert is seen, and is no news to call out.
+  const alert = events.findLast(({ data }) => CALLED_OUT.includes(data.message));
   if (alert) announce(wordsOf(alert.data));
 }
 
@@ -118,6 +123,7 @@ const later = gathered(look, 1000);
 subscribe((event) => (event.type === "alert" ? soon(event) : later(event)));
 setInterval(() => document.hidden || fetchRows(null).catch(console.warn), ALL_AGAIN_MS);
 keepTimes(list, document.getElementById("banners"));
+listen(document.getElementById("banners"), ALERT_ACTS);
 
 search.addEventListener("input", siftAndSay);
 search.form.addEventListener("submit", (event) => event.preventDefault());

@@ -111,6 +111,12 @@ def test_each_scope_is_let_in_where_it_says_and_nowhere_else(closed, made, scope
             )
 
 
+def test_who_may_not_register_is_not_asked_to(closed, made):
+    """A viewer saw "Add a camera", and read "scope: this needs admin" after it."""
+    assert "/ui/register" not in closed.get("/", headers=made("read")).text
+    assert "/ui/register" in closed.get("/", headers=made("admin")).text
+
+
 def test_a_tracker_posts_for_its_cameras_alone(closed, made):
     admin = made("admin")
     for camera_id in ("corner", "gate"):

@@ -13,7 +13,7 @@ from service.reasons import as_said
 from service.store import alerts, references
 from service.workers.upkeep import reconciliation
 from tests.service.alerts.test_states import KNOCKED, at, knock, resolve, states, told_history
-from tests.service.bench import PRIOR, made_up
+from tests.service.bench import PRIOR, made_up, moved
 
 
 def test_a_plan_stays_as_it_was_when_it_ends_early(bench):
@@ -89,6 +89,19 @@ def test_an_alert_shows_on_its_page_however_many_came_after_it(bench):
     (drift,) = bench.alerts(state="firing")
     text = bench.http.get("/ui/cameras/corner").text
     assert f'id="alert-{drift["id"]}"' in text
+
+
+def test_events_say_what_was_done_so_that_pages_call_out_news_alone(bench):
+    """Acknowledging and silencing were called out on every screen like a new alert."""
+    for _ in range(3):
+        bench.see(moved(tilt_deg=5.0))
+    url = f"/alerts/{bench.alerts()[0]['id']}"
+    bench.http.post(f"{url}/acknowledge").raise_for_status()
+    bench.http.post(f"{url}/silence", json={"until": at(1)}).raise_for_status()
+    bench.http.post(f"{url}/resolve", json={"outcome": "false_alarm"}).raise_for_status()
+    told = [event["message"] for event in bench.events("alert")]
+    assert told[0] == "alert.opened"
+    assert told[-3:] == ["alert.acknowledged", "alert.silenced", "alert.resolved"]
 
 
 def test_a_member_of_a_group_is_in_the_metrics(bench):

@@ -59,7 +59,7 @@ def test_an_alert_that_no_estimate_stands_behind_has_none(bench):
 def test_the_page_draws_what_was_weighed(bench):
     bench.see(moved(tilt_deg=3.0))
     page = bench.http.get("/ui/cameras/corner").text
-    assert "What was weighed" in page
+    assert "The numbers behind it" in page
     assert "<label>Tilt moved <meter" in page
 
 

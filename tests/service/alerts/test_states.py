@@ -3,14 +3,18 @@
 import html
 import re
 from datetime import UTC, datetime, timedelta
+from zoneinfo import ZoneInfo
 
 import pytest
+from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.alerts.alerts import open_alert
+from service.app import create_app
 from service.enums import AlertSource
 from service.reasons import as_said
 from service.store import references
+from tests.conftest import CAMERA
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
 
@@ -49,10 +53,12 @@ def states(http):
     """What each place says that the state is; one word where they agree."""
     page = http.get("/ui/cameras/corner").text
     row = re.search(r'<li class="row (\w+)" id="row-corner"', http.get("/").text)[1]
+    shown = re.search(r'<section class="summary (\w+)"', page)[1]
+    assert row == shown
     return {
         http.get("/cameras/corner/pose").json()["state"],
-        re.search(r'<section class="summary (\w+)"', page)[1],
-        row,
+        # Pages call a wrong clock a clock, and no move.
+        "drifting" if row == "clock" else row,
         *metric_states(http),
     }
 
@@ -223,6 +229,23 @@ def test_accepting_by_resolving_accepts_the_pose(bench):
     assert (alert["outcome"], alert["note"]) == ("accepted", "new mast")
 
 
+def test_a_page_says_times_by_the_zone_of_the_service(settings):
+    """ "Why" said 22:54Z on a page that was of Copenhagen, and Access was in UTC."""
+    with TestClient(create_app(settings.model_copy(update={"timezone": "Asia/Tokyo"}))) as http:
+        http.post("/cameras", json=CAMERA).raise_for_status()
+        to = datetime.now(UTC) + timedelta(hours=2)
+        body = {"to": to.isoformat()}
+        http.post("/cameras/corner/maintenance", json=body).raise_for_status()
+        page = http.get("/ui/cameras/corner").text
+        local = to.astimezone(ZoneInfo("Asia/Tokyo"))
+        assert f"maintenance is under way until {local:%Y-%m-%d %H:%M}" in page
+        assert f"{to:%H:%M}Z" not in page
+        http.post("/tokens", json={"name": "Ada", "scopes": ["read"]}).raise_for_status()
+        access = http.get("/ui/tokens").text
+        assert "Times are Asia/Tokyo" in access
+        assert f"{datetime.now(ZoneInfo('Asia/Tokyo')):%Y-%m-%d %H:}" in access
+
+
 def test_there_is_no_accepting_where_nothing_is_told(bench):
     with bench.store.write() as session:
         open_alert(
@@ -230,8 +253,67 @@ def test_there_is_no_accepting_where_nothing_is_told(bench):
             reasons=as_said("3 m/s"), source=AlertSource.REFERENCE,
         )  # fmt: skip
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
-    problem(bench.http.post(url, json={"outcome": "accepted"}), 409, "conflict")
+    problem(bench.http.post(url, json={"outcome": "accepted"}), 422, "malformed")
     assert len(bench.alerts(state="firing")) == 1
+
+
+@pytest.fixture
+def clocked(bench):
+    """A camera whose people seem to walk at another speed, and so at another height."""
+    bench.see(PRIOR)
+    for _ in range(3):
+        bench.see(moved(height_m=1.32))
+    assert [alert["kind"] for alert in bench.alerts(state="firing")] == ["clock"]
+    return bench
+
+
+def test_a_clock_fault_makes_no_false_height_the_pose(clocked):
+    """It did: 1.32 m too high, by "accept"; an alert's outcomes are those of its kind."""
+    (alert,) = clocked.alerts(state="firing")
+    url = f"/alerts/{alert['id']}/resolve"
+    for outcome in ("accepted", "put_back"):
+        said = problem(clocked.http.post(url, json={"outcome": outcome}), 422, "malformed")
+        assert said["errors"][0]["pointer"] == "/outcome"
+        assert "mended or false_alarm" in said["detail"]
+    problem(clocked.http.post("/cameras/corner/pose/accept"), 409, "conflict")
+    assert clocked.http.get("/cameras/corner").json()["prior_pose"]["height_m"] == 6.0
+    assert states(clocked.http) == {"drifting"}
+    page = clocked.http.get("/ui/cameras/corner").text
+    assert "<title>Clock: The corner" in page
+    assert 'data-outcome="mended"' in page
+    assert 'data-outcome="accepted"' not in page
+    assert re.search(r"<b>1</b> Clock", clocked.http.get("/").text)
+    assert moved_count(clocked.http) == 0
+
+
+def test_a_mended_clock_is_judged_by_who_comes_then(clocked):
+    resolve(clocked, "mended", note="NTP was off")
+    (alert,) = clocked.alerts()
+    assert (alert["outcome"], alert["resolved_by"]) == ("mended", "Ada")
+    assert states(clocked.http) == {"learning"}
+    assert "since the clock was mended" in clocked.pose()["reason"]
+    assert "Ada said that the clock is mended. NTP was off" in told_history(clocked.http)
+    clocked.see(PRIOR)
+    assert states(clocked.http) == {"ok"}
+
+
+def test_learning_anew_is_kept_as_what_it_is(bench):
+    knock(bench)
+    bench.http.post("/cameras/corner/reference/reset", json={"by": "Ada"}).raise_for_status()
+    (alert,) = bench.alerts()
+    assert (alert["outcome"], alert["resolved_by"]) == ("relearned", "Ada")
+
+
+def test_other_alerts_are_mended_or_false(bench):
+    with bench.store.write() as session:
+        open_alert(
+            session, bench.settings, "corner", "no_data", "warning", {}, None,
+            reasons=as_said("nobody"), source=AlertSource.RHYTHM,
+        )  # fmt: skip
+    url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
+    problem(bench.http.post(url, json={"outcome": "put_back"}), 422, "malformed")
+    resolve(bench, "mended")
+    assert bench.alerts()[0]["outcome"] == "mended"
 
 
 def test_the_note_of_an_accepted_pose_is_kept(bench):

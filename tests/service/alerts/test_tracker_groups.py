@@ -178,11 +178,11 @@ def test_resolving_it_resolves_its_members_the_same_way(town):
     for n in range(4):
         town.moves(n)
     url = f"/alerts/{town.group()['id']}"
-    answer = {"outcome": "put_back", "note": "frame rate set right", "by": "Ada"}
+    answer = {"outcome": "mended", "note": "frame rate set right", "by": "Ada"}
     body = town.http.post(f"{url}/resolve", json=answer).json()
-    assert (body["state"], body["outcome"]) == ("resolved", "put_back")
+    assert (body["state"], body["outcome"]) == ("resolved", "mended")
     found = {(a["state"], a["outcome"], a["note"], a["resolved_by"]) for a in town.alerts()}
-    assert found == {("resolved", "put_back", "frame rate set right", "Ada")}
+    assert found == {("resolved", "mended", "frame rate set right", "Ada")}
     assert len(town.alerts()) == 5
     assert [act["by"] for act in body["acts"]] == ["Ada"]
     problem(town.http.post(f"{url}/resolve", json=answer), 409, "conflict")

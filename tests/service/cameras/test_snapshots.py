@@ -91,6 +91,12 @@ def scans(width, height, count):
     return data[:-2] + data[last:-2] * count + data[-2:]
 
 
+def test_no_refusal_names_an_object_of_python(allowed):
+    headers = {"Content-Type": "image/png"}
+    said = problem(allowed.put(URL, content=b"GIF89a", headers=headers), 422, "malformed")
+    assert said["detail"] == "body: not a PNG image"
+
+
 def test_thousands_of_scans_cost_a_reader_its_limit_and_hold_up_nobody(allowed, monkeypatch):
     """12,000 of them, 1 MB of 49 million pixels, held all large bodies for a minute and a half."""
     monkeypatch.setattr(confined, "MAX_CPU_S", 1)

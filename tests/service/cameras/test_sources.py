@@ -164,6 +164,20 @@ def test_a_person_says_at_once_which_one_counts(known):
         assert tracks.counts(session, ["corner"]) == {"corner": WANTED + 10}
 
 
+def test_the_source_that_a_person_turned_down_is_no_alert(known):
+    """A mirror of the alert that the person answered opened in the same second."""
+    known.source = "lidar/7"
+    known.keep_to_lanes(PRIOR, 3)
+    known.reconcile()
+    assert [alert["kind"] for alert in known.alerts(state="firing")] == ["tracker"]
+    known.http.post(f"{URL}/lidar/7/use", json={"by": "Ada"}).raise_for_status()
+    for source in ("tracker-1.2", "lidar/7"):
+        known.source = source
+        known.keep_to_lanes(PRIOR, 3)
+        known.reconcile()
+        assert known.alerts(state="firing") == []
+
+
 def test_after_a_reset_the_same_source_counts(known):
     known.http.post("/cameras/corner/reference/reset").raise_for_status()
     assert known.reference().source == "tracker-1.2"

@@ -8,7 +8,7 @@ import pytest
 
 from service.store.estimates import EstimateRecord
 from service.wording.moves import angle_half_width_deg, moved_words, signed
-from service.wording.times import Clock, next_morning
+from service.wording.times import Clock
 
 EVERYTHING = ["tilt", "roll", "height", "heading"]
 
@@ -90,9 +90,3 @@ def test_times_are_said_by_the_cameras_clock(at, text):
     berlin = ZoneInfo("Europe/Berlin")
     clock = Clock(now=now, zone=berlin)
     assert clock.when(datetime.fromisoformat(at).replace(tzinfo=UTC)) == text
-
-
-def test_tomorrow_at_eight_is_so_on_the_morning_after_the_clocks_change():
-    now = datetime(2026, 10, 24, 16, tzinfo=UTC)  # summer time ends in the night
-    at = next_morning(now, ZoneInfo("Europe/Berlin"))
-    assert at.astimezone(UTC) == datetime(2026, 10, 25, 7, tzinfo=UTC)

@@ -1,0 +1,144 @@
+"""`/ui/alerts`: all alerts in lines, chosen by the address, answered there, one or many at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Annotated
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from service.access.tokens import Caller
+from service.alerts.alerts import list_alerts
+from service.api.alerts import ChosenDep, cursor_after
+from service.api.middleware.dependencies import ReadDep, StateDep
+from service.api.middleware.pages import render
+from service.cameras.status import alert_since
+from service.enums import AlertKind, AlertState, Severity, TokenScope
+from service.store import alerts, fleet, journal
+from service.store.alerts import AlertRecord, answers_of
+from service.wording import alerts as alert_words
+from service.wording.camera import fleet_alert_flags
+from service.wording.times import Clock
+
+_A_PAGE = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertRow:
+    """An alert in a line: what it is about by name, what it tells, since when, whose it is."""
+
+    alert: AlertRecord
+    name: str
+    words: str
+    since: datetime
+    flags: tuple[str, ...]
+
+    @property
+    def outcomes(self) -> str:
+        """What may be answered to it; nothing once it has ended."""
+        firing = self.alert.state == AlertState.FIRING
+        return " ".join(answers_of(self.alert.kind)) if firing else ""
+
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/wall")
+def wall() -> RedirectResponse:
+    """What is on walls: the alerts that fire."""
+    return RedirectResponse("/ui/alerts", status_code=303)
+
+
+@router.get("/ui/alerts")
+def show(
+    request: Request,
+    state: StateDep,
+    session: ReadDep,
+    chosen: ChosenDep,
+    all_: Annotated[bool, Query(alias="all", description="those that have ended, too")] = False,
+) -> HTMLResponse:
+    """Alerts, newest first; those that fire, unless others are asked for."""
+    newest = journal.newest_event_id(session)
+    if chosen.state is None and not all_:
+        chosen = replace(chosen, state=AlertState.FIRING)
+    clock = Clock(now=datetime.now(UTC), zone=state.settings.zone)
+    found = list_alerts(session, chosen, _A_PAGE + 1)
+    shown = found[:_A_PAGE]
+    names = dict(fleet.names(session, {a.camera_id for a in shown if a.camera_id is not None}))
+    asked = [(k, v) for k, v in request.query_params.multi_items() if v and k != "cursor"]
+    more = None
+    if len(found) > _A_PAGE:
+        more = urlencode([*asked, ("cursor", cursor_after(shown[-1]))])
+    caller: Caller | None = request.state.caller
+    return render(
+        request,
+        "alerts.html",
+        rows=[_row(record, names, clock) for record in shown],
+        more=more,
+        chips=_chips(asked),
+        csv=_csv(asked, chosen.state),
+        clock=clock,
+        words=alert_words,
+        operates=caller is None or caller.may(TokenScope.OPERATE),
+        newest_event=newest,
+        waiting=alerts.count_waiting(session, clock.now),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chip:
+    """A choice as a link to the page with it, or without it where it is `on`."""
+
+    words: str
+    query: str
+    on: bool
+    kind: AlertKind | None = None
+
+
+def _chips(asked: Sequence[tuple[str, str]]) -> list[list[Chip]]:
+    """The choices, in groups: those of kinds add up, of all others one holds."""
+    one_of = [
+        (("Firing", ()), ("Ended", ("state", AlertState.RESOLVED)), ("All", ("all", "true"))),
+        (("Nobody's", ("acknowledged", "false")), ("Somebody's", ("acknowledged", "true"))),
+        tuple((each.capitalize(), ("severity", each)) for each in Severity),
+    ]
+    groups = []
+    for group in one_of:
+        names = {pair[0] for _, pair in group if pair}
+        others = [pair for pair in asked if pair[0] not in names]
+        chips = []
+        for label, pair in group:
+            on = pair in asked if pair else not any(name in names for name, _ in asked)
+            query = others if on or not pair else [*others, pair]
+            chips.append(Chip(words=label, query=urlencode(query), on=on))
+        groups.append(chips)
+    kinds = []
+    for kind in AlertKind:
+        pair = "kind", kind.value
+        on = pair in asked
+        query = [each for each in asked if each != pair] if on else [*asked, pair]
+        kinds.append(Chip(words=alert_words.BADGES[kind], query=urlencode(query), on=on, kind=kind))
+    return [*groups, kinds]
+
+
+def _csv(asked: Sequence[tuple[str, str]], state: AlertState | None) -> str:
+    """The query of the file that has what the page has."""
+    kept = [pair for pair in asked if pair[0] not in ("all", "state")]
+    return urlencode([("format", "csv"), *kept, *([("state", state)] if state else [])])
+
+
+def _row(record: AlertRecord, names: dict[str, str], clock: Clock) -> AlertRow:
+    if record.camera_id is None:
+        count = len(record.camera_ids or ())
+        name = f"{count} cameras of {record.track_source}"
+    else:
+        name = names.get(record.camera_id, record.camera_id)
+    return AlertRow(
+        alert=record,
+        name=name,
+        words=alert_words.alert_line(record),
+        since=alert_since(record),
+        flags=fleet_alert_flags(record, clock.now),
+    )

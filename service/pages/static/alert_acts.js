@@ -1,0 +1,65 @@
+// What can be done with an alert on any page: answered, acknowledged, silenced.
+
+import { announce, guarded } from "./act.js";
+import { ask, signed } from "./dialogs.js";
+import { instant, tomorrow } from "./zoned.js";
+
+const path = (alert, act) => `/alerts/${encodeURIComponent(alert)}/${act}`;
+
+/** Do something and say so; whoever listens for "acted" shows what came of it. */
+export async function done(words, what) {
+  const answer = await what;
+  if (answer === undefined) return undefined;
+  announce(words);
+  document.dispatchEvent(new CustomEvent("acted"));
+  return answer ?? null;
+}
+
+export const ALERT_ACTS = {
+  answer({ alert, outcome }) {
+    const note = document.getElementById(`note-${alert}`)?.value.trim();
+    const body = { outcome, ...(note && { note }) };
+    return done("Noted.", signed("POST", path(alert, "resolve"), body));
+  },
+
+  acknowledge({ alert }) {
+    return done("Acknowledged.", signed("POST", path(alert, "acknowledge")));
+  },
+
+  silence({ alert }) {
+    return ask("silence-dialog", {
+      send: (said) => done("Silenced.", signed("POST", path(alert, "silence"), silenceOf(said))),
+    });
+  },
+
+  unsilence({ alert }) {
+    return done("The silence has ended.", signed("POST", path(alert, "silence"), { until: null }));
+  },
+};
+
+/** The body of a silence, of what was said in its dialog. */
+export function silenceOf({ how, until, reason }) {
+  const ends =
+    how === "date" ? instant(until)
+    : how === "tomorrow" ? tomorrow()
+    : new Date(Date.now() + Number(how) * 3_600_000).toISOString();
+  return { until: ends, ...(reason && { reason }) };
+}
+
+/** Ask when somebody is at the camera, or cameras, and send it. */
+export function planMaintenance(send) {
+  return ask("maintain-dialog", {
+    send: ({ from, to, reason }) => {
+      const times = { to: instant(to), ...(from && { from: instant(from) }) };
+      return done("Maintenance is planned.", send({ ...times, ...(reason && { reason }) }));
+    },
+  });
+}
+
+/** Do by a click on a button with data-act what it names, and say what is refused. */
+export function listen(root, acts) {
+  root.addEventListener("click", (event) => {
+    const button = event.target.closest("button[data-act]");
+    if (button && acts[button.dataset.act]) guarded(button, () => acts[button.dataset.act]({ ...button.dataset }, button));
+  });
+}
