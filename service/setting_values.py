@@ -76,6 +76,20 @@ def read_mqtt_url(text: str) -> str:
     return text
 
 
+def read_http_url(text: str) -> str:
+    """The URL of another service.
+
+    Raises:
+        ValueError: it is none, or has a user, a query or a fragment.
+    """
+    parts = urlsplit(text)
+    plain = parts._replace(query="", fragment="").geturl() == text and "@" not in parts.netloc
+    if parts.scheme not in ("http", "https") or not parts.hostname or not plain:
+        raise ValueError("http://host:port or https://host:port is needed, without a user")
+    _ = parts.port  # raises where it is no number of one
+    return text
+
+
 def read_camera_names(text: str) -> dict[str, str]:
     """Ids of cameras by the names that others have for them: `name=id`, with commas.
 

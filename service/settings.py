@@ -201,6 +201,10 @@ class Settings(BaseSettings):
     mqtt_frigate: str = Field(
         "frigate", pattern=f"{_TOPIC}|^$", description="Frigate's topic_prefix; empty: no Frigate"
     )
+    mqtt_frigate_url: Annotated[str, values.readable(values.read_http_url)] | None = Field(
+        None,
+        description="http://host:5000 of Frigate, which is asked for whose end no broker brought",
+    )
     mqtt_cameras: Annotated[str, values.readable(values.read_camera_names)] = Field(
         "", description="sources' names of cameras, where they are others: name=id, with commas"
     )

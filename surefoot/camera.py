@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose
 
 _PRIOR = ("prior_pose", "true_pose")  # a registration's, and a recorded scene's
@@ -61,9 +62,10 @@ class Camera:
 def read_camera(path: str | Path) -> Camera:
     """The camera of a JSON file in the form of a registration over HTTP.
 
-    `intrinsics` has width, height, fx, fy, cx, cy and perhaps distortion (k1, k2, p1, p2, k3);
-    `prior_pose` (or `true_pose`) height_m, tilt_deg and perhaps roll_deg, heading_deg, x_m, y_m.
-    What else is there is not looked at.
+    `intrinsics` has width, height, fx, fy, cx, cy and perhaps distortion (k1, k2, p1, p2, k3), or
+    projection fisheye with k1 to k4; or `lens` has width, height and hfov_deg, or focal_mm and
+    sensor_mm, or fisheye. `prior_pose` (or `true_pose`) has height_m, tilt_deg and perhaps
+    roll_deg, heading_deg, x_m, y_m. What else is there is not looked at.
 
     Raises:
         ShapeError: the file is missing, no JSON, or lacks a number.
@@ -83,13 +85,16 @@ def camera_of(body: dict[str, Any]) -> Camera:
     prior = next((body[name] for name in _PRIOR if name in body), None)
     if prior is None:
         raise ShapeError("prior_pose: height_m and tilt_deg are needed, got none")
+    if ("lens" in body) == ("intrinsics" in body):
+        raise ShapeError("intrinsics, lens: one of both is needed")
     try:
-        lens = dict(body["intrinsics"])
-        camera = Camera(
-            intrinsics=Intrinsics(**{**lens, "distortion": tuple(lens.get("distortion", [0] * 5))}),
-            prior_pose=Pose(**prior),
-        )
+        if "lens" in body:
+            lens = lens_of(**body["lens"])
+        else:
+            said = dict(body["intrinsics"])
+            lens = Intrinsics(**{**said, "distortion": tuple(said.get("distortion", ()))})
+        camera = Camera(intrinsics=lens, prior_pose=Pose(**prior))
     except (KeyError, TypeError) as error:
-        raise ShapeError(f"intrinsics, prior_pose: {error}") from error
+        raise ShapeError(f"intrinsics or lens, prior_pose: {error}") from error
     _ = camera.prior_pose.in_radians  # refuses what no camera can have
     return camera

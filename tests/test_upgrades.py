@@ -29,6 +29,7 @@ INTRINSICS = {"width": 1280, "height": 720, "fx": 1100.0, "fy": 1100.0, "cx": 63
 TURNED = json.dumps([{"code": "as_said", "values": {"text": "it has turned"}}])
 CALLED = {
     "cameras": {"id": "corner", "name": "The corner", "distortion": "[0, 0, 0, 0, 0]",
+                "projection": "perspective",
                 "reference_tracks": 50, "walking_speed_mean_mps": 1.4, "walking_speed_sd_mps": 0.1,
                 **INTRINSICS},
     "prior_poses": {"id": 1, "origin": "registered", **NUMBERS},

@@ -92,6 +92,8 @@ table(
     *needed(NUMBER, "width", "height"),
     *needed(Double, "fx", "fy", "cx", "cy"),
     *needed(JSON, "distortion"),
+    *needed(String, "projection"),
+    one_of("projection", "perspective fisheye"),
     *optional(Double, "frame_rate_hz"),
     *needed(Double, "walking_speed_mean_mps", "walking_speed_sd_mps"),
     *needed(NUMBER, "reference_tracks", "version"),

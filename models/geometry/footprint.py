@@ -15,7 +15,7 @@ def view_outline(lens: Intrinsics, pose: CameraPose, reach_m: float) -> Array:
 
     Where the edge of the picture is above the horizon, the ground ends at that distance.
     """
-    edge = _picture_edge(lens)
+    edge = lens.pulled_in(_picture_edge(lens))
     rays, on_ray = lens.rays(edge)
     world = rays[on_ray] @ pose.rotation
     level = np.linalg.norm(world[:, :2], axis=1)

@@ -258,13 +258,14 @@ def in_view(intrinsics: Intrinsics, candidates: Array, places: Array, size_m: fl
 
 
 def _lens(intrinsics: Intrinsics) -> Lens:
+    seen = intrinsics.pinhole
     return Lens(
-        fx=float(intrinsics.fx),
-        fy=float(intrinsics.fy),
-        cx=float(intrinsics.cx),
-        cy=float(intrinsics.cy),
-        width=float(intrinsics.width),
-        height=float(intrinsics.height),
+        fx=float(seen.fx),
+        fy=float(seen.fy),
+        cx=float(seen.cx),
+        cy=float(seen.cy),
+        width=float(seen.width),
+        height=float(seen.height),
     )
 
 

@@ -15,12 +15,14 @@ from pydantic import (
     ModelWrapValidatorHandler,
     PrivateAttr,
     StringConstraints,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
 
 from models.errors import CalibrationError
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection, coefficients_of
+from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
 from service.api.ignored import note_ignored
@@ -57,6 +59,7 @@ PictureSide = Annotated[int, Field(gt=0, le=100_000)]
 FieldOfView = Annotated[Finite, Field(ge=1, le=170)]
 Millimetres = Annotated[Finite, Field(ge=0.1, le=10_000)]
 SensorSize = Annotated[list[Millimetres], Field(min_length=2, max_length=2)]
+Coefficient = Annotated[Finite, Field(ge=-1e4, le=1e4)]
 FocalLength = Annotated[Finite, Field(ge=1, le=1e6)]
 Centre = Annotated[Finite, Field(ge=-1e6, le=1e6)]
 Tilt = Annotated[Finite, Field(ge=-90, le=90)]
@@ -116,7 +119,7 @@ class Out(BaseModel):
 
 
 class IntrinsicsBody(Body):
-    """Intrinsics in pixels; distortion k1, k2, p1, p2, k3."""
+    """Intrinsics in pixels; distortion k1, k2, p1, p2, k3, or of a fisheye k1, k2, k3, k4."""
 
     width: PictureSide
     height: PictureSide
@@ -124,20 +127,43 @@ class IntrinsicsBody(Body):
     fy: FocalLength
     cx: Centre
     cy: Centre
-    distortion: list[Annotated[Finite, Field(ge=-1e4, le=1e4)]] = Field(
-        default=[0.0] * 5, min_length=5, max_length=5
+    projection: Projection = Projection.PERSPECTIVE
+    distortion: list[Coefficient] = Field(
+        default_factory=lambda said: [0.0] * len(coefficients_of(said["projection"])),
+        min_length=4,
+        max_length=5,
     )
+
+    @field_validator("distortion")
+    @classmethod
+    def _as_many(cls, value: list[float], info: ValidationInfo) -> list[float]:
+        names = coefficients_of(info.data.get("projection", Projection.PERSPECTIVE))
+        if len(value) != len(names):
+            raise ValueError(
+                f"{len(names)} numbers, {', '.join(names)}, are needed, got {len(value)}"
+            )
+        return value
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
         return Intrinsics(**{**self.model_dump(), "distortion": tuple(self.distortion)})
 
 
+class FisheyeBody(Body):
+    """A fisheye as `cv2.fisheye` calibrates it; square pixels and the middle where left out."""
+
+    fx: FocalLength
+    fy: FocalLength | None = None
+    cx: Centre | None = None
+    cy: Centre | None = None
+    distortion: list[Coefficient] = Field(default=[0.0] * 4, min_length=4, max_length=4)
+
+
 class LensBody(Body):
-    """A lens without distortion as installers know it: by its field of view, or by millimetres.
+    """A lens as installers know it: by its field of view, by millimetres, or as a fisheye.
 
     Either `hfov_deg`, from the left edge of the picture to the right, or `focal_mm` with
-    `sensor_mm`, the sensor's width and height.
+    `sensor_mm`, the sensor's width and height, both without distortion; or `fisheye`.
     """
 
     width: PictureSide
@@ -145,29 +171,16 @@ class LensBody(Body):
     hfov_deg: FieldOfView | None = None
     focal_mm: Millimetres | None = None
     sensor_mm: SensorSize | None = None
+    fisheye: FisheyeBody | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        names = ("hfov_deg", "focal_mm", "sensor_mm")
-        given = [name for name in names if getattr(self, name) is not None]
-        if given not in (["hfov_deg"], ["focal_mm", "sensor_mm"]):
-            raise ValueError(
-                f"either hfov_deg or focal_mm and sensor_mm are needed; got {given or 'none'}"
-            )
         _ = self.to_intrinsics()
         return self
 
     def to_intrinsics(self) -> IntrinsicsBody:
         """The lens in pixels."""
-        size = {"width": self.width, "height": self.height}
-        if self.hfov_deg is not None:
-            lens = Intrinsics.of_view(**size, hfov_rad=math.radians(self.hfov_deg))
-        else:
-            assert self.focal_mm is not None
-            assert self.sensor_mm is not None
-            wide, tall = self.sensor_mm
-            lens = Intrinsics.of_sensor(**size, focal_mm=self.focal_mm, sensor_mm=(wide, tall))
-        return IntrinsicsBody.model_validate(asdict(lens))
+        return IntrinsicsBody.model_validate(asdict(lens_of(**self.model_dump())))
 
 
 _MEASURABLE = {"height_m", "tilt_deg", "roll_deg"}

@@ -175,6 +175,7 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         height=camera.height,
         now_s=time.time(),
         max_ahead_s=state.settings.max_ahead_s,
+        fisheye=camera.fisheye,
     )
     try:
         size = None if came.size is None else read_size(came.size)

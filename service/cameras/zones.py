@@ -22,7 +22,7 @@ from service.access.activity import note
 from service.cameras.cameras import require_camera
 from service.cameras.held_poses import HeldPose, held_pose
 from service.enums import Activity, ZoneOn
-from service.errors import check_version
+from service.errors import MalformedError, check_version
 from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
 from service.formats.zones import Corner, Zone
 from service.store import cameras, zones
@@ -114,6 +114,8 @@ def draw_zones(
     record = zones.of_camera(session, camera_id)
     check_version("the zones are", _etag(camera_id, record), etag)
     drawn = read_zones(kind, document, camera_id, (lens.width, lens.height), on)
+    for zone in drawn:
+        _check_seen(zone, lens)
     held, now = held_pose(session, camera_id, at), datetime.now(UTC)
     own = held.own if held.drifted else None
     session.merge(
@@ -193,6 +195,13 @@ def _unmoved(corners: Array, placed: MovedOutline) -> MovedOutline:
     same = len(placed.corners) == len(corners)
     ellipses = placed.ellipses if same else None
     return replace(placed, corners=corners, ellipses=ellipses, overlap=1.0)
+
+
+def _check_seen(zone: Zone, lens: Intrinsics) -> None:
+    beyond = lens.beyond(np.array(zone.corners, dtype=np.float64))
+    if beyond.any():
+        corner = zone.corners[int(np.argmax(beyond))]
+        raise MalformedError.of_field("zones", f"{zone.id}: {lens.beyond_words}, got {corner}")
 
 
 def _view_of(record: ZonesRecord) -> View:

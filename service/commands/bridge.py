@@ -58,6 +58,7 @@ def run_bridge(
         address=address,
         topics=topics,
         spool=spool,
+        frigate_url=settings.mqtt_frigate_url if settings.mqtt_frigate else None,
         url=url,
         token=token,
         discovery=settings.mqtt_discovery or None,

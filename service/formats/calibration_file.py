@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from models.geometry.intrinsics import Projection
 from service.errors import MalformedError, OverloadedError
 from service.formats.confined import MAX_SECONDS, ReaderError, read_apart
 
@@ -31,6 +32,7 @@ class CalibrationFile:
     """Numbers of a file; None where it has none. `rotation` has 9 numbers, or 3 of a vector."""
 
     matrix: tuple[float, ...] | None
+    projection: Projection
     distortion: tuple[float, ...] | None
     rotation: tuple[float, ...] | None
     translation: tuple[float, ...] | None
@@ -60,8 +62,9 @@ def read_calibration(body: bytes, timeout_s: float = MAX_SECONDS) -> Calibration
         _free.release()
     if "refused" in answer:
         raise _malformed(str(answer["refused"]))
+    projection = Projection(answer.pop("projection"))
     parts = {name: None if value is None else tuple(value) for name, value in answer.items()}
-    return CalibrationFile(**parts)
+    return CalibrationFile(projection=projection, **parts)
 
 
 def _check(body: bytes) -> None:

@@ -1,12 +1,12 @@
 """A camera as COLMAP's text model: `cameras.txt`, `images.txt` and an empty `points3D.txt`.
 
-Source: COLMAP, "Output Format"; its camera models OPENCV and FULL_OPENCV.
+Source: COLMAP, "Output Format"; its camera models OPENCV, FULL_OPENCV and OPENCV_FISHEYE.
 """
 
 import io
 import zipfile
 
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection
 from models.geometry.pose import CameraPose
 
 _PIXEL_CENTRE = 0.5  # of COLMAP's first pixel; ours is 0
@@ -18,10 +18,10 @@ def colmap_zip(intrinsics: Intrinsics, pose: CameraPose, *, camera_id: str) -> b
     COLMAP's poses are `camera_from_world`, like ours. OPENCV has no k3: a lens with one is of
     FULL_OPENCV, whose k4, k5 and k6 are 0.
     """
-    k1, k2, p1, p2, k3 = intrinsics.distortion
-    model, numbers = "OPENCV", [k1, k2, p1, p2]
-    if k3:
-        model, numbers = "FULL_OPENCV", [*numbers, k3, 0.0, 0.0, 0.0]
+    model, numbers = "OPENCV_FISHEYE", list(intrinsics.distortion)
+    if intrinsics.projection is Projection.PERSPECTIVE:
+        *numbers, k3 = intrinsics.distortion
+        model, numbers = ("FULL_OPENCV", [*numbers, k3, 0, 0, 0]) if k3 else ("OPENCV", numbers)
     middle = (intrinsics.cx + _PIXEL_CENTRE, intrinsics.cy + _PIXEL_CENTRE)
     lens = _row(intrinsics.fx, intrinsics.fy, *middle, *numbers)
     stands = _row(*pose.quaternion_wxyz, *pose.translation_m)

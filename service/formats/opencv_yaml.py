@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection, coefficients_of
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 
@@ -34,7 +34,9 @@ def opencv_yaml(
         f"image_width: {intrinsics.width}",
         f"image_height: {intrinsics.height}",
         *_matrix("K", intrinsics.matrix),
-        "# k1, k2, p1, p2, k3",
+        # As OpenCV's calibration sample says it: of a fisheye they are those of cv2.fisheye.
+        f"fisheye_model: {int(intrinsics.projection is Projection.FISHEYE)}",
+        f"# {', '.join(coefficients_of(intrinsics.projection))}",
         *_matrix("distortion", np.array([intrinsics.distortion])),
         "# x_camera = R x_world + t; metres, Z up, the ground is Z = 0",
         *_matrix("R", rotation),

@@ -8,11 +8,13 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.formats.opencv_yaml import yaml_number
 
+# image_geometry's words; each has its numbers in our order.
+_MODELS = {Projection.PERSPECTIVE: "plumb_bob", Projection.FISHEYE: "equidistant"}
 _WORLD = "map"  # REP 105: metres, z up
 
 
@@ -30,7 +32,7 @@ def ros_yaml(
     where the frame stands in the world: the centre, and the inverse of `camera_from_world`.
 
     Args:
-        intrinsics: the lens; plumb_bob has its five numbers in our order.
+        intrinsics: the lens.
         pose: where it stands.
         camera_id: a slug; ROS takes no hyphens in a name, so that they become underscores.
         at: time that the pose is of; 0, ROS' word for unknown, where it is the prior pose.
@@ -45,7 +47,7 @@ def ros_yaml(
         f"image_height: {intrinsics.height}",
         f'camera_name: "{camera_id.replace("-", "_")}"',
         *_matrix("camera_matrix", intrinsics.matrix),
-        "distortion_model: plumb_bob",
+        f"distortion_model: {_MODELS[intrinsics.projection]}",
         *_matrix("distortion_coefficients", np.array([intrinsics.distortion])),
         *_matrix("rectification_matrix", np.eye(3)),
         *_matrix("projection_matrix", np.hstack([intrinsics.matrix, np.zeros((3, 1))])),

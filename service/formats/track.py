@@ -5,6 +5,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.tracks.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 from service.formats.scaling import Scaling, read_scaling
@@ -87,6 +88,7 @@ class Limits:
     now_s: float
     max_ahead_s: float
     scaling: Scaling | None = None
+    fisheye: Intrinsics | None = None  # the lens, where it has no picture of some pixels
 
     def of_size(self, size: Any, normalised: Any) -> "Limits":
         """The limits of numbers of a picture as a request names it; the same where it does not.
@@ -187,6 +189,8 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
             refuse(f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}")
         points = np.column_stack([time_s, (boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
     _check_inside(points[:, 1:], (limits.width, limits.height))
+    if limits.fisheye is not None:
+        _check_seen(points[:, 1:], limits.fisheye)
     return IncomingTrack(source=source, track_id=track_id, points=points, boxes=boxes)
 
 
@@ -270,4 +274,14 @@ def _check_inside(uv: Array, size: tuple[int, int], what: str = "points") -> Non
             f"{what}/{at}: u from {-limit[0]:.0f} to {size[0] + limit[0]:.0f} and v from "
             f"{-limit[1]:.0f} to {size[1] + limit[1]:.0f} px are taken, got "
             f"({uv[at, 0]:.1f}, {uv[at, 1]:.1f})",
+        )
+
+
+def _check_seen(uv: Array, lens: Intrinsics) -> None:
+    beyond = lens.beyond(uv)
+    if beyond.any():
+        at = int(np.argmax(beyond))
+        raise TrackRejectedError(
+            "outside_lens",
+            f"points/{at}: {lens.beyond_words}, got ({uv[at, 0]:.1f}, {uv[at, 1]:.1f})",
         )

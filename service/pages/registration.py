@@ -68,7 +68,7 @@ class FilledOut(BaseModel):
             fields |= {"width": str(value.size[0]), "height": str(value.size[1])}
         if value.matrix is not None:
             fx, _, cx, _, fy, cy = value.matrix[:6]
-            fields["lens_form"] = "pixels"
+            fields |= {"lens_form": "pixels", "projection": value.projection}
             fields |= {"fx": _say(fx), "fy": _say(fy), "cx": _say(cx), "cy": _say(cy)}
         if value.distortion is not None:
             fields["distortion"] = ", ".join(_say(number) for number in value.distortion)

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from models.geometry.intrinsics import Projection, coefficients_of
 from service.api.cameras import CameraBody, CameraName, FrameRate, ReferenceTracks
 from service.api.schemas import (
     Body,
@@ -94,8 +95,9 @@ class TypedLens(IntrinsicsBody):
 
     @field_validator("distortion", mode="before")
     @classmethod
-    def _filled_up(cls, text: str) -> list[float]:
-        return [*_numbers(1, 2, 3, 4, 5)(text), 0.0, 0.0, 0.0, 0.0][:5]
+    def _filled_up(cls, text: str, info: ValidationInfo) -> list[float]:
+        count = len(coefficients_of(info.data.get("projection", Projection.PERSPECTIVE)))
+        return [*_numbers(*range(1, count + 1))(text), 0.0, 0.0, 0.0, 0.0][:count]
 
 
 class TypedView(LensBody):
@@ -203,6 +205,7 @@ class RegistrationForm(Body):
     fy: Typed = ""
     cx: Typed = ""
     cy: Typed = ""
+    projection: Typed = Projection.PERSPECTIVE
     distortion: Typed = ""
     hfov_deg: Typed = ""
     focal_mm: Typed = ""

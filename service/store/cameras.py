@@ -1,7 +1,7 @@
 """Cameras, their prior poses, arrival models and still images."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from typing import Any
 
@@ -23,7 +23,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection
 from models.geometry.pose import CameraPose
 from service.enums import Origin
 from service.reasons import Reasons, ServiceCode
@@ -64,6 +64,7 @@ class CameraRecord(Record):
     cx: Mapped[float]
     cy: Mapped[float]
     distortion: Mapped[list[float]]
+    projection: Mapped[Projection] = mapped_column(default=Projection.PERSPECTIVE)
     frame_rate_hz: Mapped[float | None]
     walking_speed_mean_mps: Mapped[float]
     walking_speed_sd_mps: Mapped[float]
@@ -82,7 +83,6 @@ class CameraRecord(Record):
     @property
     def intrinsics(self) -> Intrinsics:
         """The lens."""
-        k1, k2, p1, p2, k3 = self.distortion
         return Intrinsics(
             width=self.width,
             height=self.height,
@@ -90,7 +90,8 @@ class CameraRecord(Record):
             fy=self.fy,
             cx=self.cx,
             cy=self.cy,
-            distortion=(k1, k2, p1, p2, k3),
+            distortion=tuple(self.distortion),
+            projection=self.projection,
         )
 
 
@@ -216,17 +217,22 @@ _AWAITED = Prepared(
         CameraRecord.width,
         CameraRecord.height,
         CameraRecord.frame_rate_hz,
+        type_coerce(CameraRecord.projection, String),
     ).where(CameraRecord.id == bindparam("camera"))
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """The pictures of a camera: their size, and how many a second, where that is known."""
+    """The pictures of a camera: their size, and how many a second, where that is known.
+
+    `fisheye` is the lens, where it has no picture of some pixels.
+    """
 
     width: int
     height: int
     frame_rate_hz: float | None
+    fisheye: Intrinsics | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,8 +252,15 @@ def awaited(connection: Connection, camera_id: str) -> Awaited | None:
     row = _AWAITED.row(connection, {"camera": camera_id})
     if row is None:
         return None
-    seen = Picture(width=row[2], height=row[3], frame_rate_hz=row[4])
+    fisheye = None if row[5] == Projection.PERSPECTIVE else _lens(connection, camera_id)
+    seen = Picture(width=row[2], height=row[3], frame_rate_hz=row[4], fisheye=fisheye)
     return Awaited(look=bool(row[0]), source=bool(row[1]), picture=seen)
+
+
+def _lens(connection: Connection, camera_id: str) -> Intrinsics:
+    columns = (getattr(CameraRecord, each.name) for each in fields(Intrinsics))
+    row = connection.execute(select(*columns).where(CameraRecord.id == camera_id)).one()
+    return Intrinsics(**{**row._mapping, "distortion": tuple(row.distortion)})
 
 
 def as_set_up(

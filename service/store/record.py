@@ -27,6 +27,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute, Session, mapped_column
 
+from models.geometry.intrinsics import Projection
 from service import enums
 from service.reasons import Reasons, from_json, to_json
 
@@ -51,6 +52,7 @@ _STORED: dict[type[StrEnum], str] = {
     enums.Origin: "origin",
     enums.Outcome: "outcome",
     enums.PoseState: "state",
+    Projection: "projection",
     enums.Severity: "severity",
     enums.TrainingState: "state",
     enums.WebhookFormat: "format",

@@ -21,6 +21,10 @@ _MENDS = {
         "The numbers are of another picture than the camera was registered with: of a smaller "
         "stream, or from 0 to 1."
     ),
+    "outside_lens": (
+        "The numbers are of another picture than the fisheye was calibrated with, or of its black "
+        "border; a dewarped stream is a camera of its own."
+    ),
     "gap": "The tracker gives a name to somebody else: end a track that is not seen any more.",
     "too_long": "The frame rate is wrong, or a track is of several people.",
     "unsupported_media_type": (

@@ -17,7 +17,7 @@ _PLAUSIBLE_MPS = (0.95, 1.75)
 _POSSIBLE_MPS = (0.7, 2.0)  # beyond, a reference is doubted, too
 _LOW_M, _HIGH_M = 1.5, 60.0
 _UNITS = {"centimetres": 100.0, "millimetres": 1000.0}  # that heights are read off plans in
-_WIDE, _NARROW = math.radians(150), math.radians(1)  # of what Brown's model is a lens
+_NARROW = math.radians(1)
 _LEVEL = math.radians(45)
 
 
@@ -149,7 +149,7 @@ def _looking(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[
 
 
 def _through(lens: Intrinsics) -> list[Saying]:
-    if _NARROW <= lens.hfov_rad <= _WIDE:
+    if _NARROW <= lens.hfov_rad <= lens.widest_rad:
         return []
     said = f"fx = {lens.fx:g} pixels is a field of view of {math.degrees(lens.hfov_rad):.1f}°"
     how = "Are these millimetres? A lens may be told by them, with the sensor's size."

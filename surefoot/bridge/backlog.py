@@ -9,9 +9,13 @@ _TELL_S = 60.0
 
 
 class Backlog:
-    """Since when posts fail: a thousand that do so each half a minute are one line a minute."""
+    """Since when posts fail: a thousand that do so each half a minute are one line a minute.
 
-    def __init__(self) -> None:
+    `waits` and `taken` are what is logged, while it lasts and once it is over.
+    """
+
+    def __init__(self, waits: str = "tracks_wait", taken: str = "tracks_taken_again") -> None:
+        self._waits, self._taken = waits, taken
         self._since_s: float | None = None
         self._told_s = 0.0
 
@@ -22,10 +26,10 @@ class Backlog:
         if now_s - self._told_s >= _TELL_S:
             self._told_s = now_s
             since = datetime.fromtimestamp(self._since_s, UTC).isoformat(timespec="seconds")
-            log.warning("tracks_wait", extra={"since": since, **of_what})
+            log.warning(self._waits, extra={"since": since, **of_what})
 
     def end(self, now_s: float) -> None:
         """Log that all is taken again, where it was not."""
         if self._since_s is not None:
-            log.info("tracks_taken_again", extra={"after_s": round(now_s - self._since_s)})
+            log.info(self._taken, extra={"after_s": round(now_s - self._since_s)})
             self._since_s = None

@@ -4,7 +4,7 @@ import logging
 import ssl
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,9 +51,19 @@ class Address:
 
 
 class Broker:
-    """A client that connects again by itself; what it says is retained, and said again then."""
+    """A client that connects again by itself; what it says is retained, and said again then.
 
-    def __init__(self, address: Address, topics: Sequence[str], availability: str) -> None:
+    `note_connection` is told True once messages come, False once none do.
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        topics: Sequence[str],
+        availability: str,
+        note_connection: Callable[[bool], None],
+    ) -> None:
+        self._note_connection = note_connection
         self.inbox = Inbox(lambda mid: self._client.ack(mid, 1))
         self._topics, self._availability = topics, availability
         self._lock = threading.Lock()
@@ -137,12 +147,14 @@ class Broker:
         if refused:
             log.error("mqtt_topics_refused", extra={"topics": refused})
         log.info("mqtt_connected", extra={"session_present": self._resumed})
+        self._note_connection(True)
 
     def _on_disconnect(self, _: Client, __: Any, ___: Any, reason: Any, ____: Any) -> None:
         self.inbox.begin()  # from here on paho would acknowledge by the next connection
         with self._lock:
             self._connected = False
         log.warning("mqtt_disconnected", extra={"reason": str(reason)})
+        self._note_connection(False)
 
     def _on_message(self, _: Client, __: Any, message: MQTTMessage) -> None:
         self.inbox.add(message.topic, bytes(message.payload), message.mid, message.qos)

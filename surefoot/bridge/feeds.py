@@ -82,7 +82,7 @@ class Topics:
         if feed.source == _BODIES:
             check_size(message)
             return Body(_checked(name), message)
-        return feed.source, feed.read(message, name, self._camera_of)
+        return feed.source, feed.read(message, name, self.camera_of)
 
     def _feed_of(self, topic: str) -> Feed | None:
         if topic not in self._known:
@@ -92,7 +92,7 @@ class Topics:
             self._known[topic] = next(found, None)
         return self._known[topic]
 
-    def _camera_of(self, name: str) -> str:
+    def camera_of(self, name: str) -> str:
         """What a source's camera is called here: the same, as ids are spelled, or as it is told."""
         return _checked(self.cameras.get(name, name.lower().replace("_", "-")))
 

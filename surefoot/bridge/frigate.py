@@ -1,4 +1,4 @@
-"""Frigate's `frigate/events`: the whole path of a person, out of the message that ends it."""
+"""Frigate's people: of `frigate/events` what ends one, and of `/api/events` what it has stored."""
 
 from array import array
 from collections.abc import Callable
@@ -8,6 +8,8 @@ import msgspec
 
 from surefoot.bridge.values import NORMALISED, MessageError, WholeTrack, check_size, text
 
+PERSON = "person"
+CameraOf: TypeAlias = Callable[[str], str]  # our name of a camera of Frigate's
 _Point: TypeAlias = tuple[tuple[float, float], float]
 # Feet as low as this are cut off by the picture's edge: they are no feet.
 _LOWEST = 0.99
@@ -26,14 +28,31 @@ class _Event(msgspec.Struct):
     after: _After
 
 
+class Stored(msgspec.Struct):
+    """An event of Frigate's database, its path not read yet; `end_time` is None while it lasts."""
+
+    id: str
+    camera: str
+    label: str
+    start_time: float
+    end_time: float | None = None
+    false_positive: bool | None = None
+    data: msgspec.Raw = msgspec.Raw(b"null")
+
+
+class _Data(msgspec.Struct):
+    path_data: list[_Point] | None = None
+
+
 _read = msgspec.json.Decoder(_Event).decode
+_read_stored = msgspec.json.Decoder(list[Stored]).decode
+_read_data = msgspec.json.Decoder(_Data | None).decode
 
 
-def read_event(message: bytes, camera_of: Callable[[str], str]) -> WholeTrack | None:
+def read_event(message: bytes, camera_of: CameraOf) -> WholeTrack | None:
     """The path of a person whose event has ended; None of any other message, and of no foot.
 
-    Points are `[time_s, x, y]`, the bottom centre as a share of the picture. `camera_of` gives
-    our name of a camera of Frigate's.
+    Points are `[time_s, x, y]`, the bottom centre as a share of the picture.
 
     Raises:
         MessageError: it is none of Frigate's, or of one before 0.16.
@@ -44,16 +63,50 @@ def read_event(message: bytes, camera_of: Callable[[str], str]) -> WholeTrack | 
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise MessageError("malformed", f"no event of Frigate's: {error}") from error
     after = event.after
-    if event.type != "end" or after.label != "person" or after.false_positive:
+    if event.type != "end" or after.label != PERSON or after.false_positive:
         return None
-    if after.path_data is None:
-        raise MessageError("malformed", "after.path_data: Frigate 0.16 or newer is needed")
+    return _track(after, after.path_data, camera_of, "after.")
+
+
+def read_stored(answer: bytes) -> list[Stored]:
+    """The events of an answer of `/api/events`.
+
+    Raises:
+        MessageError: it is none of Frigate's.
+    """
+    try:
+        return _read_stored(answer)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise MessageError("malformed", f"no events of Frigate's: {error}") from error
+
+
+def track_of(event: Stored, camera_of: CameraOf) -> WholeTrack | None:
+    """The path of a person of the database, the same as of the message that ended it.
+
+    Raises:
+        MessageError: it has none, as what was entered by hand, or is no path.
+    """
+    if event.end_time is None or event.label != PERSON or event.false_positive:
+        return None
+    check_size(bytes(event.data))
+    try:
+        data = _read_data(event.data)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise MessageError("malformed", f"no event of Frigate's: data: {error}") from error
+    return _track(event, None if data is None else data.path_data, camera_of, "data.")
+
+
+def _track(
+    event: _After | Stored, path: list[_Point] | None, camera_of: CameraOf, where: str
+) -> WholeTrack | None:
+    if path is None:
+        told = "Frigate 0.16 or newer tells it, and not of what was entered by hand"
+        raise MessageError("malformed", f"{where}path_data: a path is needed; {told}")
     rows = array("d")
-    for (x, y), time_s in after.path_data:
+    for (x, y), time_s in path:
         if y < _LOWEST:
             rows.extend((time_s, x, y))
     if not rows:
         return None
-    camera = camera_of(after.camera)
-    track_id = text(after.id, "after.id")
-    return WholeTrack(camera, track_id, after.label, "points", rows, NORMALISED)
+    camera = camera_of(event.camera)
+    return WholeTrack(camera, text(event.id, "id"), event.label, "points", rows, NORMALISED)

@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import msgspec
@@ -30,6 +31,7 @@ class Inward:
     inbox: Inbox
     topics: Topics
     spool: Spool
+    whole: Callable[[], bool] = lambda: True  # nobody who ended before is missing
     _assemblers: dict[str, Assembler] = field(default_factory=dict)
     _told_s: float = -_TELL_S
     _refused_s: dict[tuple[str, str], float] = field(default_factory=dict)
@@ -66,6 +68,7 @@ class Inward:
     def _step(self, messages: list[Message], now_s: float) -> None:
         given: _Given = {}
         parts: list[Part] = []
+        marks: dict[str, float] = {}
         for message in messages:
             try:
                 read = self.topics.read(message.topic, message.payload)
@@ -79,6 +82,8 @@ class Inward:
             for each in found:
                 if isinstance(each, WholeTrack):
                     parts.append(_part(each, source))
+                    last_s = each.rows[-each.columns]
+                    marks[source] = min(max(marks.get(source, last_s), last_s), now_s)
                 else:
                     given.setdefault(source, []).append(each)
         self._give(given, now_s)
@@ -86,7 +91,9 @@ class Inward:
         # A silence that ended tracks is to end them in a restart, too, though nothing came.
         if given or finished or parts:
             state = self._state() if self.spool.wants_state else None
-            self.spool.keep(now_s, msgspec.msgpack.encode(given), parts + finished, state)
+            came = msgspec.msgpack.encode(given)
+            ends = marks if self.whole() else {}
+            self.spool.keep(now_s, came, parts + finished, state, ends)
         self.inbox.settle(messages)
 
     def _give(self, given: _Given, now_s: float) -> None:

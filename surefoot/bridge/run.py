@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from surefoot.bridge.broker import Address, Broker
 from surefoot.bridge.feeds import Topics
+from surefoot.bridge.frigate_history import History
 from surefoot.bridge.inward import Inward
 from surefoot.bridge.outward import Outward
 from surefoot.bridge.posting import Posting
@@ -15,11 +16,15 @@ from surefoot.bridge.spool import Spool
 
 @dataclass(frozen=True, kw_only=True)
 class Bridge:
-    """What a bridge is between; `discovery` is Home Assistant's prefix, or None for none."""
+    """What a bridge is between; `discovery` is Home Assistant's prefix, or None for none.
+
+    `frigate_url` is where Frigate is asked for what no broker has brought, or None for nowhere.
+    """
 
     address: Address
     topics: Topics
     spool: Spool
+    frigate_url: str | None
     url: str
     token: str | None
     discovery: str | None
@@ -32,7 +37,8 @@ class Bridge:
         """
         prefix = self.topics.prefix
         availability = f"{prefix}/bridge/availability"
-        broker = Broker(self.address, self.topics.asked_for, availability)
+        history = History(spool=self.spool, camera_of=self.topics.camera_of)
+        broker = Broker(self.address, self.topics.asked_for, availability, history.note_connection)
         outward = Outward(
             say=broker.say,
             prefix=prefix,
@@ -40,7 +46,9 @@ class Bridge:
             discovery=self.discovery,
             version=self.version,
         )
-        inward = Inward(inbox=broker.inbox, topics=self.topics, spool=self.spool)
+        inward = Inward(
+            inbox=broker.inbox, topics=self.topics, spool=self.spool, whole=history.whole
+        )
         failures: list[Exception] = []
 
         def part(work: Callable[[Service], None]) -> None:
@@ -52,12 +60,14 @@ class Bridge:
             finally:
                 stopping.set()
 
-        works: tuple[Callable[[Service], None], ...] = (
+        works: list[Callable[[Service], None]] = [
             lambda _: inward.carry(stopping),
             lambda service: Posting(spool=self.spool, service=service).run(stopping),
             lambda service: outward.tell(service, stopping),
             lambda service: outward.listen(service, stopping),
-        )
+        ]
+        if (url := self.frigate_url) is not None:
+            works.append(lambda _: history.run(url, stopping))
         broker.start()
         for work in works:
             threading.Thread(target=part, args=(work,), daemon=True).start()

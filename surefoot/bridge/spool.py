@@ -8,9 +8,10 @@ tracks too, is one transaction.
 import contextlib
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 MAX_GROUP_TRACKS, MAX_GROUP_BYTES = 200, 1024 * 1024  # of a post
 _SAVE_FROM_BYTES = 8 * 1024 * 1024  # of what came since the state was saved
@@ -19,6 +20,7 @@ CREATE TABLE IF NOT EXISTS posts (
     number INTEGER PRIMARY KEY AUTOINCREMENT, camera TEXT, head BLOB, track BLOB);
 CREATE INDEX IF NOT EXISTS posts_alike ON posts (camera, head, number);
 CREATE TABLE IF NOT EXISTS given (number INTEGER PRIMARY KEY, at_s REAL, found BLOB);
+CREATE TABLE IF NOT EXISTS marks (source TEXT PRIMARY KEY, until_s REAL);
 CREATE TABLE IF NOT EXISTS saved (number INTEGER PRIMARY KEY CHECK (number = 0), state BLOB);
 """
 
@@ -82,9 +84,17 @@ class Spool:
         return self._given_bytes >= _SAVE_FROM_BYTES
 
     def keep(
-        self, at_s: float, found: bytes | None, parts: Sequence[Part], state: bytes | None = None
+        self,
+        at_s: float,
+        found: bytes | None,
+        parts: Sequence[Part],
+        state: bytes | None = None,
+        marks: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
-        """Have all of a step on the disk: what was given and finished, or the state after it."""
+        """Have all of a step on the disk: what was given and finished, or the state after it.
+
+        `marks` say up to when everybody of a source is kept; they never go back.
+        """
         with self._lock, _transaction(self._db):
             if state is not None:
                 self._db.execute("REPLACE INTO saved VALUES (0, ?)", (state,))
@@ -97,9 +107,21 @@ class Spool:
                 "INSERT INTO posts (camera, head, track) VALUES (?, ?, ?)",
                 [(part.camera, part.head, part.track) for part in parts],
             )
+            self._db.executemany(
+                "INSERT INTO marks VALUES (?, ?) ON CONFLICT (source) DO UPDATE "
+                "SET until_s = max(until_s, excluded.until_s)",
+                list(marks.items()),
+            )
             self.waiting += len(parts)
             self._bytes += sum(len(part.head) + len(part.track) for part in parts)
             self._news.notify_all()
+
+    def mark(self, source: str) -> float | None:
+        """The time up to which everybody of a source is kept; None where nobody ever was."""
+        with self._lock:
+            found = self._db.execute("SELECT until_s FROM marks WHERE source = ?", (source,))
+            row = found.fetchone()
+        return None if row is None else float(row[0])
 
     def state(self) -> bytes | None:
         """The state that was saved last."""

@@ -10,6 +10,7 @@ import pytest
 
 import surefoot
 from models.monitoring.verdict import DriftLimits
+from service.api.cameras import CameraBody
 from service.settings import Settings
 from studies.simulation.lanes import SiteConfig
 from tests.conftest import ROOT, SCENES
@@ -111,10 +112,33 @@ def test_a_camera_is_read_of_a_registration(tmp_path):
         ({**body, "prior_pose": {"height_m": 5}}, "tilt_deg"),
         ({**body, "prior_pose": {"height_m": -5, "tilt_deg": 4}}, "height_m: must be above 0"),
         ({"intrinsics": lens}, "prior_pose: height_m and tilt_deg are needed"),
+        ({**body, "lens": {}}, "one of both"),
+        ({"prior_pose": body["prior_pose"]}, "one of both"),
+        ({"prior_pose": body["prior_pose"], "lens": {"hfov_deg": 90}}, "width"),
     ):
         path.write_text(json.dumps(wrong))
         with pytest.raises(surefoot.CalibrationError, match=message):
             surefoot.read_camera(path)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"hfov_deg": 70.0},
+        {"focal_mm": 4.0, "sensor_mm": [5.76, 3.24]},
+        {"fisheye": {"fx": 500.0, "distortion": [0.01, 0.0, 0.0, 0.0]}},
+    ],
+)
+def test_a_lens_is_told_as_the_service_takes_it(tmp_path, told):
+    body = {"lens": {"width": 1920, "height": 1080, **told}}
+    body["prior_pose"] = {"height_m": 5.0, "tilt_deg": 45.0}
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(body))
+    camera = surefoot.read_camera(path)
+    stored = CameraBody.model_validate(body).lens_value()
+    assert camera.intrinsics == stored
+    path.write_text(camera.as_json())
+    assert surefoot.read_camera(path) == camera
 
 
 def test_tracks_are_read_of_mot_text_and_of_feet(tmp_path):

@@ -4,9 +4,14 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from sqlalchemy import select
 
+from service.errors import MalformedError, TooLargeError
 from service.formats import mot
+from service.formats.mot import read_mot
+from service.formats.track import Clock, Limits
 from service.store.engines.store import Store
 from service.store.tracks import TrackRecord, unpack
 from tests.service.conftest import problem
@@ -111,6 +116,27 @@ def test_what_is_no_such_text_or_lacks_its_clock(corner):
     problem(send(corner, ["a;b;c"]), 422, "malformed")
     problem(send(corner, ["1,1,2,3"]), 422, "malformed")
     assert send(corner, ["frame,id", ""]).json()["accepted"] == 0
+
+
+_TEXT = "\n".join([*walk("7"), *walk("8", "0.9,0,1"), "1,9,1,1,1,1,1,-1,-1,-1"]).encode()
+_CLOCK = Clock(frame_rate_hz=25.0, started_at_s=T0)
+_LIMITS = Limits(width=1280, height=720, now_s=T0 + 1e6, max_ahead_s=60.0)
+
+
+@given(data=st.data())
+def test_bytes_that_were_changed_cut_or_repeated_are_read_or_refused_by_name(data):
+    begin, end = sorted(data.draw(st.tuples(*[st.integers(0, len(_TEXT))] * 2)))
+    between = data.draw(
+        st.binary(max_size=8)
+        | st.just(_TEXT[begin:end] * 2)
+        | st.sampled_from([b"nan", b"-1e999", b"9" * 400, b"\0", b",", b"\r"])
+    )
+    try:
+        batch = read_mot(_TEXT[:begin] + between + _TEXT[end:], "s", _CLOCK, _LIMITS)
+    except (MalformedError, TooLargeError):
+        return
+    assert all(np.isfinite(each.points).all() for each in batch.tracks)
+    assert all(each.code and each.detail for each in batch.rejections)
 
 
 def test_the_form_to_register_with_reads_it_the_same(http):

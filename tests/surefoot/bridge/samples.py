@@ -1,6 +1,6 @@
 """A small message of each source, made by its specification, and one way to read each."""
 
-from surefoot.bridge import axis, deepstream, frames, onvif, rows
+from surefoot.bridge import axis, deepstream, frames, frigate, onvif, rows
 from surefoot.bridge.onvif import Profile
 from surefoot.bridge.rows import Clock
 
@@ -67,6 +67,18 @@ ULTRALYTICS_TEXT = b"0 0.275 0.625 0.05 0.25 0.9 7\n2 0.5 0.5 0.1 0.1 0.8\n"
 ULTRALYTICS_SUMMARY = b"""[{"name": "person", "class": 0, "confidence": 0.9, "track_id": 7,
  "box": {"x1": 480.0, "y1": 540.0, "x2": 576.0, "y2": 810.0}}, {"name": "car", "class": 2}]"""
 
+# Frigate 0.16, tracked_object.py and api/event.py
+_PATH = b"[[[0.275, 0.75], 1795161600.25], [[0.3, 0.8], 1795161602.5]]"
+FRIGATE = (
+    b'{"type": "end", "before": {}, "after": {"id": "1.5-a", "camera": "yard", "label": "person",'
+    b' "false_positive": false, "end_time": 1795161603.0, "path_data": ' + _PATH + b"}}"
+)
+FRIGATE_STORED = (
+    b'[{"id": "1.5-a", "camera": "yard", "label": "person", "start_time": 1795161600.25,'
+    b' "end_time": 1795161603.0, "false_positive": null, "data": {"type": "object",'
+    b' "path_data": ' + _PATH + b"}}]"
+)
+
 _HD = (1920.0, 1080.0)
 _FRAMES = Clock("frame_number", rate_hz=20.0, started_at_s=1_795_161_600.0)
 T = 1_795_161_600.25
@@ -95,4 +107,21 @@ READERS = {
         ULTRALYTICS_SUMMARY,
         lambda message: rows.read_ultralytics_summary(message, "yard", T, _HD),
     ),
+}
+
+
+def _frigate(message):
+    track = frigate.read_event(message, str)
+    return [] if track is None else [track]
+
+
+def _frigate_stored(answer):
+    found = (frigate.track_of(each, str) for each in frigate.read_stored(answer))
+    return [each for each in found if each is not None]
+
+
+# Whole tracks rather than boxes.
+TRACK_READERS = {
+    "frigate": (FRIGATE, _frigate),
+    "frigate_stored": (FRIGATE_STORED, _frigate_stored),
 }

@@ -19,10 +19,12 @@ from surefoot.bridge.values import (
     Detection,
     Ended,
     MessageError,
+    WholeTrack,
 )
 from tests.surefoot.bridge import samples
-from tests.surefoot.bridge.samples import READERS, T
+from tests.surefoot.bridge.samples import READERS, TRACK_READERS, T
 
+ALL_READERS = READERS | TRACK_READERS
 PLACE = (0.25, 0.5, 0.3, 0.75)  # of the person in every sample but ONVIF's own
 
 
@@ -124,7 +126,7 @@ def test_a_message_beyond_all_measure_is_refused_before_it_is_read(source):
     assert refused.value.code == "too_large"
 
 
-@pytest.mark.parametrize("source", READERS)
+@pytest.mark.parametrize("source", ALL_READERS)
 @pytest.mark.parametrize(
     "message",
     [b"", b"{", b"[" * 100_000, b"{}", b"[]", b"\xff\xfe", b"null", b'"x"', b"<a" * 1000, b"<a/>"],
@@ -137,7 +139,7 @@ def read_or_refused(source, message):
     """Numbers of whatever is read are finite, and whatever is not read has a code."""
     found, refused = [], None
     try:
-        found = READERS[source][1](message)
+        found = ALL_READERS[source][1](message)
     except MessageError as error:
         refused = error
     if refused is not None:
@@ -147,6 +149,9 @@ def read_or_refused(source, message):
         assert 1 <= len(each.track_id) <= 200
         if isinstance(each, Detection):
             assert all(map(math.isfinite, (each.time_s, *each.box)))
+        elif isinstance(each, WholeTrack):
+            assert len(each.rows) >= 3
+            assert all(map(math.isfinite, each.rows))
 
 
 _LEAVES = st.one_of(
@@ -173,11 +178,20 @@ def _places(value, path=()):
 
 @pytest.mark.parametrize(
     "source",
-    ["axis", "onvif_json", "deepstream", "frames", "supervision_json", "ultralytics_summary"],
+    [
+        "axis",
+        "onvif_json",
+        "deepstream",
+        "frames",
+        "supervision_json",
+        "ultralytics_summary",
+        "frigate",
+        "frigate_stored",
+    ],
 )
 @given(data=st.data())
 def test_json_with_anything_anywhere(source, data):
-    document = json.loads(READERS[source][0])
+    document = json.loads(ALL_READERS[source][0])
     path = data.draw(st.sampled_from([each for each in _places(document) if each]))
     inside = document
     for key in path[:-1]:
@@ -186,10 +200,10 @@ def test_json_with_anything_anywhere(source, data):
     read_or_refused(source, json.dumps(document).encode())
 
 
-@pytest.mark.parametrize("source", READERS)
+@pytest.mark.parametrize("source", ALL_READERS)
 @given(data=st.data())
 def test_bytes_that_were_changed_cut_or_repeated(source, data):
-    message = READERS[source][0]
+    message = ALL_READERS[source][0]
     begin, end = sorted(data.draw(st.tuples(*[st.integers(0, len(message))] * 2)))
     between = data.draw(st.binary(max_size=8) | st.just(message[begin:end] * 2))
     read_or_refused(source, message[:begin] + between + message[end:])
