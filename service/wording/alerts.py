@@ -29,6 +29,7 @@ BADGES = {
     AlertKind.NO_DATA: "No people",
     AlertKind.STALE: "Not looked at",
     AlertKind.TRACKER: "Tracker",
+    AlertKind.PICTURE: "Picture",
 }
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",
@@ -73,6 +74,10 @@ _ANSWERS = {
     AlertKind.TRACKER: {
         Answer.MENDED: ("The other one is off", "Only one tracker posts from now on."),
         Answer.FALSE_ALARM: ("Both may post", "The one that counts counts; no alert of the other."),
+    },
+    AlertKind.PICTURE: {
+        Answer.MENDED: ("It sees again", f"The view is free and sharp. {_AGAIN}"),
+        Answer.FALSE_ALARM: ("Nothing was wrong", "Later pictures are compared with the next one."),
     },
 }
 # After "You" or a name, of an answer that can be taken back.
