@@ -163,6 +163,17 @@ class Settings(BaseSettings):
         description="still images of cameras, as a second witness: `features` keeps none of them",
     )
 
+    snapshot_every_min: float = Field(
+        60.0, ge=1, description="minutes between pictures that are asked of a `snapshot_url`"
+    )
+    snapshot_allow: Networks = Field(
+        "", description="CIDRs, with commas, of private addresses that pictures may be asked of"
+    )
+    snapshot_user: str | None = Field(
+        None, description="sent where a camera of these asks for a user, by basic or digest"
+    )
+    snapshot_password: str | None = Field(None, repr=False, description="and the password")
+
     webhook_allow: Networks = Field(
         "", description="CIDRs, with commas, of private addresses that webhooks may go to"
     )
@@ -293,6 +304,11 @@ class Settings(BaseSettings):
     def webhook_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
         """Private networks that webhooks may go to."""
         return values.read_networks(self.webhook_allow)
+
+    @property
+    def snapshot_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
+        """Private networks that pictures may be asked of, and the password given to."""
+        return values.read_networks(self.snapshot_allow)
 
     @property
     def proxy_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:

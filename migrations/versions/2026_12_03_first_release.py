@@ -103,6 +103,9 @@ table(
     *optional(String, "estimate_error"),
     *optional(DateTime, "estimate_failing_since", "estimate_after"),
     *needed(JSON, "lacks"),
+    *optional(String, "snapshot_url"),
+    *optional(DateTime, "snapshot_due_at"),
+    *optional(String, "snapshot_error"),
     *needed(DateTime, "created_at", "updated_at"),
 )
 table(

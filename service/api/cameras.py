@@ -3,10 +3,10 @@
 import re
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from models.geometry.intrinsics import Intrinsics
 from service.api.documented import ETAG
@@ -27,10 +27,18 @@ from service.api.schemas import (
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 from service.enums import PoseState
+from service.notifications.send import read_url
 from service.wording.typed_pose import Tone, judge_lens, judge_pose
+
+
+def _checked_url(text: str) -> str:
+    read_url(text)
+    return text
+
 
 CameraName = Annotated[str, StringConstraints(max_length=200)]
 FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
+SnapshotUrl = Annotated[str, AfterValidator(_checked_url)]
 ReferenceTracks = Annotated[int, Field(ge=5, le=100_000)]
 
 
@@ -71,6 +79,7 @@ class CameraBody(_LensedBody):
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
+    snapshot_url: SnapshotUrl | None = Field(None, description="a JPEG or PNG of now")
 
     @model_validator(mode="after")
     def _has_lens(self) -> Self:
@@ -94,6 +103,7 @@ class CameraBody(_LensedBody):
             walking_speed_mean_mps=self.walking_speed.mean_mps,
             walking_speed_sd_mps=self.walking_speed.sd_mps,
             reference_tracks=self.reference_tracks,
+            snapshot_url=self.snapshot_url,
         )
 
 
@@ -105,6 +115,7 @@ class CameraPatch(_LensedBody):
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
+    snapshot_url: SnapshotUrl | Literal[""] | None = Field(None, description="empty: none")
 
     @model_validator(mode="after")
     def _whole_pose(self) -> Self:
@@ -130,6 +141,8 @@ class CameraOut(Out):
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
     reference_tracks: int
+    snapshot_url: str | None
+    snapshot_error: str | None
     state: PoseState
     reference: ReferenceOut
     tracks: int
@@ -258,6 +271,7 @@ def change(
             walking_speed_mean_mps=None if speed is None else speed.mean_mps,
             walking_speed_sd_mps=None if speed is None else speed.sd_mps,
             reference_tracks=body.reference_tracks,
+            snapshot_url=body.snapshot_url,
         ),
     )
     response.headers["ETag"] = view.etag

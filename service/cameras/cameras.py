@@ -50,6 +50,7 @@ class CameraSpec:
     walking_speed_mean_mps: float
     walking_speed_sd_mps: float
     reference_tracks: int
+    snapshot_url: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +64,7 @@ class CameraChange:
     walking_speed_mean_mps: float | None = None
     walking_speed_sd_mps: float | None = None
     reference_tracks: int | None = None
+    snapshot_url: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +116,7 @@ def register_camera(
         walking_speed_mean_mps=spec.walking_speed_mean_mps,
         walking_speed_sd_mps=spec.walking_speed_sd_mps,
         reference_tracks=spec.reference_tracks,
+        snapshot_url=spec.snapshot_url,
         version=1,
         estimate_due_at=None,
         looked_at_pk=None,
@@ -199,6 +202,9 @@ def change_camera(
     for name, value in {**changed, **lens}.items():
         if name not in ("intrinsics", "prior_pose"):
             setattr(record, name, value)
+    if change.snapshot_url is not None:
+        record.snapshot_url = change.snapshot_url or None
+        record.snapshot_due_at = record.snapshot_error = None
     record.version += 1
     record.updated_at = datetime.now(UTC)
     reference = references.newest(session, camera_id)

@@ -18,7 +18,7 @@ from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.references import begin_reference, keep_answer
 from service.settings import Settings
-from service.store import alerts, tracks
+from service.store import alerts, pictures, tracks
 from service.store.alerts import AlertRecord
 
 
@@ -117,6 +117,7 @@ def learn_anew(
     _close(session, decision, Outcome.RELEARNED, Activity.REFERENCE_RESET)
     from_s = tracks.newest_end_s(session, decision.camera_id)
     begin_reference(session, decision.camera_id, Origin.RESET, from_s=from_s, by=decision.by)
+    pictures.forget(session, decision.camera_id)
     request_estimate(session, queue, decision.camera_id)
     return view_pose(session, settings, decision.camera_id)
 
@@ -153,6 +154,8 @@ def resolve_alert(
             continue
         if each.camera_id is None or each.kind not in alerts.POSE_KINDS:
             close_alert(session, each, Outcome(answer), note, by)
+            if each.camera_id and each.kind == AlertKind.PICTURE and answer == Answer.FALSE_ALARM:
+                pictures.forget(session, each.camera_id)
             continue
         decision = Decision(camera_id=each.camera_id, by=by, note=note)
         if answer == Answer.ACCEPTED:
@@ -166,6 +169,8 @@ def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answe
     """Have a camera judged against its prior pose by whoever comes from now on."""
     _close(session, decision, Outcome(answer), Activity(f"pose.{answer}"))
     keep_answer(session, decision.camera_id, answer, decision.by)
+    if answer == Answer.FALSE_ALARM:
+        pictures.forget(session, decision.camera_id)  # the next one is what all are compared with
     request_estimate(session, queue, decision.camera_id)
 
 

@@ -5,7 +5,7 @@ Three steps, as of an estimate: read in one transaction, computed in none, saved
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import cv2
@@ -30,7 +30,7 @@ from models.pictures import (
 from models.pose import PictureEvidence, PosePosterior, posterior_by_picture
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, open_alert
-from service.enums import AlertKind, AlertSource, Outcome, Severity
+from service.enums import AlertKind, AlertSource, Outcome, PoseState, Severity
 from service.reasons import ServiceCode
 from service.references import drift_limits, is_before, window_of
 from service.settings import Settings
@@ -275,6 +275,20 @@ class SeenPicture:
 
 
 _LATER = 0.25
+_DOUBTS = (PoseState.SUSPECTED, PoseState.UNSURE, PoseState.DRIFTING)
+_AGAIN = timedelta(minutes=1)
+
+
+def ask_in_doubt(session: Session, record: EstimateRecord, picture: SeenPicture | None) -> None:
+    """Ask the camera for a picture at once where people raise a doubt that none has spoken to."""
+    camera = session.get(CameraRecord, record.camera_id)
+    if camera is None or camera.snapshot_url is None or record.state not in _DOUBTS:
+        return
+    now = datetime.now(UTC)
+    asked_s = 0.0 if picture is None else picture.taken_s
+    spoken = asked_s >= record.to_s or now.timestamp() - asked_s < _AGAIN.total_seconds()
+    if not spoken and camera.snapshot_error is None:
+        camera.snapshot_due_at = now
 
 
 def seen_picture(

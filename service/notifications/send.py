@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address
 from typing import Any
 
@@ -64,8 +64,15 @@ def check_url(text: str, allowed: Networks) -> httpx.URL:
     return url
 
 
-def checked_addresses(host: str, port: int, allowed: Networks) -> list[str]:
-    """The addresses of a host, all of which may be reached.
+def checked_addresses(
+    host: str,
+    port: int,
+    allowed: Networks,
+    setting: str = "SUREFOOT_WEBHOOK_ALLOW",
+    *,
+    public: bool = True,
+) -> list[str]:
+    """The addresses of a host, all of which may be reached: by a setting, or as `public` ones.
 
     Raises:
         AddressError: it has none, or one of them may not be reached.
@@ -76,19 +83,20 @@ def checked_addresses(host: str, port: int, allowed: Networks) -> list[str]:
         raise AddressError(f"the host {host!r} does not resolve: {error}") from error
     addresses = list(dict.fromkeys(str(entry[4][0]) for entry in found))
     for address in addresses:
-        if not may_reach(address, allowed):
+        if not may_reach(address, allowed, public=public):
             ranges = ", ".join(str(network) for network in allowed) or "none"
             raise AddressError(
-                f"the host {host!r} resolves to {address}, which is private or reserved; "
-                f"SUREFOOT_WEBHOOK_ALLOW names those that may be reached: {ranges}"
+                f"the host {host!r} resolves to {address}, which is "
+                f"{'private or reserved' if public else 'sent no password'}; "
+                f"{setting} names those that may be reached: {ranges}"
             )
     return addresses
 
 
-def may_reach(address: str, allowed: Networks) -> bool:
-    """True where an address is public, or in a network that is allowed."""
+def may_reach(address: str, allowed: Networks, *, public: bool = True) -> bool:
+    """True where an address is in a network that is allowed, or, unless they are not, `public`."""
     ip = _inner(ip_address(address))
-    return _is_public(ip) or any(ip in network for network in allowed)
+    return (public and _is_public(ip)) or any(ip in network for network in allowed)
 
 
 def _inner(ip: IPv4Address | IPv6Address) -> IPv4Address | IPv6Address:
@@ -174,7 +182,7 @@ def _exchange(
     )
     backend = CheckedBackend(allowed, lambda: deadline_s - time.monotonic())
     with (
-        httpcore.ConnectionPool(ssl_context=_tls(), network_backend=backend) as pool,
+        httpcore.ConnectionPool(ssl_context=tls_context(), network_backend=backend) as pool,
         pool.stream("POST", target, headers=sent, content=content) as answer,
     ):
         given = {name.lower(): value for name, value in answer.headers}
@@ -191,8 +199,15 @@ def _exchange(
 class CheckedBackend(httpcore.NetworkBackend):
     """Connects to addresses that were checked in the same breath; all within one deadline."""
 
-    def __init__(self, allowed: Networks, left_s: Callable[[], float]) -> None:
-        self._allowed = allowed
+    def __init__(
+        self,
+        allowed: Networks,
+        left_s: Callable[[], float],
+        *,
+        setting: str = "SUREFOOT_WEBHOOK_ALLOW",
+        public: bool = True,
+    ) -> None:
+        self._check = partial(checked_addresses, allowed=allowed, setting=setting, public=public)
         self._left_s = left_s
         self._plain = httpcore.SyncBackend()
 
@@ -206,7 +221,7 @@ class CheckedBackend(httpcore.NetworkBackend):
     ) -> httpcore.NetworkStream:
         """A connection to the first address of a host that answers."""
         failed: Exception | None = None
-        for address in checked_addresses(host, port, self._allowed):
+        for address in self._check(host, port):
             try:
                 stream = self._plain.connect_tcp(
                     address, port, _left(self._left_s), local_address, socket_options
@@ -272,6 +287,6 @@ def _seconds(text: str) -> float | None:
 
 
 @lru_cache(maxsize=1)
-def _tls() -> ssl.SSLContext:
+def tls_context() -> ssl.SSLContext:
     """Well-known authorities, or those that SSL_CERT_FILE names."""
     return httpx.create_ssl_context()

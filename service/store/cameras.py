@@ -18,6 +18,7 @@ from sqlalchemy import (
     cast,
     delete,
     func,
+    or_,
     select,
     type_coerce,
 )
@@ -50,7 +51,9 @@ class CameraRecord(Record):
     `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `lacks` says what failed beside the served estimate.
+    `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
+    `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
+    last one did not come.
     """
 
     __tablename__ = "cameras"
@@ -77,6 +80,9 @@ class CameraRecord(Record):
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
     lacks: Mapped[Reasons] = mapped_column(default=())
+    snapshot_url: Mapped[str | None]
+    snapshot_due_at: Mapped[datetime | None]
+    snapshot_error: Mapped[str | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
 
@@ -342,6 +348,18 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
         .where(CameraRecord.estimate_failing_since.is_not(None) | CameraRecord.id.in_(besides))
         .order_by(CameraRecord.estimate_failing_since, CameraRecord.id)
     ).all()
+
+
+def snapshots_due(session: Session, now: datetime, most: int) -> list[tuple[str, str]]:
+    """Cameras of whom a picture is due, and where it is asked for; the longest due first."""
+    due = or_(CameraRecord.snapshot_due_at.is_(None), CameraRecord.snapshot_due_at <= now)
+    rows = session.execute(
+        select(CameraRecord.id, CameraRecord.snapshot_url)
+        .where(CameraRecord.snapshot_url.is_not(None), due)
+        .order_by(CameraRecord.snapshot_due_at, CameraRecord.id)
+        .limit(most)
+    )
+    return [(camera_id, url) for camera_id, url in rows if url is not None]
 
 
 def lacking(session: Session, code: ServiceCode) -> set[str]:

@@ -27,7 +27,7 @@ from service.estimation.learning import (
     save_reference,
 )
 from service.estimation.picture_estimates import save_by_picture
-from service.estimation.pictures import compare, load_picture, save_picture
+from service.estimation.pictures import ask_in_doubt, compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
@@ -86,6 +86,8 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
         if evidence is not None and finding is not None:
             record = save_estimate(session, context.queue, settings, evidence, finding)
             _log_estimate(record)
+            if record is not None:
+                ask_in_doubt(session, record, evidence.picture)
         if finding is None or (evidence is not None and evidence.site is None):
             _log_estimate(save_by_picture(session, settings, camera_id))
         cooling = context.growth_cooldown.failures_of(camera_id)

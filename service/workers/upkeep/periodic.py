@@ -27,12 +27,14 @@ from service.workers.context import UPKEEP, JobContext
 from service.workers.processes.workers import take_setback
 from service.workers.upkeep.reconciliation import run_reconcile, run_sweep
 from service.workers.upkeep.retention import run_retention
+from service.workers.upkeep.snapshots import SnapshotRounds
 
 log = logging.getLogger("surefoot.worker")
 
 _SHORTEST_REST_S, _ASK_S = 0.05, 1.0
 _SWEEP_S = 0.5
 _CLOCK_S = 1.0
+_SNAPSHOTS_S = 2.0
 _FIRST_HOURLY_S = 120.0  # a service that is restarted every half an hour has its turn too
 _JUMP_S = 2.0
 
@@ -101,7 +103,7 @@ def _repeat(context: JobContext, tasks: list[Periodic], goes_on: Callable[[], bo
 
 
 def _quick(context: JobContext, now_s: float) -> list[Periodic]:
-    stale, clock = StaleWatch(), ClockWatch()
+    stale, clock, snapshots = StaleWatch(), ClockWatch(), SnapshotRounds()
     return [
         Periodic("clock", _CLOCK_S, lambda: clock.look(context), now_s),
         Periodic("sweep", _SWEEP_S, lambda: run_sweep(context), now_s),
@@ -111,6 +113,7 @@ def _quick(context: JobContext, now_s: float) -> list[Periodic]:
             lambda: run_reconcile(context, stale),
             now_s,
         ),
+        Periodic("snapshots", _SNAPSHOTS_S, lambda: snapshots.run(context), now_s),
     ]
 
 

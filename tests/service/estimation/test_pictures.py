@@ -12,8 +12,11 @@ from PIL import Image
 from sqlalchemy import func, select
 
 from service.app import create_app
+from service.notifications.fetch import Fetched, FetchError
+from service.store import cameras
 from service.store.cameras import SnapshotRecord
 from service.store.pictures import PictureRecord, PictureReferenceRecord
+from service.workers.upkeep import snapshots
 from tests.conftest import CAMERA
 from tests.models.pictures.given import seen_after, wall
 from tests.service.conftest import problem
@@ -32,16 +35,22 @@ def http(request, settings):
         yield client
 
 
-def take(http, pose=PRIOR, *, before_s=0.0, gain=1.0, grey=None):
-    """Send the picture that a camera takes at a pose, with some noise of its own."""
+def picture(pose=PRIOR, seed=7, gain=1.0, grey=None):
+    """The picture that a camera takes at a pose, with some noise of its own, as a PNG."""
     grey = seen_after(SCENE, PRIOR, pose, LENS) if grey is None else grey
-    noise = np.random.default_rng(round(before_s * 10) + 7).normal(0, 2, grey.shape)
+    noise = np.random.default_rng(seed).normal(0, 2, grey.shape)
     made = BytesIO()
     Image.fromarray(np.clip(grey * gain + noise, 0, 255).astype(np.uint8)).save(made, "PNG")
+    return made.getvalue()
+
+
+def take(http, pose=PRIOR, *, before_s=0.0, gain=1.0, grey=None):
+    """Send a picture."""
+    made = picture(pose, round(before_s * 10) + 7, gain, grey)
     at = datetime.now(UTC) - timedelta(seconds=before_s)
     answer = http.put(
         PATH,
-        content=made.getvalue(),
+        content=made,
         headers={"Content-Type": "image/png"},
         params={"taken_at": at.isoformat()},
     )
@@ -165,3 +174,55 @@ def test_an_older_picture_than_the_newest_is_refused(http):
         params={"taken_at": at},
     )
     assert "a newer picture is kept" in problem(answer, 409, "conflict")["detail"]
+
+
+def test_a_camera_is_asked_for_its_picture_and_at_once_in_doubt(http, monkeypatch):
+    seen = {"pose": PRIOR, "asked": 0}
+
+    def fetched(settings, url):
+        seen["asked"] += 1
+        if seen["pose"] is None:
+            raise FetchError("answered 500")
+        return Fetched(content=picture(seen["pose"]), media_type="image/png")
+
+    monkeypatch.setattr(snapshots, "fetch", fetched)
+
+    def rounds(street):
+        with street.context.store.read() as session:
+            due = cameras.snapshots_due(session, datetime.now(UTC), 9)
+        for camera_id, url in due:
+            snapshots.fetch_snapshot(street.context, camera_id, url)
+        return len(due)
+
+    street = known_street(http, http.settings, 60)
+    camera = {"snapshot_url": "http://camera.example/now.jpg"}
+    http.patch("/cameras/corner", json=camera, headers={"If-Match": "*"}).raise_for_status()
+    street.context = replace(street.context, settings=http.settings)
+    assert rounds(street) == 1
+    street.look()
+    assert rounds(street) == 0  # for an hour
+    with street.context.store.write() as session:  # it was an hour ago
+        record = session.get_one(PictureRecord, "corner")
+        record.taken_at = record.same_since = datetime.now(UTC) - timedelta(hours=1)
+    street.clock_s += 19_000
+    street.keep_to_lanes(KNOCKED, 40)
+    seen["pose"] = KNOCKED
+    assert street.look()["state"] == "drifting"
+    assert rounds(street) == 1
+    found = street.look()
+    assert found["estimates"]["picture"]["tilt_deg"] == pytest.approx(5.0, abs=0.2)
+    # One that does not answer is named, and asked again in ten minutes.
+    seen["pose"] = None
+    http.patch("/cameras/corner", json=camera, headers={"If-Match": "*"}).raise_for_status()
+    assert rounds(street) == 1
+    assert http.get("/cameras/corner").json()["snapshot_error"] == "answered 500"
+    assert (rounds(street), seen["asked"]) == (0, 3)
+    gone = {"snapshot_url": ""}
+    after = http.patch("/cameras/corner", json=gone, headers={"If-Match": "*"}).json()
+    assert (after["snapshot_url"], after["snapshot_error"]) == (None, None)
+
+
+def test_an_address_that_is_none_is_refused(http):
+    for url in ("ftp://camera/now.jpg", "http://viewer:secret@camera/", "camera"):
+        body = {**CAMERA, "snapshot_url": url}
+        problem(http.post("/cameras", json=body), 422, "malformed")
