@@ -110,7 +110,7 @@ def parsed(body: bytes, media_type: str) -> Any:
             words = f"at most {_MOST_YAML} bytes of YAML are taken, got {len(body)}"
             raise TooLargeError(f"body: {words}")
         _check_yaml(body)
-        return _plain(yaml.load(body, Loader=yaml.CSafeLoader))
+        return _plain(yaml.safe_load(body))
     except (ValueError, TypeError, RecursionError, yaml.YAMLError) as error:
         what = "YAML with keys that are text" if media_type == YAML_TYPE else "JSON"
         raise MalformedError(f"body: {what} is needed, {str(error):.100}") from error
