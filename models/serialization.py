@@ -49,14 +49,14 @@ def to_bytes(form: Format, values: Mapping[str, Any]) -> bytes:
     return gzip.compress(data, mtime=0)
 
 
-def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
-    """The values of `to_bytes`; arrays of one's own.
+def from_bytes(form: Format, data: bytes, most_bytes: int = _MOST_BYTES) -> dict[str, Any]:
+    """The values of `to_bytes`; arrays of one's own. Unpacked they are of `most_bytes` at most.
 
     Raises:
         CheckpointError: the bytes are damaged, or of another format or version.
     """
     try:
-        raw = _unpacked(data)
+        raw = _unpacked(data, most_bytes)
         # On a place of their own in memory: those of safetensors lie as they come.
         arrays = {name: array.copy() for name, array in load(raw).items()}
         length = int.from_bytes(raw[:8], "little")
@@ -71,11 +71,11 @@ def from_bytes(form: Format, data: bytes) -> dict[str, Any]:
     return {**values, **arrays}
 
 
-def _unpacked(data: bytes) -> bytes:
+def _unpacked(data: bytes, most_bytes: int) -> bytes:
     with gzip.GzipFile(fileobj=BytesIO(data)) as file:
-        raw = file.read(_MOST_BYTES + 1)
-    if len(raw) > _MOST_BYTES:
-        raise ValueError(f"over {_MOST_BYTES} bytes when unpacked")
+        raw = file.read(most_bytes + 1)
+    if len(raw) > most_bytes:
+        raise ValueError(f"over {most_bytes} bytes when unpacked")
     return raw
 
 

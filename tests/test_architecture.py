@@ -33,6 +33,7 @@ MODEL_ROOMS = [
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},
+    {"pictures"},
     {"tracks"},
     {"simulation"},
     {"walking"},

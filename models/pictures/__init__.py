@@ -1,0 +1,1 @@
+"""A camera's turn by two of its pictures, and what else a picture tells."""

@@ -1,0 +1,236 @@
+"""The turn of a camera between two of its pictures, with its covariance, and the pose after it."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.pose import CameraPose, pose_from_centre
+from models.geometry.rotation import Array, Mask, angles_from_rotation
+from models.pictures import config
+from models.pictures.consensus import (
+    Consensus,
+    biweights,
+    consensus_at,
+    derivatives_px,
+    find,
+    fitted,
+    normal_of,
+    residuals_px,
+)
+from models.pictures.features import Features
+from models.pictures.matching import Matches, lens_of, match
+
+_REFITS = 10
+_STEP_RAD = 1e-6  # of numeric derivatives
+_FACE = 24  # directions across the picture, for what is still in sight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """A camera's turn since a reference picture.
+
+    `rotation` (3,) is the rotation vector in radians of `now_from_reference`, in OpenCV's camera
+    frame: x right, y down, z forward, so that a ray x of before is seen at R x. `log_zoom` is the
+    log of the focal length now by that before. `covariance` (4, 4) is of a small turn on the left
+    of R and of the log zoom; floors for light, sway and the lens are in it.
+
+    `inliers` of `matches` agree, `shared` is the share of the old view that is still in sight, and
+    `residual_px` the inliers' usual distance, in pixels of the new picture. `shifted` says that the
+    camera moved aside in a scene of some depth, more likely than that it only turned: then the
+    covariance is wider.
+    """
+
+    rotation: Array
+    log_zoom: float
+    covariance: Array
+    inliers: int
+    matches: int
+    shared: float
+    residual_px: float
+    shifted: bool
+
+    @property
+    def matrix(self) -> Array:
+        """R (3, 3) of `now_from_reference`."""
+        return np.asarray(cv2.Rodrigues(np.asarray(self.rotation, np.float64))[0])
+
+    @property
+    def angle_rad(self) -> float:
+        """The whole angle of the turn."""
+        return float(np.linalg.norm(self.rotation))
+
+    @property
+    def aim(self) -> tuple[float, float, float]:
+        """How far it turned right, down and clockwise, in radians, from where it looked before.
+
+        Of a level camera these are the changes of heading, tilt and roll.
+        """
+        forward, right = self.matrix[2], self.matrix[0]
+        return (
+            math.atan2(forward[0], forward[2]),
+            math.atan2(forward[1], math.hypot(forward[0], forward[2])),
+            math.atan2(right[1], math.hypot(right[0], right[2])),
+        )
+
+
+def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> Turn | None:
+    """The turn between two pictures of a camera; None where they do not match.
+
+    That is no evidence of a move: it may be night, fog, or a lorry before the camera.
+
+    Args:
+        reference: of the picture before.
+        now: of the newer one, of any size.
+        intrinsics: of the camera; scaled to the pictures' sizes.
+    """
+    matches = match(reference, now, intrinsics)
+    # A clock in the picture stands whatever the camera does.
+    allowed = ~matches.overlay
+    best = find(matches, allowed)
+    if best is None or not _is_evidence(matches, best):
+        return None
+    rival = find(matches, allowed & ~best.agree)
+    near = False
+    if rival is not None and rival.score > config.RIVAL * best.score and rival.log10_false < 0:
+        near = _apart_px(matches, best, rival) < 3 * matches.tolerance_px
+        if not near:
+            return None
+    if (best.agree & matches.still).sum() > 0.5 * best.agree.sum():
+        best = consensus_at(matches, np.ones(len(matches), bool), best.rotation, best.log_zoom)
+    else:
+        best = consensus_at(matches, ~matches.still, best.rotation, best.log_zoom)
+        if not _is_evidence(matches, best):
+            return None
+    return _refined(matches, best, reference, now, intrinsics, shifted=near)
+
+
+def turned_pose(prior: CameraPose, turn: Turn) -> CameraPose:
+    """The pose after a turn of a camera that had a pose: where it is, it stays."""
+    return pose_from_centre(turn.matrix @ prior.rotation, prior.centre_m)
+
+
+def turned_covariance(prior: CameraPose, turn: Turn) -> Array:
+    """The covariance (3, 3) of tilt, roll and heading in radians (`ANGLES`) after a turn."""
+    after = turn.matrix @ prior.rotation
+    columns = []
+    for axis in np.eye(3):
+        angles = [
+            np.array(angles_from_rotation(cv2.Rodrigues(sign * _STEP_RAD * axis)[0] @ after))
+            for sign in (1, -1)
+        ]
+        change = angles[0] - angles[1]
+        change[1:] = [math.remainder(each, 2 * math.pi) for each in change[1:].tolist()]
+        columns.append(change / (2 * _STEP_RAD))
+    slopes = np.stack(columns, axis=1)
+    return np.asarray(slopes @ turn.covariance[:3, :3] @ slopes.T)
+
+
+def _is_evidence(matches: Matches, found: Consensus) -> bool:
+    cells = len(np.unique(matches.cells[found.agree]))
+    return bool(
+        found.agree.sum() >= config.FEWEST_INLIERS
+        and cells >= config.FEWEST_CELLS
+        and found.log10_false < config.LOG10_FALSE
+    )
+
+
+def _apart_px(matches: Matches, one: Consensus, other: Consensus) -> float:
+    """How far apart two consensuses see what the first agrees on, in the median."""
+    off = residuals_px(matches, other.rotation, other.log_zoom)[one.agree]
+    return float(np.median(np.nan_to_num(np.linalg.norm(off, axis=-1), nan=np.inf)))
+
+
+def _refined(
+    matches: Matches,
+    found: Consensus,
+    reference: Features,
+    now: Features,
+    intrinsics: Intrinsics,
+    *,
+    shifted: bool,
+) -> Turn:
+    rotation, log_zoom = fitted(matches, found.agree, found.rotation, found.log_zoom, _REFITS)
+    agree = consensus_at(matches, found.agree, rotation, log_zoom).agree
+    off = residuals_px(matches, rotation, log_zoom)
+    length = np.linalg.norm(off, axis=-1)
+    # Of a two-dimensional normal distribution the median distance is 1.177 sd.
+    sigma = max(float(np.median(length[agree])) / 1.177, config.LEAST_SIGMA_PX / now.analysed)
+    shifted = shifted or _is_shifted(matches, agree)
+    covariance = _covariance(matches, agree, rotation, log_zoom, sigma)
+    if shifted:
+        covariance = covariance * config.SHIFTED_WIDER**2
+    vector = np.asarray(cv2.Rodrigues(rotation)[0], np.float64).ravel()
+    lens = (config.LENS_SHARE * np.linalg.norm(vector)) ** 2
+    floor = np.array([*[config.FLOOR_RAD**2 + lens] * 3, config.FLOOR_LOG_ZOOM**2])
+    return Turn(
+        rotation=vector,
+        log_zoom=log_zoom,
+        covariance=covariance + np.diag(floor),
+        inliers=int(agree.sum()),
+        matches=len(matches),
+        shared=_shared(rotation, log_zoom, reference, now, intrinsics),
+        residual_px=float(np.median(length[agree])),
+        shifted=shifted,
+    )
+
+
+def _covariance(
+    matches: Matches, agree: Mask, rotation: Array, log_zoom: float, sigma: float
+) -> Array:
+    """The covariance (4, 4): what residuals say, those of a cell of the picture being alike.
+
+    Source: Cameron and Miller 2015, eq. 11 (clusters).
+    """
+    slopes, off = (
+        derivatives_px(matches, rotation, log_zoom),
+        residuals_px(matches, rotation, log_zoom),
+    )
+    length = np.linalg.norm(off, axis=-1)
+    weights = biweights(length, matches.tolerance_px) * matches.weights * agree
+    normal, _ = normal_of(slopes, off, weights)
+    normal[3, 3] += 1.0 / config.LOG_ZOOM_SD**2
+    bread = np.linalg.inv(normal + np.eye(4) * 1e-12 * np.trace(normal))
+    pulls = np.einsum("mki,mk,m->mi", slopes[agree], off[agree], weights[agree])
+    sums = np.zeros((config.CELLS[0] * config.CELLS[1], 4))
+    np.add.at(sums, matches.cells[agree], pulls)
+    cells = int((sums != 0).any(axis=1).sum())
+    clustered = bread @ (sums.T @ sums) @ bread * cells / max(cells - 2, 1)
+    plain = (
+        bread
+        @ np.einsum("mki,mkj,m->ij", slopes[agree], slopes[agree], weights[agree] ** 2)
+        @ bread
+    )
+    share = cells / (cells + 8)
+    return np.asarray(share * clustered + (1 - share) * plain * sigma**2)
+
+
+def _is_shifted(matches: Matches, agree: Mask) -> bool:
+    """True where many more matches keep to lines towards one point than agree on a turn."""
+    clear = ~matches.overlay
+    if clear.sum() < 2 * config.FEWEST_INLIERS:
+        return False
+    reach = matches.tolerance_px / 3 / matches.focal_px
+    _, mask = cv2.findEssentialMat(
+        matches.reference[clear, :2], matches.now[clear, :2], np.eye(3), cv2.RANSAC, 0.999, reach
+    )
+    if mask is None:
+        return False
+    more = (mask[:, 0] > 0).sum() - agree.sum()
+    return bool(more > max(config.SHIFTED_MORE * agree.sum(), 10))
+
+
+def _shared(
+    rotation: Array, log_zoom: float, reference: Features, now: Features, intrinsics: Intrinsics
+) -> float:
+    """The share of the old view that is still in sight."""
+    lens = lens_of(intrinsics, reference.width, reference.height)
+    sides = [np.linspace(0, side - 1, _FACE) for side in (reference.width, reference.height)]
+    rays, seen = lens.rays(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
+    turned = rays[seen] @ rotation.T
+    turned[:, :2] *= math.exp(log_zoom)
+    view = lens_of(intrinsics, now.width, now.height)
+    uv, valid = view.project(turned)
+    return float((view.contains(uv) & valid).sum() / max(len(rays), 1))

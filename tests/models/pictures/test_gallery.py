@@ -1,0 +1,70 @@
+from dataclasses import replace
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from models.pictures import config
+from models.pictures.features import describe
+from models.pictures.gallery import best_turn, light_apart, renewed
+from models.pictures.turn import turned_pose
+from tests.models.pictures.given import LENS, PRIOR, seen_after, wall
+
+
+def lit(grey, gain, lift=0.0):
+    return np.clip(grey * gain + lift, 0, 255).astype(np.uint8)
+
+
+def test_the_reference_of_the_same_light_is_asked_first():
+    gallery = [describe(lit(wall(), gain)) for gain in (1.0, 0.3)]
+    found = best_turn(gallery, describe(lit(wall(), 0.32)), LENS)
+    assert (found.reference, found.tried) == (1, 1)
+
+
+def test_no_match_is_no_turn():
+    found = best_turn([describe(wall(0))], describe(wall(1)), LENS)
+    assert (found.turn, found.reference, found.tried) == (None, None, 1)
+    assert best_turn([], describe(wall(1)), LENS).turn is None
+
+
+def test_a_creep_does_not_hide_in_renewals():
+    """Each picture has turned by 0.3 deg more, and is darker than the one before it."""
+    gallery = renewed((), describe(wall()), None)
+    for step in range(1, 6):
+        after = replace(PRIOR, heading_rad=PRIOR.heading_rad + radians(0.3 * step))
+        now = describe(lit(seen_after(wall(), PRIOR, after), 0.8**step))
+        found = best_turn(gallery[-1:], now, LENS)
+        gallery = renewed(gallery, now, found.turn)
+    assert len(gallery) > 2
+    heading = turned_pose(PRIOR, found.turn).heading_rad
+    assert degrees(heading - PRIOR.heading_rad) == pytest.approx(1.5, abs=0.1)
+
+
+def test_a_gallery_keeps_its_first_and_no_more_than_eight():
+    first = describe(wall())
+    gallery = renewed((), first, None)
+    for gain in np.linspace(0.1, 1.0, 14):
+        now = describe(lit(wall(), gain, lift=20 * (1 - gain)))
+        gallery = renewed(gallery, now, best_turn(gallery, now, LENS).turn)
+    assert gallery[0] is first
+    assert 3 <= len(gallery) <= config.MOST_REFERENCES
+
+
+def test_a_picture_that_is_not_known_to_be_of_this_view_becomes_no_reference():
+    gallery = (describe(wall()),)
+    dark = describe(lit(wall(), 0.3))
+    turn = best_turn(gallery, dark, LENS).turn
+    assert len(renewed(gallery, dark, turn)) == 2
+    for wrong in (
+        None,
+        replace(turn, shifted=True),
+        replace(turn, shared=0.5),
+        replace(turn, inliers=9),
+    ):
+        assert renewed(gallery, dark, wrong) == gallery
+
+
+def test_light_apart_is_nothing_of_the_same_picture():
+    measures = describe(wall()).measures
+    assert light_apart(measures, measures) == 0
+    assert light_apart(measures, replace(measures, mean=measures.mean + 30)) == pytest.approx(1)
