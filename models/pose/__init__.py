@@ -33,6 +33,7 @@ from models.pose.estimating import (
     unless_failed,
 )
 from models.pose.hypotheses import Hypothesis, PosePosterior, drift_of, pose_posterior
+from models.pose.picture import PictureEvidence, posterior_by_picture, with_picture
 from models.pose.pose_fit import (
     FusedEstimate,
     Rival,
@@ -78,7 +79,10 @@ __all__ = [
     "Observations",
     "PartialFailure",
     "PoseFinding",
+    "PictureEvidence",
     "PosePosterior",
+    "posterior_by_picture",
+    "with_picture",
     "ChartResult",
     "Trajectory",
     "WalkConfig",

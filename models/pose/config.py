@@ -80,6 +80,11 @@ LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
 OCCAM = 3.0  # log evidence that a pose which is free to fit gains by that alone
 HABIT_LOSS = 0.2  # of a group's own scatter, by which hours differ in how they fit the prior pose
 MOST_LOSS = 50.0  # standard errors: beyond, numbers overflow
+# A picture beside the people.
+PICTURE_FREEDOM = 5.0  # of Student's t: light and leaves move matches beyond residuals
+PICTURE_WRONG = 1e-4  # of matches are of something else: `python -m studies pictures` counts them
+SITE_CHANGES, MOVED_SINCE = 0.02, 0.02  # of windows: people go elsewhere; it moved after them
+PICTURED = 0.5  # likelier right than wrong
 # How often paths are not found again: of cameras turned far, and of those that stand.
 LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
 # A still camera is told to stand where a turn would have been noticed: at four sd, 12 deg would.

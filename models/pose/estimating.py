@@ -18,6 +18,7 @@ from models.pose import config
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
 from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
+from models.pose.picture import PictureEvidence, with_picture
 from models.pose.pose_fit import (
     FullSearch,
     FusedEstimate,
@@ -49,6 +50,7 @@ class PoseFinding:
     change, None where there was none, and `first` the first that counts. `failures` are of what is
     beside. `warm_start` is where the next estimate may begin; None where it has to search all
     poses. `moved_prior` is how likely it was, before any track, that the camera has moved.
+    `picture` is what a picture says beside the people, where there is one that matched.
     """
 
     prior: CameraPose
@@ -59,11 +61,14 @@ class PoseFinding:
     failures: tuple[PartialFailure, ...] = ()
     warm_start: WarmStart | None = None
     moved_prior: float = config.MOVED_PRIOR
+    picture: PictureEvidence | None = None
 
     @cached_property
     def posterior(self) -> PosePosterior:
         """The posterior over what moved."""
-        return pose_posterior(self.fused, self.joint.walking_groups, self.prior, self.moved_prior)
+        groups, moved_prior = self.joint.walking_groups, self.moved_prior
+        people = pose_posterior(self.fused, groups, self.prior, moved_prior)
+        return people if self.picture is None else with_picture(people, self.picture, moved_prior)
 
     @cached_property
     def drift(self) -> Drift:
@@ -80,6 +85,8 @@ def estimate_pose(
     tracks: Observations,
     site: CameraSite,
     warm_start: WarmStart | None = None,
+    *,
+    picture: PictureEvidence | None = None,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
@@ -92,6 +99,7 @@ def estimate_pose(
         warm_start: of the finding of almost the same tracks at the same site, the newest of them
             left out and some older ones: where nothing speaks against it, its pose is refined,
             which takes a quarter to a half of the time and comes to the same.
+        picture: what the newest picture says, where one matched: it counts in the posterior alone.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -100,7 +108,8 @@ def estimate_pose(
     prior = site.prior
     if not site.learned:
         joint = joint_estimate(tracks, prior, site.speed_reference)
-        return PoseFinding(prior=prior, joint=joint, fused=by_speeds_alone(joint, prior))
+        fused = by_speeds_alone(joint, prior)
+        return PoseFinding(prior=prior, joint=joint, fused=fused, picture=picture)
     failures: list[PartialFailure] = []
     found = None
     if site.paths is not None:
@@ -117,6 +126,7 @@ def estimate_pose(
         first=found.first,
         failures=tuple(failures),
         warm_start=None if failures else found.warm_start,
+        picture=picture,
     )
 
 

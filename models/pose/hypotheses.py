@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
-from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array, Mask
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
@@ -49,7 +49,9 @@ class PosePosterior:
     """A mixture over hypotheses: weights (K,), means (K, 4) and covariances (K, 4, 4).
 
     Means are offsets of tilt, roll, log height and heading from the prior pose. By the first
-    hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing.
+    hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing. `pictured` is
+    whether a picture has had its say, and `site_changed` how likely people walk otherwise for other
+    reasons than the camera: 0 without a picture (`models.pose.picture`).
 
     The offset leans on how seldom cameras move; how far off it may be does not. It is asked of the
     hypotheses by which all may have moved: a turn that is too small to be noticed is in there.
@@ -60,6 +62,8 @@ class PosePosterior:
     means: Array
     covariances: Array
     seen: Mask
+    pictured: bool = False
+    site_changed: float = 0.0
 
     @property
     def moved(self) -> float:
@@ -156,16 +160,13 @@ def pose_posterior(
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]
     degrees = _degrees(walking_groups)
-    spreads = (
-        np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
-    )
-    moves = np.einsum("ki,ij->kij", spreads**2, np.eye(len(PARAMETERS)))
+    moves = move_covariances()
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
     squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
     # A mode may be far from a Gaussian: the prior pose is never less likely than people say of it.
     squared[0] = min(squared[0], max(fused.prior_gap, 0.0))
-    log_weights = _log_prior(moved_prior) + _log_student(squared, marginals, degrees)
+    log_weights = log_prior(moved_prior) + log_student(squared, marginals, degrees)
     means = gains @ offset[seen]
     # The variance of a t: of few groups it is wider than that of a normal distribution.
     heavy = (degrees + squared) / (degrees + seen.sum() - 2)
@@ -182,6 +183,26 @@ def pose_posterior(
         covariances=covariances,
         seen=seen,
     )
+
+
+def of_people_who_tell_nothing(prior: CameraPose, moved_prior: float) -> PosePosterior:
+    """The posterior over what moved before anybody has walked by."""
+    moves = move_covariances()
+    return PosePosterior(
+        prior=prior,
+        weights=np.exp(log_prior(moved_prior)),
+        means=np.zeros((len(moves), len(PARAMETERS))),
+        covariances=moves + np.diag(config.REST_SD**2),
+        seen=np.zeros(len(PARAMETERS), bool),
+    )
+
+
+def move_covariances() -> Array:
+    """Covariances (K, 4, 4) of how far what moved does, by each hypothesis."""
+    spreads = (
+        np.where(_MOVED_IN, config.MOVE_SD, 0.0) * np.where(_FAR, config.FAR_MOVE, 1.0)[:, None]
+    )
+    return np.asarray(np.einsum("ki,ij->kij", spreads**2, np.eye(len(PARAMETERS))))
 
 
 def seen_parameters(fused: FusedEstimate, walking_groups: int) -> Mask:
@@ -204,7 +225,7 @@ def off_sd_at_odds(
         walking_groups: of the windows (N,).
         moved_prior: how likely it is, before any track, that the camera has moved.
     """
-    priors = _log_prior(moved_prior)[: len(_SUBSETS)]
+    priors = log_prior(moved_prior)[: len(_SUBSETS)]
     alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
     degrees, size = _degrees(walking_groups), int(seen.sum())
     wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
@@ -218,10 +239,9 @@ def off_sd_at_odds(
 
 
 def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
-    """The drift from the prior pose, by the posterior of an estimate."""
-    return drift_between(
-        posterior.parameters, posterior.sd, fused.identifiable, posterior.prior, posterior.move
-    )
+    """The drift from the prior pose, by the posterior of an estimate and, maybe, a picture."""
+    told = (*fused.identifiable, *(ANGLES if posterior.pictured else ()))
+    return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, posterior.move)
 
 
 def _degrees(walking_groups: float | Array) -> Any:
@@ -229,7 +249,7 @@ def _degrees(walking_groups: float | Array) -> Any:
     return config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
 
 
-def _log_prior(moved_prior: float) -> Array:
+def log_prior(moved_prior: float) -> Array:
     """Log prior weights (K,): each parameter moves by itself, or all, one turn, or the scale."""
     shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - config.MOVES_IN).prod(axis=1)
     rest = 1 - config.ALL_SHARE - config.SCALE_SHARE - config.TURNED_SHARE
@@ -257,7 +277,7 @@ def _by_paths(
     return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
 
 
-def _log_student(squared: Array, scales: Array, degrees: float) -> Array:
+def log_student(squared: Array, scales: Array, degrees: float) -> Array:
     """Log densities (K,) of t's of so many degrees of freedom at squared Mahalanobis distances."""
     size = scales.shape[-1]
     _, log_determinants = np.linalg.slogdet(scales)

@@ -12,13 +12,17 @@ from models.pose.pose_fit import FusedEstimate
 
 
 class WindowState(StrEnum):
-    """State by a window. Where too little is known to say that a camera stands: `learning`."""
+    """State by a window. Where too little is known to say that a camera stands: `learning`.
+
+    `site_changed` is with pictures alone: they say that it stands, and people walk elsewhere.
+    """
 
     LEARNING = "learning"
     OK = "ok"
     SUSPECTED = "suspected"
     UNSURE = "unsure"
     DRIFTING = "drifting"
+    SITE_CHANGED = "site_changed"
 
 
 def state_of(
@@ -34,7 +38,10 @@ def state_of(
     """
     if drifting:
         return WindowState.DRIFTING
-    if fused.paths_changed:
+    if posterior.pictured and posterior.moved < LIKELY:
+        otherwise = fused.paths_changed or posterior.site_changed >= LIKELY
+        return WindowState.SITE_CHANGED if otherwise else WindowState.OK
+    if fused.paths_changed and not posterior.pictured:
         return WindowState.UNSURE
     if posterior.moved >= LIKELY:
         return WindowState.SUSPECTED
