@@ -308,6 +308,7 @@ _OTHERS = {
     "arrivals": "studies.alarms.arrivals_study",
     "base-study": "studies.base_model.base_study",
     "base-model": "studies.base_model.making",
+    "pictures": "studies.pictures.run",
     "zones": "studies.protocol.zones_study",
     "start-weights": "studies.regressors.start_weights",
 }

@@ -31,10 +31,15 @@ RIVAL = 0.6  # of the best consensus' score: a second one as large makes both no
 # Covariance
 ROBUST = 4.685  # Tukey's biweight: 95 % efficient at the normal distribution
 LEAST_SIGMA_PX = 0.3  # of the analysed picture: of a feature's place, at least
+FEW_INLIERS = (
+    75.0  # at which variances double: few match in other light, and err more than they say
+)
 FLOOR_RAD = math.radians(0.02)  # sd of each angle, of pictures of one pose at other hours
 FLOOR_LOG_ZOOM = 0.001
 LENS_SHARE = 0.01  # of the turn: by how much the focal length and the distortion may be wrong
+LENS_ACROSS = 0.2  # of that in the other directions
 SHIFTED_MORE = 0.3  # of the inliers more by a shifted camera than by a turned one
+SHIFTED_LEAST = 12  # more, at least: of a few, lines explain some by chance
 SHIFTED_WIDER = 3.0  # times the standard deviations
 
 # Gallery

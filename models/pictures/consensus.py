@@ -17,6 +17,9 @@ from models.pictures import config
 from models.pictures.matching import Indices, Matches
 
 _CONVERGED = 1e-9
+_JUDGED = 400  # matches that samples are scored by: of more, as many are enough
+_AT_ONCE, _STARTS = 250, 8  # samples of a round; starts that are climbed from
+_MISSED = 1e-6  # of consensuses, by bad luck with the samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,22 +53,32 @@ def find(matches: Matches, allowed: Mask, seed: int = 0) -> Consensus | None:
     if len(of) < 2:
         return None
     draw = np.random.default_rng(seed)
-    count = min(config.SAMPLES, 4 * len(of) ** 2)
-    pairs = of[draw.integers(0, len(of), (count, 2))]
-    rotations, zooms = _by_pairs(matches, pairs[pairs[:, 0] != pairs[:, 1]])
-    if not len(rotations):
-        return None
-    judged = of if len(of) <= 400 else np.sort(draw.choice(of, 400, replace=False))
-    scores = _scores(matches, judged, rotations, zooms)
+    judged = of if len(of) <= _JUDGED else np.sort(draw.choice(of, _JUDGED, replace=False))
+    starts: list[tuple[float, Array, float]] = []
+    tried, needed = 0, config.SAMPLES
+    while tried < needed:
+        pairs = of[draw.integers(0, len(of), (_AT_ONCE, 2))]
+        rotations, zooms = _by_pairs(matches, pairs[pairs[:, 0] != pairs[:, 1]])
+        scores = _scores(matches, judged, rotations, zooms)
+        likely = np.argsort(-scores, kind="stable")[:_STARTS].tolist()
+        starts += [(float(scores[k]), rotations[k], float(zooms[k])) for k in likely]
+        tried += _AT_ONCE
+        share = max((each[0] for each in starts), default=0.0) / matches.weights[judged].sum()
+        needed = min(config.SAMPLES, _samples_for(share))
     best: Consensus | None = None
-    for k in np.argsort(-scores, kind="stable")[:8].tolist():
-        rotation, zoom = rotations[k], float(zooms[k])
-        for _ in range(3):
-            rotation, zoom = fitted(matches, allowed, rotation, zoom)
+    for _, start, log_zoom in sorted(starts, key=lambda each: -each[0])[:_STARTS]:
+        rotation, zoom = fitted(matches, allowed, start, log_zoom, 3)
         made = consensus_at(matches, allowed, rotation, zoom)
         if best is None or made.score > best.score:
             best = made
     return best
+
+
+def _samples_for(share: float) -> int:
+    """How many pairs are enough for one of two right matches, where such a share is right."""
+    if share >= 1:
+        return 1
+    return math.ceil(math.log(_MISSED) / math.log1p(-(max(share, 0.01) ** 2)))
 
 
 def consensus_at(matches: Matches, allowed: Mask, rotation: Array, log_zoom: float) -> Consensus:

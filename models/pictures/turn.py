@@ -163,18 +163,28 @@ def _refined(
     if shifted:
         covariance = covariance * config.SHIFTED_WIDER**2
     vector = np.asarray(cv2.Rodrigues(rotation)[0], np.float64).ravel()
-    lens = (config.LENS_SHARE * np.linalg.norm(vector)) ** 2
-    floor = np.array([*[config.FLOOR_RAD**2 + lens] * 3, config.FLOOR_LOG_ZOOM**2])
     return Turn(
         rotation=vector,
         log_zoom=log_zoom,
-        covariance=covariance + np.diag(floor),
+        covariance=covariance + _floor(vector),
         inliers=int(agree.sum()),
         matches=len(matches),
         shared=_shared(rotation, log_zoom, reference, now, intrinsics),
         residual_px=float(np.median(length[agree])),
         shifted=shifted,
     )
+
+
+def _floor(vector: Array) -> Array:
+    """The covariance (4, 4) of what no residual shows: sway, light, and a lens that is off.
+
+    A focal length that is off by a share makes a turn about right or down off by that share.
+    """
+    floor = np.diag([*[config.FLOOR_RAD**2] * 3, config.FLOOR_LOG_ZOOM**2])
+    aside = config.LENS_SHARE * np.array([vector[0], vector[1], 0.0])
+    floor[:3, :3] += np.outer(aside, aside)
+    floor[:3, :3] += np.eye(3) * (config.LENS_ACROSS * config.LENS_SHARE) ** 2 * (vector @ vector)
+    return np.asarray(floor)
 
 
 def _covariance(
@@ -204,13 +214,15 @@ def _covariance(
         @ bread
     )
     share = cells / (cells + 8)
-    return np.asarray(share * clustered + (1 - share) * plain * sigma**2)
+    wider = 1 + config.FEW_INLIERS / max(agree.sum(), 1)
+    return np.asarray((share * clustered + (1 - share) * plain * sigma**2) * wider)
 
 
 def _is_shifted(matches: Matches, agree: Mask) -> bool:
     """True where many more matches keep to lines towards one point than agree on a turn."""
     clear = ~matches.overlay
-    if clear.sum() < 2 * config.FEWEST_INLIERS:
+    least = max(config.SHIFTED_MORE * agree.sum(), config.SHIFTED_LEAST)
+    if (clear & ~agree).sum() <= least:
         return False
     reach = matches.tolerance_px / 3 / matches.focal_px
     _, mask = cv2.findEssentialMat(
@@ -219,7 +231,7 @@ def _is_shifted(matches: Matches, agree: Mask) -> bool:
     if mask is None:
         return False
     more = (mask[:, 0] > 0).sum() - agree.sum()
-    return bool(more > max(config.SHIFTED_MORE * agree.sum(), 10))
+    return bool(more > least)
 
 
 def _shared(
